@@ -1,8 +1,8 @@
 """Makes the table of docs/evidence/reliability.md: python bench/reliability.py [R7 R8 ...] [--scale 0.1]
 
 A row's result is kept as WORK/ROW.json and not measured again, unless the row is named or --again is given. What is
-kept is printed as Markdown, or written with -o. --scale: of the full numbers that the issue asks for; --minutes: the
-most for each row of fuzzing.
+kept of the rows named, or of all, is printed as Markdown, or written with -o. --scale: of the full numbers that the
+issue asks for; --minutes: the most for each row of fuzzing.
 
 Exit status: 0 nothing was found, 1 a row found something or could not be measured.
 """
@@ -13,6 +13,7 @@ import argparse
 import json
 import resource
 import sys
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -64,15 +65,17 @@ def spoken(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
-def table(work: Path) -> str:
-    head = ("row", "what is tried", "number", "result", "time of one core", "what that leaves open")
-    lines = [f"| {' | '.join(head)} |", "| --- | --- | --- | --- | ---: | --- |"]
-    for row in ROWS.values():
+def table(work: Path, names: Collection[str]) -> str:
+    """The rows `names`, in the order of ROWS, with what is kept of them."""
+    head = ("row", "what is tried", "number", "full number", "result", "time of one core", "what that leaves open")
+    lines = [f"| {' | '.join(head)} |", "| --- | --- | --- | --- | --- | ---: | --- |"]
+    for row in (row for name, row in ROWS.items() if name in names):
         found = kept(row.name, work)
-        cells = [row.name, row.title, f"of {row.full}", "not measured", "", row.leaves]
+        cells = [row.name, row.title, "0", row.full, "not measured", "", row.leaves]
         if found is not None:
             mark = "" if found.sound else "**found:** "
-            cells[2:5] = found.number, mark + found.result, spoken(found.seconds)
+            cells[2] = found.number
+            cells[4:6] = mark + found.result, spoken(found.seconds)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -92,19 +95,20 @@ def main() -> int:
     if unknown := set(given.rows) - set(ROWS):
         parser.error(f"{', '.join(sorted(unknown))}: expected rows of {', '.join(ROWS)}")
     work = given.work.resolve()
-    for name in [] if given.table else given.rows or ROWS:
+    names = given.rows or list(ROWS)
+    for name in [] if given.table else names:
         if given.rows or given.again or kept(name, work) is None:
             print(f"{name}: {ROWS[name].title} ...", file=sys.stderr, flush=True)
             (work / name).mkdir(parents=True, exist_ok=True)
             found = measure(ROWS[name], Run(given.scale, given.minutes, work / name))
             (work / f"{name}.json").write_text(json.dumps(asdict(found), indent=1) + "\n", encoding="utf-8")
             print(f"{name}: {found.number}: {found.result} ({spoken(found.seconds)})", file=sys.stderr, flush=True)
-    text = table(work)
+    text = table(work, names)
     if given.output:
         given.output.write_text(text, encoding="utf-8")
     else:
         print(text, end="")
-    return 0 if all(each.sound for name in ROWS if (each := kept(name, work))) else 1
+    return 0 if all(each.sound for name in names if (each := kept(name, work))) else 1
 
 
 if __name__ == "__main__":

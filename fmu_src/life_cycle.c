@@ -30,7 +30,8 @@ static component* refuse_resource(const log_target* log, const char* reason) {
 }
 
 /* the model of the resource, after a check that resource and variable table are those of the modelDescription.xml */
-static model* create_model(const log_target* log, const void* resource, size_t size, const char* identifier) {
+static model* create_model(const log_target* log, const void* resource, size_t size, const char* identifier,
+                           const char* resources) {
   char expected[39] = "", message[256] = "";
   model* m = model_create(resource, size, message, sizeof message);
   if (!m) {
@@ -42,8 +43,10 @@ static model* create_model(const log_target* log, const void* resource, size_t s
     log_text reason = {.length = 0};
     log_append(&reason, this_fmi.identifier);
     log_append(&reason, " is not that of this FMU: expected ");
+    log_append(&reason, expected);
+    log_append(&reason, ", as of the model in ");
     model_destroy(m);
-    life_refuse(log, reason.bytes, expected);
+    life_refuse(log, reason.bytes, resources);
     return NULL;
   }
   return m;
@@ -56,7 +59,7 @@ component* life_create(const log_target* log, const char* identifier, const char
   if (!resource) {
     return refuse_resource(log, reason.bytes);
   }
-  model* m = create_model(log, resource, size, identifier);
+  model* m = create_model(log, resource, size, identifier, resources);
   free(resource);
   if (!m) {
     return NULL;

@@ -76,9 +76,9 @@ def damaged(run: Run) -> Outcome:
         f"{files} states of another finger and of an older version"
     )
     result = (
-        f"{by_length + plain + others} taken over but for the {repaired:,} under a checksum that fits whose number "
-        "can be one: what is saved is then what was given, and the next 20 samples are finite; "
-        "a refused one changed no byte"
+        f"{by_length + plain + others} wrongly taken over; {repaired:,} of those with a checksum made to fit are taken "
+        "over, since the changed number is a possible one: the FMU then saves what it was given, and its next 20 "
+        "samples are finite; all others are refused with no byte changed"
     )
     return Outcome(number, result, by_length + plain + others == 0)
 
@@ -94,9 +94,9 @@ def day(run: Run) -> Outcome:
         "24 times"
     )
     result = (
-        f"{different} samples differ by a bit from those of the pieces; the last 6 s differ from those of the first "
-        f"hour by {drift:.1g} of {largest:.2g}; in the second half the heap grows by {heap} bytes, the resident memory "
-        f"by {resident} KiB"
+        f"{different} samples differ by a bit from those of the pieces; outputs of the last 6 s differ from the same "
+        f"motion after the first hour by at most {drift:.1g}, the largest being {largest:.2g} (N·m, rad or rad/s); "
+        f"in the second half the heap grows by {heap} bytes, the resident memory by {resident} KiB"
     )
     return Outcome(number, result, different == 0 and drift < 1e-6 * largest and heap <= 0 and resident < 256)
 
@@ -109,10 +109,10 @@ def instances(run: Run) -> Outcome:
     fmu = small(run).fmu
     used, opened = least_growth(fmu, "bare", made)
     lost, left = least_growth(fmu, "unloaded", loads)
-    number = f"{ROUNDS * made:,} instances, {ROUNDS * loads:,} loads and unloads"
+    number = f"{ROUNDS * made:,} instances, {ROUNDS * loads:,} loads and unloads, each in {ROUNDS} equal rounds"
     result = (
-        f"in {made:,} instances {used} bytes and {opened} handles left; "
-        f"in {loads:,} loads {lost} bytes and {left} handles"
+        f"in the round that left least (a leak shows in each): after {made:,} instances {used} bytes and {opened} "
+        f"handles, after {loads:,} loads {lost} bytes and {left} handles"
     )
     return Outcome(number, result, used < made and opened == 0 and lost < loads and left == 0)
 
@@ -199,7 +199,8 @@ def host(run: Run) -> Outcome:
     number = f"{spoken(calls)} calls in {modes} floating-point modes (rounding × flush to zero), locale {locale or 'C'}"
     result = (
         f"{changed} calls changed rounding, masks, x87 word, locale, current folder, umask or SIGFPE; "
-        f"outputs in other modes within {float(answer[3]):.1g} of {float(answer[4]):.2g}"
+        f"outputs in other modes differ by at most {float(answer[3]):.1g}, the largest being {float(answer[4]):.2g} "
+        "(N·m, rad or rad/s)"
     )
     return Outcome(number, result, changed == 0)
 

@@ -240,8 +240,9 @@ def no_room(run: Run) -> Outcome:
     )
     result = (
         f"{tried - ended - lost - len(wrong)} refused in one line, {ended} had room enough, {lost} with little memory "
-        f"ended by a library or by Python itself, no half file; FMU: {refusals} calls refused, "
-        f"{words_said} with a word about memory, {leaked} leaks; {len(wrong)} wrong"
+        f"ended by a library or by Python itself, no half file; FMU: {refusals} of the allocations refuse "
+        f"a call, {words_said} with a word about memory, with the other {allocations - refusals} every call succeeds, "
+        f"{leaked} leaks; {len(wrong)} wrong"
     )
     return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong and fmu_sound)
 
@@ -257,7 +258,7 @@ ROWS = [
     Row(
         "R18",
         "No room, no right, no memory",
-        "all",
+        f"{len(SMALL_COMMANDS)} commands",
         "quotas, network disks; the kernel's out-of-memory killer (R17)",
         no_room,
     ),

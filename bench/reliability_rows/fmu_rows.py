@@ -94,7 +94,8 @@ def values(run: Run) -> Outcome:
                     assert instance.restore(before) == OK
     result = f"{tried - len(wrong)} refused by name with no byte changed; {len(wrong)} wrong"
     return Outcome(
-        f"{tried:,}: every Real input and parameter × NaN, ±Inf, ±1.8e308 × three states, both FMUs",
+        f"{tried:,}: every Real input and parameter × NaN, ±Inf, the largest double with both signs × three states, "
+        "both FMUs",
         "; ".join([result, *wrong[:3]]),
         not wrong,
     )

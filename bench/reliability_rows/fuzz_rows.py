@@ -217,9 +217,15 @@ ROWS = [
     Row(
         "R1",
         "Sequences of FMI calls",
-        "1e7",
+        "1e7 sequences",
         "FMI 3.0; the simulated finger (its random calls are among the tests)",
         calls,
     ),
-    Row("R14", "Inputs of the parsers", "1e7", "logs of the binary formats beyond R15", parsers),
+    Row(
+        "R14",
+        "Inputs of the parsers",
+        "1e7 descriptions, 1e6 rigs",
+        "rigs, where 0 of them are tried; logs of the binary formats beyond R15",
+        parsers,
+    ),
 ]

@@ -16,16 +16,21 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import fmpy
-import numpy as np
-from numpy.typing import NDArray
-from reference_files import SAME_TIME, BadFile, Trace, carried_traces, cross_check_trace
+try:
+    import fmpy
+    import numpy as np
+    from numpy.typing import NDArray
+except ModuleNotFoundError as missing:
+    print(f"check_reference: no {missing.name} in {sys.executable}; expected fmpy and numpy there", file=sys.stderr)
+    sys.exit(2)
+from reference_files import SAME_TIME, BadFile, Trace, carried_traces, cross_check_trace, expect_whole, number
 
 Array = NDArray[Any]
 FMI_TYPES: dict[str, Any] = {
@@ -74,6 +79,7 @@ def read_model(path: Path) -> Any:
         raise BadFile(f"{path}: {str(failed).splitlines()[0]}; expected an FMU") from None
     if model.fmiVersion.split(".")[0] not in ("2", "3") or model.coSimulation is None:
         raise BadFile(f"{path}: FMI {model.fmiVersion}; expected an FMU of FMI 2.0 or 3.0 for co-simulation")
+    expect_whole(path)
     platforms = fmpy.supported_platforms(str(path))
     if fmpy.platform not in platforms and fmpy.platform_tuple not in platforms:
         raise BadFile(f"{path}: binaries for {', '.join(platforms) or 'no platform'}; expected {fmpy.platform}")
@@ -97,6 +103,17 @@ def expect_variables(model: Any, names: Iterable[str], where: object, causality:
             raise BadFile(f"{where}: {name} is not a numeric variable of the FMU")
         if causality and known[name].causality != causality:
             raise BadFile(f"{where}: {name} is of causality {known[name].causality}; expected {causality}")
+
+
+def expect_values(model: Any, settings: Mapping[str, str]) -> None:
+    """Raises BadFile for a value of --set that its variable cannot have."""
+    expect_variables(model, settings, "--set")
+    types = {variable.name: FMI_TYPES[variable.type] for variable in model.modelVariables if is_numeric(variable)}
+    for name, text in settings.items():
+        for each in text.split() or [text]:
+            value = number(each, f"--set {name}")
+            if not issubclass(types[name], np.floating) and not value.is_integer():
+                raise BadFile(f"--set {name}: {each!r}; expected a whole number")
 
 
 def traces_of(path: Path, model: Any, prefix: str | None) -> list[Trace]:
@@ -204,7 +221,7 @@ def check(
 ) -> list[tuple[str, list[Verdict]]]:
     """The verdicts on an FMU, by trace. Raises BadFile, RunFailed."""
     model = read_model(path)
-    expect_variables(model, settings, "--set")
+    expect_values(model, settings)
     found = []
     for trace in traces_of(path, model, prefix):
         check_names(model, trace)
@@ -234,6 +251,16 @@ def setting(text: str) -> tuple[str, str]:
     return name, value
 
 
+def relative_tolerance(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}; expected a number, 0 or more")
+    return value
+
+
 def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description="Compares a co-simulation FMU with reference results.")
     parser.add_argument("fmu", type=Path, metavar="MODEL.fmu")
@@ -244,7 +271,9 @@ def main(arguments: Sequence[str]) -> int:
         help="of NAME_in.csv, NAME_ref.csv and NAME_ref.opt; without it, the results that the FMU carries",
     )
     parser.add_argument("--set", type=setting, action="append", default=[], metavar="VARIABLE=VALUE", dest="settings")
-    parser.add_argument("--tolerance", type=float, metavar="RELTOL", help="in place of the one of the trace")
+    parser.add_argument(
+        "--tolerance", type=relative_tolerance, metavar="RELTOL", help="in place of the one of the trace"
+    )
     options = parser.parse_args(arguments)
     try:
         found = check(options.fmu, options.trace, dict(options.settings), options.tolerance)

@@ -12,13 +12,31 @@ if [ $# -lt 1 ] || [ $# -gt 2 ]; then
 fi
 here=$(dirname "$0")
 worst=0
+checked=0
+failed=0
+names=
 
 # check FMU [TRACE]
 check() {
   "${PYTHON:-python3}" "$here/check_reference.py" "$@"
   status=$?
+  checked=$((checked + 1))
+  if [ "$status" -ne 0 ]; then
+    failed=$((failed + 1))
+    names="$names $(basename "$1")"
+  fi
   if [ "$status" -gt "$worst" ]; then worst=$status; fi
 }
+
+finish() {
+  if [ "$failed" -gt 0 ]; then echo "reference_check: $failed of $checked FMUs failed:$names" >&2; fi
+  exit "$worst"
+}
+
+if ! "${PYTHON:-python3}" -c 'import fmpy, numpy' 2>/dev/null; then
+  echo "reference_check: no fmpy and numpy for ${PYTHON:-python3}; expected PYTHON=a Python that has both" >&2
+  exit 2
+fi
 
 if [ $# -eq 1 ]; then
   for fmu in "$1"/*.fmu; do
@@ -28,7 +46,7 @@ if [ $# -eq 1 ]; then
     fi
     check "$fmu"
   done
-  exit "$worst"
+  finish
 fi
 
 for options in "$2"/*_ref.opt; do
@@ -39,4 +57,4 @@ for options in "$2"/*_ref.opt; do
   name=$(basename "$options" _ref.opt)
   check "$1/$name.fmu" "$2/$name"
 done
-exit "$worst"
+finish

@@ -19,6 +19,7 @@ import io
 import posixpath
 import re
 import zipfile
+import zlib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -156,16 +157,28 @@ def number(text: str, where: str) -> float:
 # --- what an FMU carries ---------------------------------------------------------------------------------------------
 
 
+def expect_whole(fmu: Path) -> None:
+    """Raises BadFile for an archive with a damaged member: its checksums tell."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            damaged = archive.testzip()
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as wrong:
+        raise BadFile(f"{fmu}: {wrong}; expected an archive that is whole") from None
+    if damaged is not None:
+        raise BadFile(f"{fmu}: {damaged}: damaged (its checksum in the archive differs); expected it whole")
+
+
 def carried_traces(fmu: Path, step: float | None, not_numeric: Collection[str]) -> list[Trace]:
     """The traces in an FMU. step: that of its default experiment (s). Raises BadFile.
 
     Columns of variables in `not_numeric` (texts, binary data) are left out.
     """
     with zipfile.ZipFile(fmu) as archive:
-        files = {name: archive.read(name) for name in archive.namelist() if name.startswith("extra/")}
+        names = frozenset(archive.namelist())
+        files = {name: archive.read(name) for name in names if name.startswith("extra/")}
     if MANIFEST not in files:
         raise BadFile(f"{fmu}: no {MANIFEST} in it; expected reference results in the FMU, or FOLDER/NAME of a trace")
-    carried = _Carried(fmu, files, step, not_numeric)
+    carried = _Carried(fmu, names, files, step, not_numeric)
     related = list(carried.related())
     documents = [(MANIFEST, carried.xml(MANIFEST))]  # drafts of the standard had the experiments in the manifest
     documents += [(path, carried.xml(path)) for path, role in related if role.split("/")[0] == "experiment"]
@@ -180,9 +193,10 @@ def carried_traces(fmu: Path, step: float | None, not_numeric: Collection[str]) 
 
 @dataclass(frozen=True)
 class _Carried:
-    """The files of an FMU below extra/, by path."""
+    """The files of an FMU below extra/, by path. names: of all its files."""
 
     fmu: Path
+    names: Collection[str]
     files: Mapping[str, bytes]
     step: float | None
     not_numeric: Collection[str]
@@ -212,7 +226,7 @@ class _Carried:
         return posixpath.normpath(posixpath.join(posixpath.dirname(base), unquote(parts.path)))
 
     def related(self) -> Iterator[tuple[str, str]]:
-        """Path and role of each file that is in the FMU, or is a result or experiment."""
+        """Path and role of each file below extra/. Raises BadFile for one that is gone."""
         for each in _children(self.xml(MANIFEST), "Related"):
             source, role = each.get("source"), each.get("role", "")
             needed = role.split("/")[0] in ("experiment", "result")
@@ -221,9 +235,9 @@ class _Carried:
             path = self.path(MANIFEST, source)
             if path in self.files:
                 self._check_sum(path, each)
-            elif not needed:
-                continue  # a tool that does not know the manifest may have removed it
-            yield path, role
+                yield path, role
+            elif path not in self.names:
+                raise BadFile(f"{self.where(path)}: not in the FMU; expected it, as {MANIFEST} lists it")
 
     def _check_sum(self, path: str, related: ElementTree.Element) -> None:
         expected, kind = related.get("checksum"), related.get("checksumType", "SHA3-256")

@@ -181,6 +181,35 @@ def test_a_bad_setting_is_refused(fmus: Path, setting: str) -> None:
     assert done.status == 2 and done.out == ""
 
 
+@pytest.mark.parametrize("setting", ["bias.forget_rate=abc", "bias.forget_rate=nan", "kinematics_source=1.5"])
+def test_a_setting_that_its_variable_cannot_have_is_no_fault_of_the_fmu(fmus: Path, setting: str) -> None:
+    done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", setting)
+    assert done.status == 2 and done.err.count("\n") == 1
+    name, _, value = setting.partition("=")
+    assert done.err.startswith(f"check_reference: --set {name}: {value!r}; expected a ")
+
+
+@pytest.mark.parametrize("tolerance", ["-1", "nan", "inf", "small"])
+def test_a_tolerance_that_is_none_is_refused(fmus: Path, tolerance: str) -> None:
+    done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", f"--tolerance={tolerance}")
+    assert done.status == 2 and done.out == ""
+    assert f"argument --tolerance: {tolerance!r}; expected a number, 0 or more" in done.err
+
+
+def test_a_python_without_fmpy_is_named(tmp_path: Path) -> None:
+    """-S leaves the installed packages out."""
+    (tmp_path / "bare").write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "$@"\n')
+    (tmp_path / "bare").chmod(0o755)
+    for command in (
+        [str(tmp_path / "bare"), str(EXAMPLE / "check_reference.py"), "some.fmu"],
+        ["sh", str(EXAMPLE / "reference_check.sh"), str(REFERENCE), str(REFERENCE)],
+    ):
+        environment = dict(os.environ, PYTHON=str(tmp_path / "bare"))
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+        assert "no fmpy" in done.stderr and "expected" in done.stderr
+
+
 def test_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
     """The shell variant: the worst answer of all is its own."""
 
@@ -192,11 +221,13 @@ def test_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
     done = run_all(fmus)
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.findall(r"0 of \d+ variables differ from (\w+)", done.stdout) == sorted(NAMES)
+    assert done.stderr == ""
     for name in NAMES:
         shutil.copy(fmus / f"{name}.fmu", tmp_path)
     shutil.copytree(REFERENCE, tmp_path / "traces")
     spoil(tmp_path / "traces" / "cable_loop", "_ref.csv", r"\n0\.0,[^,]*", "\n0.0,1.0")
-    assert run_all(tmp_path, tmp_path / "traces").returncode == 1
+    one = run_all(tmp_path, tmp_path / "traces")
+    assert one.returncode == 1 and one.stderr == f"reference_check: 1 of {len(NAMES)} FMUs failed: cable_loop.fmu\n"
     (tmp_path / "asymmetric_pair.fmu").unlink()
     assert run_all(tmp_path, tmp_path / "traces").returncode == 2
     assert run_all(tmp_path, tmp_path).returncode == 2
@@ -207,7 +238,9 @@ def test_the_workflow_runs_the_script() -> None:
     (command,) = re.findall(r"run: (.*reference_check\.sh .*)", text)
     assert command == "PYTHON=python sh ci_reference_check/reference_check.sh fmus traces"
     assert "python -m pip install fmpy numpy\n" in text  # what the script imports
-    imported = re.findall(r"^import (\w+)", (EXAMPLE / "check_reference.py").read_text(encoding="utf-8"), re.MULTILINE)
+    imported = re.findall(
+        r"^\s*import (\w+)", (EXAMPLE / "check_reference.py").read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert set(imported) - set(sys.stdlib_module_names) == {"fmpy", "numpy"}
 
 

@@ -80,6 +80,12 @@ def test_bad_instantiation_gives_null_and_a_reason(
         assert expected in instance.last_message and instance.messages[-1][1] == "logStatusError"
 
 
+def test_another_guid_is_answered_with_the_one_of_the_resources_and_their_place(small_fmu: UnpackedFmu) -> None:
+    with Instance(small_fmu, guid=b"{of another finger}") as instance:
+        expected = f"expected {small_fmu.guid}, as of the model in {small_fmu.location.decode()}"
+        assert instance.last_message.endswith(expected)
+
+
 def test_instantiation_without_callbacks_or_logger(small_fmu: UnpackedFmu) -> None:
     for arguments in ({"callbacks": None}, {"logger": False}, {"name": None, "logger": False}):
         for guid in (small_fmu.guid.encode(), b"wrong"):

@@ -67,6 +67,14 @@ def test_standard_errors_are_annotations(fitted: Any, ssv: Path) -> None:
         assert said.attrib["identified"] == str(bool(row.identified)).lower()
 
 
+def test_warnings_of_the_fit_are_an_annotation_of_the_set(fitted: Any, ssv: Path) -> None:
+    (annotation,) = ElementTree.parse(ssv).getroot().iterfind(f"{SSV}Annotations/{SSC}Annotation")
+    assert annotation.get("type") == "tendonfmu.fit"
+    (listed,) = annotation
+    assert [each.text for each in listed.findall("warning")] == fitted.warnings and len(fitted.warnings) > 1
+    assert any("residuals are not white" in each for each in fitted.warnings)
+
+
 def test_the_fmu_of_the_start_with_the_set_is_that_of_the_fitted_finger(fitted: Any, ssv: Path, tmp_path: Path) -> None:
     """By fmpy, which sets one value after the other in the order of the FMU."""
     signals = tf.read_recording(UNSEEN).frame[:400]

@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -154,14 +155,43 @@ def test_an_uneven_recording_is_interpolated_to_its_median_step(tmp_path: Path) 
     time[200:] += 0.1
     position = 0.01 * np.sin(8 * (time - time[0]))[:, None]
     recording = tf.Recording.from_arrays(time, tendon_force=5.0 + 100.0 * position, tendon_position=position)
-    fmu = tf.build(DESCRIPTION, tmp_path / "uneven.fmu", reference=recording)
+    with pytest.warns(tf.InputWarning) as warned:
+        fmu = tf.build(DESCRIPTION, tmp_path / "uneven.fmu", reference=recording)
     signals = table(members(fmu)[STIMULI])
+    (said,) = [str(each.message) for each in warned]
+    assert f"gaps, over which 50 of {len(signals)} rows of the reference are interpolated" in said
     step = np.median(np.diff(time))
     assert np.abs(np.diff(signals["time"]) - step).max() < 1e-12 and signals["time"][0] == 0.0
     assert time[-1] - time[0] - step < signals["time"][-1] <= time[-1] - time[0] + 1e-9
     assert np.abs(signals["tendon_position[1]"] - 0.01 * np.sin(8 * signals["time"])).max() < 0.01 * (8 * 0.11) ** 2 / 8
     done = check(fmu)
     assert done.status == 0, done.out + done.err
+
+
+def test_a_recording_of_another_finger_is_warned_of(tmp_path: Path) -> None:
+    """The same that `tendonfmu check` calls an error; the recording of the finger itself raises no warning."""
+    demo = ROOT / "examples" / "demo_recording"
+    signals = tf.read_recording(demo / "two_joints_unseen.parquet").frame[:2000]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tf.build(demo / "two_joints.json", tmp_path / "same.fmu", reference=signals)
+    signals["tendon_position[2]"] *= -1
+    with pytest.warns(tf.InputWarning, match=r"tendon_position\[2\]: .*; probably a wrong sign.*") as found:
+        tf.build(demo / "two_joints.json", tmp_path / "other.fmu", reference=signals)
+    assert len(found) == 1 and found[0].filename == __file__
+    assert (tmp_path / "other.fmu").exists()
+
+
+@pytest.mark.parametrize("name", ["finger.zip", "finger", ".fmu", "finger.fmu.json"])
+@pytest.mark.parametrize("source", [DESCRIPTION, ROOT / "examples/rigs/index_finger.json"])
+def test_an_output_of_another_suffix_is_refused(tmp_path: Path, source: Path, name: str) -> None:
+    with pytest.raises(tf.InputError, match=rf"{re.escape(name)}: expected a name that ends in \.fmu"):
+        tf.build(source, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_suffix_may_be_in_capitals(tmp_path: Path) -> None:
+    assert tf.build(DESCRIPTION, tmp_path / "FINGER.FMU").exists()
 
 
 def test_what_cannot_be_a_reference_is_refused(tmp_path: Path) -> None:
@@ -281,7 +311,11 @@ def test_a_result_alone_takes_inputs_and_options_that_lie_beside_it(edited: Call
 
 
 def test_an_experiment_without_a_tolerance_gets_a_stated_one(edited: Callable[[Edit], Path]) -> None:
-    fmu = edited(lambda files: files.pop(OPTIONS) and None)
+    def without_options(files: dict[str, bytes]) -> None:
+        files.pop(OPTIONS)
+        files[MANIFEST] = re.sub(rb"<Related [^>]*ref\.opt[^>]*>", b"", files[MANIFEST])
+
+    fmu = edited(without_options)
     done = check(fmu)
     assert done.status == 0, done.err
     assert " 7.483e-05 " in done.out  # 1e-3 of the largest
@@ -312,6 +346,11 @@ SPOILED: dict[str, tuple[str, bytes | None, str]] = {
     "no XML": (MANIFEST, b"<a>", "manifest.xml: .*; expected XML"),
     "nothing to compare": (MANIFEST, b"<fmiReferences/>", "no experiment with references and no result"),
     "result missing": (RESULT, None, r"cable_loop_ref\.csv: not in the FMU"),
+    "options missing": (
+        OPTIONS,
+        None,
+        r"cable_loop_ref\.opt: not in the FMU; expected it, as .*manifest\.xml lists it",
+    ),
     "file elsewhere": (
         MANIFEST,
         b'<fmiReferences><Related source="https://example.org/a.csv" role="result"/></fmiReferences>',
@@ -331,6 +370,27 @@ def test_a_bad_file_in_the_fmu_is_named(edited: Callable[[Edit], Path], spoiled:
     done = check(edited(edit))
     assert done.status == 2 and done.err.count("\n") == 1 and done.out == ""
     assert re.search(message, done.err), done.err
+
+
+def test_a_file_of_the_fmu_outside_of_its_folder_may_be_listed(edited: Callable[[Edit], Path]) -> None:
+    def edit(files: dict[str, bytes]) -> None:
+        listed = b'<Related source="../../documentation/%s" role="documentation"/></fmiReferences>'
+        files[MANIFEST] = files[MANIFEST].replace(b"</fmiReferences>", listed % b"index.html")
+
+    assert check(edited(edit)).status == 0
+
+
+@pytest.mark.parametrize("member", [RESULT, OPTIONS, "sources/finger_model.c"])
+def test_a_damaged_member_is_named(fmu: Path, tmp_path: Path, member: str) -> None:
+    """One byte in the middle of what the archive holds of it, where a checksum or the decompression finds it."""
+    with zipfile.ZipFile(fmu) as archive:
+        where = archive.getinfo(member)
+    content = bytearray(fmu.read_bytes())
+    content[where.header_offset + 30 + len(member) + where.compress_size // 2] ^= 0xFF
+    (tmp_path / "damaged.fmu").write_bytes(content)
+    done = check(tmp_path / "damaged.fmu")
+    assert done.status == 2 and done.err.count("\n") == 1 and done.out == ""
+    assert "damaged.fmu: " in done.err and "whole" in done.err
 
 
 # --- FMUs of another tool ---------------------------------------------------------------------------------------------

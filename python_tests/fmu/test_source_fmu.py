@@ -5,6 +5,7 @@ FMI2_FUNCTION_PREFIX is for programs that are linked with several FMUs: no name 
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shutil
@@ -18,7 +19,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fmi2_headers import NAMES, write_headers
+from fmi2_headers import FMPY_HEADERS, NAMES, write_headers
 from fmu_binary import FINGER, OK, Instance, UnpackedFmu, fmi_platform, motion, unpack
 from repository_paths import ROOT, TESTS
 
@@ -81,6 +82,27 @@ def test_the_documentation_says_how_to_build(fingers: list[UnpackedFmu]) -> None
     page = (fingers[0].folder / "documentation" / "index.html").read_text()
     for word in ("cmake -S sources", "FMI_HEADERS", "BUILD_SHARED_LIBS=OFF", "FMI2_FUNCTION_PREFIX", "fmpy compile"):
         assert word in page
+
+
+@needs_tools
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_caller_of_the_documentation_compiles(tmp_path: Path, fmi: int) -> None:
+    """With the prefix on the function that it calls; warnings are errors."""
+    from tendonfmu.fmu.packaging import members
+    from tendonfmu.model import read_finger
+
+    (tmp_path / "other.json").write_text(json.dumps(OTHER))
+    page = members(read_finger(tmp_path / "other.json"), fmi=fmi)["documentation/index.html"].decode()
+    (caller,) = re.findall(r'<pre id="caller">(.*?)</pre>', page, re.DOTALL)
+    (tmp_path / "caller.c").write_text(html.unescape(caller))
+    headers = write_headers(tmp_path / "headers") if fmi == 2 else FMPY_HEADERS
+    options = ("-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{headers}")
+    run("cc", *options, "-c", tmp_path / "caller.c", "-o", tmp_path / "caller.o")
+    called = run("nm", "-u", "--format=just-symbols", tmp_path / "caller.o").split()
+    assert [name for name in called if "fmi" in name] == [
+        f"other_finger_fmi{fmi}Instantiate" + ("CoSimulation" if fmi == 3 else "")
+    ]
+    assert defined(tmp_path / "caller.o") == {"create_other_finger"}
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def use(monkeypatch: pytest.MonkeyPatch, measure: Callable[[Run], Outcome], work
 
 def test_the_rows_are_those_of_the_page() -> None:
     assert list(reliability.ROWS) == [f"R{k}" for k in range(1, 21)]
-    assert re.findall(r"^\| (R\d+) \|(?:[^|\n]*\|){5}$", PAGE.read_text(encoding="utf-8"), re.MULTILINE) == list(
+    assert re.findall(r"^\| (R\d+) \|(?:[^|\n]*\|){6}$", PAGE.read_text(encoding="utf-8"), re.MULTILINE) == list(
         reliability.ROWS
     )
 
@@ -45,8 +45,30 @@ def test_a_result_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsy
 
     assert use(monkeypatch, measure, tmp_path, "--scale", "0.1") == 0
     assert use(monkeypatch, measure, tmp_path) == 0 and scales == [0.1]
-    assert "| R2 | Time and step length | 100 things | all well |" in capsys.readouterr().out
+    assert "| R2 | Time and step length | 100 things | 420 pairs | all well |" in capsys.readouterr().out
     assert use(monkeypatch, measure, tmp_path, "R2") == 0 and scales == [0.1, 1.0]
+
+
+def test_only_the_rows_named_are_printed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, sound in (("R2", True), ("R3", False)):
+        kept = {"number": "5 things", "result": "none", "sound": sound, "seconds": 1.0}
+        (tmp_path / f"{name}.json").write_text(json.dumps(kept))
+
+    def shown(*words: str) -> tuple[int, list[str]]:
+        monkeypatch.setattr(sys, "argv", ["reliability.py", "--work", str(tmp_path), "--table", *words])
+        return reliability.main(), re.findall(r"^\| (R\d+) ", capsys.readouterr().out, re.MULTILINE)
+
+    assert shown("R2") == (0, ["R2"]) and shown("R3", "R2") == (1, ["R2", "R3"])
+    assert shown() == (1, list(reliability.ROWS))
+
+
+def test_full_numbers_and_what_is_left_open_are_those_of_the_page() -> None:
+    lines = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    rows = {cells[0]: cells for cells in lines if len(cells) == 7}
+    for name, row in reliability.ROWS.items():
+        assert (rows[name][1], rows[name][3], rows[name][6]) == (row.title, row.full, row.leaves)
 
 
 @pytest.mark.parametrize("finding", [Outcome("1", "half a file", False), ValueError("lost\ncount")])

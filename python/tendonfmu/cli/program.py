@@ -474,6 +474,10 @@ def fit(
     print_json(lambda: text)
     print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
     say(f"{output}: {len(fitting.parameters_)} numbers estimated")
+    if report is not None:
+        say(f"{report}: all results, as JSON")
+    if ssv is not None:
+        say(f"{ssv}: parameter set for an FMU of the finger")
     if figures is not None:
         from tendonfmu.report import write_fit_page
 

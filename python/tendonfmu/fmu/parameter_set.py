@@ -10,6 +10,8 @@ The standard error of a value is an annotation of its parameter, which readers o
         </ssc:Annotation>
       </ssv:Annotations>
     </ssv:Parameter>
+
+An annotation of the whole set, `tendonfmu.fit`, has an element `warnings` with one `warning` for each of the fit.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from tendonfmu.fmu.packaging import package_file
 from tendonfmu.fmu.reference_results import Related
 from tendonfmu.model import Finger, native
 
-ANNOTATION = "tendonfmu.uncertainty"
+ANNOTATION, OF_THE_SET = "tendonfmu.uncertainty", "tendonfmu.fit"
 MIME_TYPE = "application/x-ssp-parameter-set"
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -63,7 +65,9 @@ def check_parameter_set_path(path: Path, *inputs: Path) -> None:
     check_output(path, *inputs)
 
 
-def write_parameter_set(path: Path, name: str, parameters: Sequence[SetParameter], finger: Finger) -> Path:
+def write_parameter_set(
+    path: Path, name: str, parameters: Sequence[SetParameter], finger: Finger, *, warnings: Sequence[str] = ()
+) -> Path:
     """Write a parameter set, whole or not at all.
 
     Parameters
@@ -76,6 +80,8 @@ def write_parameter_set(path: Path, name: str, parameters: Sequence[SetParameter
         The parameters, with names of `finger`'s.
     finger
         A finger, for the units.
+    warnings
+        Those of the fit, such as that its residuals are not white: standard errors are too small then.
 
     Returns
     -------
@@ -88,11 +94,11 @@ def write_parameter_set(path: Path, name: str, parameters: Sequence[SetParameter
         The file cannot be written.
     """
     with whole_file(path) as file:
-        file.write_bytes(_parameter_set(name, parameters, finger))
+        file.write_bytes(_parameter_set(name, parameters, finger, warnings))
     return path
 
 
-def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger) -> bytes:
+def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger, warnings: Sequence[str]) -> bytes:
     from lxml import etree
 
     units = {each.path: each.unit for each in native.Instance(finger.image).parameters()}
@@ -105,10 +111,8 @@ def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger
         unit = {"unit": units[each.path]} if units[each.path] in base_units else {}
         etree.SubElement(parameter, f"{{{_SSV}}}Real", value=repr(each.value), **unit)
         if each.standard_error is not None and np.isfinite(each.standard_error):
-            annotations = etree.SubElement(parameter, f"{{{_SSV}}}Annotations")
-            annotation = etree.SubElement(annotations, f"{{{_SSC}}}Annotation", type=ANNOTATION)
             etree.SubElement(
-                annotation,
+                _annotation(parameter, ANNOTATION),
                 "uncertainty",
                 standardError=repr(each.standard_error),
                 identified=str(each.identified).lower(),
@@ -120,7 +124,18 @@ def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger
             unit_element = etree.SubElement(defined, f"{{{_SSC}}}Unit", name=unit_name)
             exponents: Mapping[str, Any] = base_units[unit_name]
             etree.SubElement(unit_element, f"{{{_SSC}}}BaseUnit", {key: str(exponents[key]) for key in exponents})
+    if warnings:
+        listed = etree.SubElement(_annotation(root, OF_THE_SET), "warnings")  # an annotation takes one element
+        for sentence in warnings:
+            etree.SubElement(listed, "warning").text = NOT_IN_XML.sub("?", sentence)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def _annotation(parent: Any, kind: str) -> Any:
+    """Return a new annotation of an element."""
+    from lxml import etree
+
+    return etree.SubElement(etree.SubElement(parent, f"{{{_SSV}}}Annotations"), f"{{{_SSC}}}Annotation", type=kind)
 
 
 def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:

@@ -34,6 +34,7 @@ VERSION = "1.0.0-alpha.1"  # of fmi-ls-ref
 # The agreement that the semantics ask of two implementations (docs/reference/semantics.md).
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
 UNEVEN = 1e-6  # share of a step by which a sample may be off the grid before it is interpolated
+GAP = 1.5  # median steps; in a longer step samples were lost
 DIGITS = 12  # of the step: 0.002 s rather than 0.0020000000000000005 s
 
 _SPACE = "http://fmi-standard.org/fmi-ls-manifest"
@@ -131,6 +132,27 @@ def reference_files(finger: Finger, recording: Recording, *, arrays: bool = Fals
             "Step and tolerance of the comparison, in the form of the FMI cross-check",
         ),
     ]
+
+
+def bridged_rows(recording: Recording) -> tuple[int, int]:
+    """Count the rows that `reference_files` interpolates over gaps.
+
+    Parameters
+    ----------
+    recording
+        Two samples or more.
+
+    Returns
+    -------
+    rows : int
+        All rows of the inputs.
+    bridged : int
+        Those among them without a sample nearby: in steps of more than 1.5 median steps.
+    """
+    steps = np.diff(recording.time)
+    median = float(np.median(steps))
+    lost = np.rint(steps[steps > GAP * median] / median) - 1
+    return int(steps.sum() / median + UNEVEN) + 1, int(lost.sum())
 
 
 def related_members(related: Sequence[Related]) -> dict[str, bytes]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import check_output
-from tendonfmu.fmu import build_fmu, parameter_sets, reference_files, related_members
+from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_files, related_members
 from tendonfmu.interface.options import with_checked_options
-from tendonfmu.model import FingerSource, finger_file, read_finger
-from tendonfmu.recordings import RecordingSource, read_recording
+from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
+from tendonfmu.recordings import Recording, RecordingSource, belongs, read_recording
 from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
 
 
@@ -32,7 +33,7 @@ def build(
     finger
         A finger, its description, or the file of it; or the file of a rig, for the FMU of the simulated finger.
     output
-        The FMU to write.
+        The FMU to write, with a name that ends in .fmu.
     reference
         A recording of the finger: the FMU then carries its inputs, the outputs over it, and the tolerance of a
         comparison. None: the FMU carries no reference results.
@@ -53,7 +54,12 @@ def build(
     ------
     InputError
         The description, the recording or a parameter set is refused, binaries are missing, the output cannot be
-        written, or `fmi` is 3 with a rig.
+        written or does not end in .fmu, or `fmi` is 3 with a rig.
+
+    Warns
+    -----
+    InputWarning
+        The recording does not belong to the finger, as `tendonfmu check` finds it, or has gaps.
     """
     target = Path(output)
     folder = None if binaries is None else Path(binaries)
@@ -68,10 +74,32 @@ def build(
         if rig:
             if reference is not None or sets:
                 raise InputError(f"{file}: a rig; expected a finger description with a reference or parameter sets")
+            _check_suffix(target)
             return build_plant_fmu(file, target, binaries=folder)
     else:
         check_output(target, *others)
+    _check_suffix(target)
     model = read_finger(finger)
-    related = [] if reference is None else reference_files(model, read_recording(reference), arrays=fmi == 3)
+    recording = None if reference is None else read_recording(reference)
+    related = [] if recording is None else reference_files(model, recording, arrays=fmi == 3)
     related += parameter_sets(sets, model)
+    for sentence in [] if recording is None else _doubts(model, recording):
+        warnings.warn(sentence, InputWarning, stacklevel=3)  # at the call of tendonfmu.build
     return build_fmu(model, target, binaries=folder, extra=related_members(related), fmi=fmi)
+
+
+def _check_suffix(output: Path) -> None:
+    if output.suffix.lower() != ".fmu":
+        raise InputError(f"{output}: expected a name that ends in .fmu, as importing tools want it")
+
+
+def _doubts(finger: Finger, recording: Recording) -> list[str]:
+    """Return what speaks against a recording as a reference, one line each."""
+    found = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
+    rows, invented = bridged_rows(recording)
+    if invented:
+        found.append(
+            f"{recording.path}: gaps, over which {invented} of {rows} rows of the reference are interpolated; expected "
+            "a recording without gaps, such as a part of this one"
+        )
+    return found

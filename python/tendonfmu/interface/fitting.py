@@ -98,7 +98,7 @@ class FitResult:
         ----------
         path
             A .json file, as of `tendonfmu fit -o`; or a .ssv file, as of `--ssv`: the values that an FMU of the finger
-            takes, with their standard errors as annotations.
+            takes, with their standard errors and the warnings of the fit as annotations.
 
         Raises
         ------
@@ -107,7 +107,8 @@ class FitResult:
         """
         file = Path(path)
         if file.suffix.lower() == ".ssv":
-            write_parameter_set(file, f"{self.finger.name}: fitted", self._set_parameters(), self.finger)
+            name = f"{self.finger.name}: fitted"
+            write_parameter_set(file, name, self._set_parameters(), self.finger, warnings=self.warnings)
         else:
             self.finger.write(path)
 
