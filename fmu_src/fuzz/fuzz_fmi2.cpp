@@ -1,7 +1,7 @@
 // A byte string drives a sequence of FMI 2.0 calls on one instance. Whatever is called, in whatever state and with
 // whatever arguments: a call that is refused leaves no trace in the saved state, one that the standard does not allow
-// is refused, messages are one line, and outputs are finite. fmi2_session.hpp holds what is checked; a wrapper of another
-// version of FMI gets a file like this one.
+// is refused, messages are one line, and outputs are finite. fmi2_session.hpp holds what is checked; a wrapper of
+// another version of FMI gets a file like this one.
 #include <fuzzer/FuzzedDataProvider.h>
 
 #include <algorithm>
