@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -473,3 +474,14 @@ def test_regular_blocks_have_no_gap_in_them() -> None:
     assert blocks.count == 12 and blocks.sizes().sum() == 42
     with pytest.raises(InputError, match="length of a block = 0 s: expected above 0"):
         regular_blocks([time], [parts], 0.0)
+
+
+def test_a_pulley_has_few_forms_however_far_a_joint_seems_to_turn() -> None:
+    """Angles that nearly equal arms do not determine span 1e9 rad."""
+    from tendonfmu.diagnosis.effects.pulley_eccentricity import CANDIDATE as PULLEY
+
+    def forms(reach: float) -> int:
+        span = SimpleNamespace(angle=np.array([[0.0, reach]]))
+        return len(PULLEY.find_shapes({}, Place(1, 1), span))  # type: ignore[arg-type]
+
+    assert forms(1.0) > 1 and forms(100.0) <= 62 and forms(1e9) <= 62

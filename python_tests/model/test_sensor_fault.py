@@ -162,7 +162,7 @@ def test_a_force_that_reads_zero_as_a_slack_tendon_is_wound_up(runner: Runner) -
 
 
 def test_without_other_tendons_nothing_can_be_told(runner: Runner) -> None:
-    """One tendon at one joint: its angle is its own. With the measured angle it is told."""
+    """One tendon alone gives the angle of its joint, so its fault shows only beside the measured angle."""
     recording = {
         name: values if values.ndim == 1 or name == "joint_position" else values[:, :1]
         for name, values in changed(moving(12), "tendon_force", 0, slice(6, None), 0.0).items()

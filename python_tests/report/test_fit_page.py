@@ -234,7 +234,7 @@ def finger_of_one_joint() -> dict[str, Any]:
 
 
 def recording_of(data: dict[str, Any], pretension: float, seed: int) -> dict[str, Any]:
-    """20 s of the finger's own model, to and fro, with some noise on the forces."""
+    """20 s of the finger's own model, back and forth, with some noise on the forces."""
     time = np.arange(2000) * 0.01
     angle = 0.4 * np.sin(2.1 * time) + 0.2 * np.sin(0.7 * time)
     motion = {"time": time, "joint_position": angle[:, None], "joint_velocity": np.gradient(angle, time)[:, None]}

@@ -112,7 +112,7 @@ def test_the_models_jumps_are_drawn_once(loops: LoopFigure, presliding: Preslidi
 
 @needs_plant
 def test_the_small_moves_are_numbered_where_they_turn(presliding: PreslidingFigure) -> None:
-    """To and fro by 2 to 21 mrad, as the page says."""
+    """Back and forth by 2 to 21 mrad, as the page says."""
     moves = 1e3 * np.diff([0.0, *presliding.small.angle[presliding.turns]])
     assert len(moves) == 6 and np.all(moves[:-1] * moves[1:] < 0.0) and moves[0] < 0.0
     sizes = np.abs(moves)

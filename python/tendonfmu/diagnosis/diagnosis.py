@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.cause_selection import CERTAIN, names_with
+from tendonfmu.diagnosis.cause_selection import CERTAIN
 from tendonfmu.diagnosis.changes.check import check_sides
 from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
 from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
@@ -33,15 +33,16 @@ from tendonfmu.diagnosis.evidence import evidence
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings
 from tendonfmu.diagnosis.gain import require_unseen
-from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis, Key
+from tendonfmu.diagnosis.hypotheses import Hypothesis
 from tendonfmu.diagnosis.remainder import Remainder, measure_remainder
 from tendonfmu.diagnosis.residual_views import residual_views, whiteness
-from tendonfmu.diagnosis.result import ABSORBED, Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
 from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, without_events
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.size import size_of
 from tendonfmu.diagnosis.span import span_of
+from tendonfmu.diagnosis.unseen_effects import unseen_effects
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
 from tendonfmu.model import Finger, FingerSource, read_finger
@@ -65,7 +66,6 @@ HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
 HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
-SMALLEST_GAIN = 1e-6  # where every gain counts as material
 SIGNALS = "signals, delay and presliding"
 PHASES = {
     SIGNALS: 20.0,
@@ -403,7 +403,8 @@ class _Result:
             for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
             if all(self._is_in_nominal(each) for each in (cause.accepted[0], rival))
         ]
-        unseen = self._unseen(verified)
+        known = [*verified.causes, *verified.dropped, *self._found.small]
+        unseen = unseen_effects(self._found.last.selection, verified.causes, known, self._least_gain)
         nearest: dict[str, Hypothesis] = {}
         for each in unseen:
             if self._is_in_nominal(_ordinary(each.hypothesis)):
@@ -446,51 +447,6 @@ class _Result:
             return False
         shapes = effect.candidate.find_shapes(nominal, effect.place, span_of(nominal, recordings))
         return any(law_of(shape) == law_of(effect.shape) for shape in shapes)
-
-    def _unseen(self, verified: Verified) -> list[_Unseen]:
-        """Return, for each place at which an effect of ordinary size would not become a cause, its best shape.
-
-        Refitting absorbs the effect, or what it leaves is too small beside the rest of the error. The places nearest
-        to being visible come first.
-        """
-        selection = self._found.last.selection
-        known = [*verified.causes, *verified.dropped, *self._found.small]
-        places = {(cause.effect, each.place.joint, each.place.tendon) for cause in known for each in cause.accepted}
-        names = [cause.effect for cause in verified.causes]
-        best: dict[Key, _Unseen] = {}
-        for each, share in zip(selection.hypotheses, selection.shares, strict=True):
-            if each.level != HERE or each.key in places:
-                continue
-            gain = selection.grams.ordinary_gain(each.mix, np.array(each.members[0].shape.expected))
-            least = self._least_gain * names_with(each.effect, names)
-            own = _Unseen(each, share, gain, least)
-            if each.key not in best or own.nearness > best[each.key].nearness:
-                best[each.key] = own
-        hidden = [each for each in best.values() if each.nearness < 1.0]
-        return sorted(hidden, key=lambda each: -each.nearness)
-
-
-@dataclass(frozen=True)
-class _Unseen:
-    """An effect at a place, and what keeps it from being seen.
-
-    Attributes
-    ----------
-    share
-        Share of its variance that survives the refit.
-    gain, needed
-        1 − rms ratio that an ordinary size would bring, and that a cause has to bring.
-    """
-
-    hypothesis: Hypothesis
-    share: float
-    gain: float
-    needed: float
-
-    @property
-    def nearness(self) -> float:
-        """How near it is to being visible; from 1 on it is."""
-        return min(self.share / ABSORBED, self.gain / max(self.needed, SMALLEST_GAIN))
 
 
 def where_of(hypothesis: Hypothesis) -> Where:

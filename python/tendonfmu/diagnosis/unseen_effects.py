@@ -1,0 +1,73 @@
+"""Which effects a recording cannot show: the refit absorbs them, or an ordinary size is lost beside the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tendonfmu.diagnosis.cause_selection import Selection, names_with
+from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis, Key
+from tendonfmu.diagnosis.result import ABSORBED
+from tendonfmu.diagnosis.search import NamedCause
+
+SMALLEST_GAIN = 1e-6  # where every gain counts as material
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """An effect at a place, and what keeps it from being seen.
+
+    Attributes
+    ----------
+    share
+        Share of its variance that survives the refit.
+    gain, needed
+        1 − rms ratio that an ordinary size would bring, and that a cause has to bring.
+    """
+
+    hypothesis: Hypothesis
+    share: float
+    gain: float
+    needed: float
+
+    @property
+    def nearness(self) -> float:
+        """How near it is to being visible; from 1 on it is."""
+        return min(self.share / ABSORBED, self.gain / max(self.needed, SMALLEST_GAIN))
+
+
+def unseen_effects(
+    selection: Selection, causes: Sequence[NamedCause], known: Sequence[NamedCause], least_gain: float
+) -> list[Unseen]:
+    """Return, for each place at which an effect of ordinary size would not become a cause, its best shape.
+
+    Parameters
+    ----------
+    selection
+        Of the model with all causes.
+    causes
+        Those that are named; each raises what a further one has to gain.
+    known
+        Those and whatever else was seen there; none of them is listed.
+    least_gain
+        Share of the rms that a first cause must remove.
+
+    Returns
+    -------
+    list of Unseen
+        The places nearest to being visible first.
+    """
+    places = {(cause.effect, each.place.joint, each.place.tendon) for cause in known for each in cause.accepted}
+    names = [cause.effect for cause in causes]
+    best: dict[Key, Unseen] = {}
+    for each, share in zip(selection.hypotheses, selection.shares, strict=True):
+        if each.level != HERE or each.key in places:
+            continue
+        gain = selection.grams.ordinary_gain(each.mix, np.array(each.members[0].shape.expected))
+        own = Unseen(each, share, gain, least_gain * names_with(each.effect, names))
+        if each.key not in best or own.nearness > best[each.key].nearness:
+            best[each.key] = own
+    hidden = [each for each in best.values() if each.nearness < 1.0]
+    return sorted(hidden, key=lambda each: -each.nearness)
