@@ -327,13 +327,15 @@ class finger {
 
   // Without a branch for each output: 25 of them took 9 % of a step.
   bool unpack(const outputs& wanted, std::size_t samples, tendonfmu_outputs& c) const noexcept {
-    bool wrong = false;
+    int wrong = 0;
     detail::for_each_output(wanted, c, joints_, tendons_,
                             [&](const char*, auto array, auto*& to, std::size_t count) noexcept {
                               to = pointer(array);
-                              wrong |= (array.size() != 0) & (array.size() != samples * count);
+                              const int is_wanted = array.size() != 0;
+                              const int differs = array.size() != samples * count;
+                              wrong |= is_wanted & differs;
                             });
-    return !wrong || have_sizes(wanted, samples);
+    return wrong == 0 || have_sizes(wanted, samples);
   }
 
   // The same, to name the first one that is wrong.
