@@ -52,7 +52,9 @@ def names(cause: Cause) -> set[str]:
 # --- nothing changed --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("how", [OTHER, REPEAT], ids=["other motion", "exact repeat"])
+@pytest.mark.parametrize(
+    "how", repeated([pytest.param(OTHER, id="other motion"), pytest.param(REPEAT, id="exact repeat")], 0)
+)
 def test_nothing_is_named_where_nothing_has_changed(how: How) -> None:
     found = changes(how=how)
     assert (found.kind, found.verdict, found.causes, found.load) == ("change", "adequate", (), None)
@@ -114,6 +116,7 @@ def test_a_number_that_changed_by_30_percent_is_named_with_its_size(
     assert cause.parameters[path][0] == pytest.approx(told.now.value)
 
 
+@pytest.mark.long
 def test_a_term_that_the_description_lacks_was_0() -> None:
     found = changes(now=replace(WELL, mass=0.02))
     (cause,) = found.causes
@@ -126,6 +129,7 @@ def test_a_term_that_the_description_lacks_was_0() -> None:
     assert math.hypot(last["sine"], last["cosine"]) == pytest.approx(cause.changed.now.value)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_two_changes_at_once_have_a_size_each() -> None:
     found = changes(now=BOTH)

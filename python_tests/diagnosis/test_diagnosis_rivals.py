@@ -110,6 +110,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
     )
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_each_rival_answers_on_a_recording(case: Case) -> None:
     answered = beside(case)

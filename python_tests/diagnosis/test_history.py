@@ -17,7 +17,6 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 from dask_on_loopback import dask_processes
 from real_browser import Elements, figures_of, needs_nothing_else
-from repetitions import repeated
 from tendonfmu.diagnosis.changes import history as change_history
 from tendonfmu.diagnosis.changes.history import History, Line, Size, diagnose_history, share_of, times_of
 from tendonfmu.diagnosis.changes.trend import slope
@@ -280,7 +279,8 @@ def test_names_are_escaped_and_nothing_is_a_history_too(tmp_path: Path) -> None:
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("workers", repeated([0, 2], 0))
+@pytest.mark.long
+@pytest.mark.parametrize("workers", [0, 2])
 def test_friction_that_grows_is_followed(tmp_path: Path, workers: int) -> None:
     """Here, or on workers that are processes of their own on the loopback; the same call again runs nothing."""
     shares = (1.1, 1.25, 1.4)

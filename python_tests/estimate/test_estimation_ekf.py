@@ -73,7 +73,7 @@ class Pair:
         np.testing.assert_allclose(learner.values(), self.twin.parameters(naive.z), rtol=0.0, atol=CLOSE * 1e3)
 
 
-@pytest.mark.parametrize("seed", repeated(range(10), 0, 2))
+@pytest.mark.parametrize("seed", repeated(range(10), 0))
 def test_random_fingers(seed: int) -> None:
     """All structures: asymmetric, working points, loops, slack, jumps, three kinematics."""
     description, recording, source = random_fit_case(seed, 120)
@@ -91,7 +91,7 @@ BIASES: dict[str, Description] = {
 }
 
 
-@pytest.mark.parametrize("name", repeated(BIASES, 2, 4, 6))
+@pytest.mark.parametrize("name", repeated(BIASES, 6))
 def test_every_bias_option(name: str) -> None:
     description = lasting_finger()
     description["bias"] |= BIASES[name]
@@ -127,7 +127,7 @@ def test_standard_errors_are_those_of_the_numbers() -> None:
 def test_several_recordings_each_with_its_own_bias() -> None:
     description = lasting_finger()
     pair = Pair(description, groups(description, few_unknowns), drift=1e-4)
-    for seed in (4, 5, 6):
+    for seed in (4, 5):
         recording = recorded(description, seed, 8.0, 25.0)
         pair.run(recording, 3, recording["external_torque"])
 

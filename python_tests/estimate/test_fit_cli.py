@@ -227,6 +227,7 @@ def take_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SKIPPED: no SIGINT for another process")
 @pytest.mark.parametrize(("method", "phase"), repeated([("batch", b"pass 2"), ("ekf", b"filtering, pass 1")], 0))
 def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(

@@ -86,6 +86,7 @@ def coloured_fits() -> dict[tuple[str, bool], list[FrictionFit]]:
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["batch", "ekf"])
 def test_standard_errors_cover_the_truth(coloured_fits: dict[Any, list[FrictionFit]], method: str) -> None:
     """rms of the scores: 1 where the standard errors are right. Every sample counted, it is far above."""

@@ -210,6 +210,7 @@ def test_a_python_without_fmpy_is_named(tmp_path: Path) -> None:
         assert "no fmpy" in done.stderr and "expected" in done.stderr
 
 
+@pytest.mark.long
 def test_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
     """The shell variant: the worst answer of all is its own."""
 

@@ -115,6 +115,7 @@ def test_a_program_in_c(
     assert [line.strip() for line in out.splitlines()] == printed(expected[:1] + expected[1:-1], numbers)
 
 
+@pytest.mark.long
 @needs_compiler
 @pytest.mark.slow
 def test_a_program_linked_with_the_sources(

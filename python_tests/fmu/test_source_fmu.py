@@ -185,22 +185,46 @@ MAIN = "int left_main(int, char**); int right_main(int, char**);" + (
 )
 
 
+def compile_with_prefix(fmu: UnpackedFmu, side: str, folder: Path) -> list[str | Path]:
+    """Objects of the sources and of the driver that calls them; every name begins with the prefix."""
+    headers = write_headers(folder / f"headers_{side}")
+    prefix = f"-DFMI2_FUNCTION_PREFIX={side}_"
+    objects = compile_sources(fmu, folder / side, prefix, f"-I{headers}")
+    names = defined(*objects)
+    assert len(names) > 200 and [name for name in names if not name.startswith(f"{side}_")] == []
+    driver = folder / f"{side}.o"
+    run("cc", f"-I{headers}", prefix, f"-Dmain={side}_main", "-c", TESTS / "portable" / "driver.c", "-o", driver)
+    return [*objects, driver]
+
+
+def arguments_of(fmu: UnpackedFmu, samples: Path) -> list[str | Path]:
+    write_samples(fmu, samples)
+    return ["linked", fmu.guid, (fmu.folder / "resources").as_uri(), samples]
+
+
+@needs_tools
+@pytest.mark.slow
+def test_a_prefix_is_before_every_name(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
+    parts = compile_with_prefix(fingers[1], "main", tmp_path)
+    (tmp_path / "main.c").write_text(
+        "int main_main(int, char**);\nint main(int count, char** words) { return main_main(count, words); }"
+    )
+    run("cc", tmp_path / "main.c", *parts, "-o", tmp_path / "program", "-lm")
+    printed = run(tmp_path / "program", *arguments_of(fingers[1], tmp_path / "samples.txt")).splitlines()
+    expected = bits_of_binary(fingers[1])
+    assert [line.strip() for line in printed] == expected
+    assert len(set(expected)) > SAMPLES / 2  # it moves
+
+
+@pytest.mark.long
 @needs_tools
 def test_two_fingers_in_one_program(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
-    headers = write_headers(tmp_path / "headers")
-    driver = TESTS / "portable" / "driver.c"
-    parts: list[Path] = []
+    parts: list[str | Path] = []
     arguments: list[str | Path] = []
     expected: list[str] = []
     for side, fmu in zip(("left", "right"), fingers, strict=True):
-        prefix = f"-DFMI2_FUNCTION_PREFIX={side}_"
-        objects = compile_sources(fmu, tmp_path / side, prefix, f"-I{headers}")
-        names = defined(*objects)
-        assert len(names) > 200 and [name for name in names if not name.startswith(f"{side}_")] == []
-        run("cc", f"-I{headers}", prefix, f"-Dmain={side}_main", "-c", driver, "-o", tmp_path / f"{side}.o")
-        parts += [*objects, tmp_path / f"{side}.o"]
-        write_samples(fmu, tmp_path / f"{side}.txt")
-        arguments += ["linked", fmu.guid, (fmu.folder / "resources").as_uri(), tmp_path / f"{side}.txt"]
+        parts += compile_with_prefix(fmu, side, tmp_path)
+        arguments += arguments_of(fmu, tmp_path / f"{side}.txt")
         expected += bits_of_binary(fmu)
     (tmp_path / "main.c").write_text(MAIN)
     run("cc", tmp_path / "main.c", *parts, "-o", tmp_path / "program", "-lm")
@@ -218,6 +242,7 @@ def moves_like(fmu: UnpackedFmu, library: Path, folder: Path) -> bool:
     return bits_of_binary(UnpackedFmu(folder)) == bits_of_binary(fmu)
 
 
+@pytest.mark.long
 @needs_tools
 @pytest.mark.slow
 def test_without_a_prefix_all_but_fmi_is_hidden(fingers: list[UnpackedFmu], tmp_path: Path) -> None:

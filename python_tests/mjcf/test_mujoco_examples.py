@@ -60,6 +60,7 @@ def test_the_core_takes_force_from_the_tendons() -> None:
     assert velocity[0] > 0.8 and -applied[0] == pytest.approx(lost, rel=0.15) and lost > 0.01
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_compensation_holds_the_force_closer() -> None:
     import press

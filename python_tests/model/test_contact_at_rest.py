@@ -256,6 +256,7 @@ def oracle_run(seed: int) -> oracle.Result:
     return oracle.run(*resting_case(seed), 1 + seed % 3)
 
 
+@pytest.mark.long
 def test_random_fingers_take_every_branch_of_the_rest() -> None:
     seen: Counter[str] = Counter()
     for seed in SEEDS:

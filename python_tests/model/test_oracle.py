@@ -51,6 +51,7 @@ def slow_crossings(step: float) -> dict[str, Any]:
     return recording(time, 10.0 + 2.0 * np.sin(3.0 * time), np.sin(2.0 * time) ** 3, np.cos(time))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("runner", [ORACLE, NATIVE], ids=lambda runner: runner.name)
 def test_halving_the_step_changes_only_what_the_signals_change(runner: Runner) -> None:
     """At common times the difference is of the order of the step (an entry or exit is seen a step later)."""

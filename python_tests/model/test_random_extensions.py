@@ -72,6 +72,7 @@ def run_sse2(description: Description, recording: Recording, source: int) -> dic
 EVERY_RUNNER = [*(each for each in RUNNERS if each is not ORACLE), Runner("sse2_kernel", run_sse2)]
 
 
+@pytest.mark.long
 def test_fingers_have_every_effect_at_every_place_and_take_every_branch() -> None:
     branches: Counter[str] = Counter()
     seen: Counter[str] = Counter()

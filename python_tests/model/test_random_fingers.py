@@ -107,6 +107,7 @@ def detection_oracle_run(seed: int) -> oracle.Result:
     return oracle.run(*detection_case(seed), 1 + seed % 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fingers", repeated([FEWER, FINGERS], 0))
 def test_random_fingers_take_every_branch(fingers: int) -> None:
     branches: Counter[str] = Counter()
@@ -186,6 +187,7 @@ def test_agrees_with_the_oracle_on_random_fingers(runner: Runner, sources: int) 
 # --- the optional keys of the detection
 
 
+@pytest.mark.long
 def test_detection_fingers_take_every_branch() -> None:
     branches: Counter[str] = Counter()
     for seed in DETECTION_FINGERS:

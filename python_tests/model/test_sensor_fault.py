@@ -346,6 +346,7 @@ def oracle_run(seed: int) -> oracle.Result:
     return oracle.run(*failing_case(seed), 1 + seed % 3)
 
 
+@pytest.mark.long
 def test_random_fingers_take_every_branch_of_the_watch() -> None:
     seen: Counter[str] = Counter()
     for seed in SEEDS:

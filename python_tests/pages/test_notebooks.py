@@ -61,6 +61,7 @@ def test_a_notebook_is_stored_without_outputs_and_uses_public_names(file: Path) 
     assert "from tendonfmu" not in source and not re.search(r"\btf\.\w+\._|\btf\._", source)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_run_and_fit(run_notebook: Any, tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[0], tmp_path))

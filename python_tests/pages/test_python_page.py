@@ -57,6 +57,7 @@ def run(code: str, folder: Path) -> str:
     return answer.out
 
 
+@pytest.mark.long
 def test_the_example_of_the_contract(tmp_path: Path) -> None:
     shutil.copy(DEMO / "two_joints.json", tmp_path / "finger.json")
     pd.read_parquet(DEMO / "two_joints_training.parquet").iloc[:5500].to_parquet(tmp_path / "monday.parquet")

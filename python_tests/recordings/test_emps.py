@@ -284,6 +284,7 @@ def test_the_errors_are_those_of_the_benchmark(recordings: dict[str, Path]) -> N
     assert error(recordings["emps"], recordings["DATA_EMPS_PULSES"]) <= 5.99
 
 
+@pytest.mark.long
 @measured
 def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[str, Path]) -> None:
     finger = json.loads(recordings["emps"].read_text(encoding="utf-8"))

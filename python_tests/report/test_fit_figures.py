@@ -368,6 +368,7 @@ def test_every_style_is_known(sheets: list[Sheet]) -> None:
     assert used <= set(STYLES)
 
 
+@pytest.mark.long
 def test_panels_are_drawn(sheets: list[Sheet], tmp_path: Path) -> None:
     """One sheet of each kind: not blank, as large as said, the same bytes again."""
     kinds = {sheet.section: sheet for sheet in sheets}

@@ -295,6 +295,7 @@ def test_a_browser_has_nothing_to_complain_of(browser: str, written: Written, tm
     assert "CONSOLE" not in visit(browser, file, "--dump-dom").stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", repeated([1280, 400], 0))
 def test_screenshots_are_not_blank(browser: str, page: str, tmp_path: Path, width: int) -> None:
     shot = tmp_path / "shot.png"
@@ -307,6 +308,7 @@ def test_screenshots_are_not_blank(browser: str, page: str, tmp_path: Path, widt
     assert all(0.005 < share < 0.5 for share in bands), bands  # ink in every part of it, and paper
 
 
+@pytest.mark.long
 def test_the_browser_tests_can_fail(browser: str, tmp_path: Path) -> None:
     wide = "<!DOCTYPE html><div style='width:900px'>wide</div>"
     found = measure(browser, tmp_path, wide, 400)

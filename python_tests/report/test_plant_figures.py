@@ -71,6 +71,7 @@ def test_every_law_along_a_tendon_has_its_mark(rig: Rig) -> None:
         assert len(route.edges) + len(route.varying_edges) == len(edges)
 
 
+@pytest.mark.long
 @needs_plant
 def test_the_bristles_are_those_named(rig: Rig, presliding: PreslidingFigure) -> None:
     """After a reversal w = −1 + 2 exp(−angle/d): the joint by its own distance, pulley and edge over this tendon's
@@ -85,6 +86,7 @@ def test_the_bristles_are_those_named(rig: Rig, presliding: PreslidingFigure) ->
     assert set(bristle_numbers(rig, JOINT, TENDON)) == {"pulley", "edge", "joint"}
 
 
+@pytest.mark.long
 @needs_plant
 def test_the_loops_tell_what_the_page_says(loops: LoopFigure) -> None:
     """In the middle of a stroke the model is a few percent off; after a reversal as much as the friction itself."""

@@ -87,6 +87,7 @@ def test_its_outputs_are_the_friction_fmus_inputs(plant_fmu: UnpackedFmu, tmp_pa
     assert set(friction.names("input")) <= set(plant_fmu.names("output"))
 
 
+@pytest.mark.long
 def test_same_input_same_bytes(tmp_path: Path) -> None:
     first = build_plant_fmu(INDEX_FINGER, tmp_path / "first.fmu").read_bytes()
     command = [sys.executable, "-c", BUILD, str(INDEX_FINGER), str(tmp_path / "other.fmu")]

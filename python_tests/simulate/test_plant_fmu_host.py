@@ -89,6 +89,7 @@ def comma_locale(tmp_path: Path) -> tuple[str, dict[str, str]]:
     return "de_DE.UTF-8", {**os.environ, "LOCPATH": str(tmp_path)}
 
 
+@pytest.mark.long
 def test_decimal_comma(plant_fmu: UnpackedFmu, comma_locale: tuple[str, dict[str, str]]) -> None:
     name, environment = comma_locale
     command = [sys.executable, "-c", LOCALE_HOST, HERE, str(plant_fmu.folder), name]
@@ -108,6 +109,7 @@ def test_the_hosts_floating_point_stays(plant_fmu: UnpackedFmu) -> None:
     assert np.float64(5e-324) / 1 > 0 and np.float64(2.3e-308) / 4 > 0
 
 
+@pytest.mark.long
 @needs_count
 def test_instances_leave_nothing(plant_fmu: UnpackedFmu) -> None:
     """No handle, and less than half of the smallest block (32 bytes) each by the allocator's own count."""

@@ -215,6 +215,7 @@ def test_cvode_error_falls_with_its_tolerance() -> None:
     assert errors[0] < 1e-2 and errors[-1] < errors[0] / 30.0, errors
 
 
+@pytest.mark.long
 def test_cvode_agrees_with_radau_on_the_twin() -> None:
     """Over 40 ms of a two-joint finger in motion with friction everywhere: the twin's equations, scipy's solver."""
     law = dry(0.02, 0.03, 0.005, 0.2)

@@ -336,6 +336,7 @@ def test_without_a_plant_check_says_so(
     assert read_rig(tmp_path / "rig.json").rate == 500.0  # the file itself can still be read
 
 
+@pytest.mark.long
 def test_an_installation_without_the_module_does_everything_else(tmp_path: Path) -> None:
     """The package as it is where SUNDIALS was not found, in an interpreter of its own."""
     installed = Path(plant.__file__).parent.parent

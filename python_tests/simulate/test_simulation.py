@@ -149,6 +149,7 @@ def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
 # --- reproducibility --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.skipif(
     not sys.platform.startswith("linux") or platform.machine() != "x86_64",
     reason="SAME BYTES ON ANOTHER PROCESSOR NOT TESTED: the C library of x86-64 Linux can be told to do without FMA",

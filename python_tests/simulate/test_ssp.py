@@ -290,6 +290,7 @@ def table_of_page(heading: str) -> list[list[str]]:
     return [[cell.strip() for cell in row.replace("−", "-").strip("|").split("|")] for row in rows]
 
 
+@pytest.mark.long
 def test_the_tables_of_the_page(index_finger: Path) -> None:
     """Torques at the begin of a push within 0.05 mN·m; false contacts within 20 ms; largest errors within 2 mN·m."""
     runs = {

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from repetitions import repeated
 from repository_paths import ROOT
 
 MISSING = "The simulated finger is not built: "
@@ -81,6 +82,7 @@ def test_the_model_is_configured_without_eigen(tmp_path: Path) -> None:
     assert "tendonfmu_description" in built
 
 
+@pytest.mark.long
 @needs_cmake
 def test_the_estimation_needs_no_sundials(tmp_path: Path) -> None:
     said = configure(tmp_path, "-DTENDONFMU_PLANT=OFF")
@@ -92,7 +94,10 @@ def test_the_estimation_needs_no_sundials(tmp_path: Path) -> None:
 @needs_cmake
 @pytest.mark.parametrize(
     ("version", "reason"),
-    [("5.8.0", "is not of version 6 or 7"), ("8.0.0", "is not of version 6 or 7"), ("6.4.1", "cannot be linked")],
+    repeated(
+        [("5.8.0", "is not of version 6 or 7"), ("8.0.0", "is not of version 6 or 7"), ("6.4.1", "cannot be linked")],
+        1,
+    ),
 )
 def test_an_unusable_installation_is_refused_with_its_version(tmp_path: Path, version: str, reason: str) -> None:
     root = fake_sundials(tmp_path / "installation", version)
@@ -101,7 +106,9 @@ def test_an_unusable_installation_is_refused_with_its_version(tmp_path: Path, ve
 
 
 @needs_cmake
-@pytest.mark.parametrize(("content", "reason"), [(None, "does not exist"), (b"no archive", "could not be unpacked")])
+@pytest.mark.parametrize(
+    ("content", "reason"), repeated([(None, "does not exist"), (b"no archive", "could not be unpacked")], 1)
+)
 def test_unusable_sources_do_not_end_the_configuration(tmp_path: Path, content: bytes | None, reason: str) -> None:
     archive = tmp_path / "cvode.tar.gz"
     if content is not None:

@@ -151,7 +151,7 @@ def copied(earlier: Path, folder: Path) -> None:
         (folder / "out" / name).write_bytes(text)
 
 
-@pytest.mark.parametrize("moment", repeated(MOMENTS, 1, 3))
+@pytest.mark.parametrize("moment", repeated(MOMENTS, 1))
 @pytest.mark.parametrize("number", STATUS, ids=lambda number: number.name)
 def test_nothing_is_left_and_nothing_is_lost(
     tmp_path: Path, earlier: Path, moment: str, number: signal.Signals
@@ -205,6 +205,7 @@ def test_a_disk_that_fails_in_between_changes_nothing(
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", repeated([1.0, 3.0, 8.0], 1))
 def test_a_real_diagnosis_is_interrupted(tmp_path: Path, seconds: float) -> None:
     """Wherever it is then."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -41,7 +42,7 @@ from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, wi
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.size import size_of
-from tendonfmu.diagnosis.span import span_of
+from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.unseen_effects import unseen_effects
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
@@ -437,15 +438,19 @@ class _Result:
             for each in unseen
         )
 
+    @cached_property
+    def _nominal_span(self) -> Span:
+        return span_of(self._found.nominal.data, self._found.fitted_to)
+
     def _is_in_nominal(self, effect: Accepted) -> bool:
         """Return whether the nominal description has the place, and the law there that the effect belongs to.
 
         The extended description may have a second law at the place, such as friction by the load, as a cause.
         """
-        nominal, recordings = self._found.nominal.data, self._found.fitted_to
-        if effect.place not in effect.candidate.places(nominal, recordings[0].kinematics):
+        nominal = self._found.nominal.data
+        if effect.place not in effect.candidate.places(nominal, self._found.fitted_to[0].kinematics):
             return False
-        shapes = effect.candidate.find_shapes(nominal, effect.place, span_of(nominal, recordings))
+        shapes = effect.candidate.find_shapes(nominal, effect.place, self._nominal_span)
         return any(law_of(shape) == law_of(effect.shape) for shape in shapes)
 
 

@@ -124,6 +124,9 @@ def _turning_points(path: Numbers, dead: float) -> Numbers:
     if dead <= 0:
         return path[:1]
     thinned = path[:: max(1, len(path) // 20_000)]
+    # Within a stretch that only rises or only falls, its end alone counts.
+    rising = np.diff(thinned) > 0
+    thinned = thinned[np.r_[True, rising[1:] != rising[:-1], True]] if len(thinned) > 2 else thinned
     points, extreme, direction = [float(thinned[0])], float(thinned[0]), 0
     for value in thinned.tolist():
         if (direction >= 0 and value > extreme) or (direction <= 0 and value < extreme):
