@@ -98,9 +98,13 @@ _BINNED = (
 )
 
 
-def views_of(joint: int, size: float, shapes: Mapping[str, Shape]) -> tuple[ResidualView, ...]:
-    """All kinds of views of one joint. size: N·m of what no model explains. shapes: kind → mean residual before."""
-    time, lag, frequency = np.linspace(0.0, 60.0, 1200), np.linspace(0.0, 2.0, 101), np.geomspace(0.05, 50.0, 120)
+def views_of(joint: int, size: float, shapes: Mapping[str, Shape], white: float = 0.08) -> tuple[ResidualView, ...]:
+    """All kinds of views of one joint.
+
+    size: N·m of what no model explains. shapes: kind → mean residual before. white: correlation after 10 ms of what is
+    left.
+    """
+    time, lag, frequency = np.linspace(0.0, 60.0, 1200), np.linspace(0.01, 1.0, 100), np.geomspace(0.05, 50.0, 120)
     before = _coloured(f"before{joint}", len(time), size)
     if shapes:
         before += 1.8 * size * np.sin(2.1 * time + joint) * (1 + 0.4 * np.sin(0.31 * time))
@@ -113,7 +117,7 @@ def views_of(joint: int, size: float, shapes: Mapping[str, Shape]) -> tuple[Resi
     power = size**2 / 50.0 * (1 + 6.0 / (1 + (frequency / 1.5) ** 2)) * np.exp(_noise(f"spectrum{joint}", 120, 0.25))
     hump = 40.0 * np.exp(-(((np.log(frequency) - np.log(0.33)) / 0.25) ** 2)) if shapes else np.zeros_like(frequency)
     found.append(ResidualView(joint, "spectrum", "frequency", "Hz", frequency, power * (1 + hump), power))
-    decay = np.exp(-lag / 0.12)
+    decay = white ** (lag / 0.01)
     longer = 0.7 * np.cos(2.1 * lag) + 0.3 * decay if shapes else decay
     found.append(ResidualView(joint, "autocorrelation", "lag", "s", lag, longer, decay))
     return tuple(found)
@@ -332,8 +336,8 @@ def three_causes() -> Diagnosis:
         ),
         experiment=EXPERIMENT,
         views=(
-            *views_of(1, 2.4e-3, {"tendon_force": lambda f: 2.3e-4 * (f - 11.0)}),
-            *views_of(2, 2.1e-3, {"angle": lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)}),
+            *views_of(1, 2.4e-3, {"tendon_force": lambda f: 2.3e-4 * (f - 11.0)}, 0.51),
+            *views_of(2, 2.1e-3, {"angle": lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)}, 0.42),
         ),
         whiteness=((0.94, 0.51), (0.95, 0.42)),
         detection=None,
@@ -370,7 +374,7 @@ def unexplained() -> Diagnosis:
             "disturbance from outside.",
         ),
         views=(
-            *views_of(1, 1.5e-3, {"time": np.zeros_like}),
+            *views_of(1, 1.5e-3, {"time": np.zeros_like}, 0.93),
             *views_of(2, 0.98e-3, {}),
         ),
         whiteness=((0.93, 0.93), (0.05, 0.05)),
@@ -408,7 +412,7 @@ def many_joints() -> Diagnosis:
         views=tuple(
             view
             for j, size in enumerate(rms, start=1)
-            for view in views_of(j, 0.5 * size, {"angle": lambda q: 0.006 * np.sin(3 * q)})
+            for view in views_of(j, 0.5 * size, {"angle": lambda q: 0.006 * np.sin(3 * q)}, 0.51)
         ),
         whiteness=((0.94, 0.51),) * 4,
         nominal_data=finger,

@@ -44,6 +44,5 @@ from .search import without_blocks as without_blocks
 from .series import make_grid as make_grid
 from .signal_choice import estimation_recordings as estimation_recordings
 from .size import NBSP as NBSP
-from .size import count_of as count_of
 from .size import quantity as quantity
 from .size import size_at as size_at

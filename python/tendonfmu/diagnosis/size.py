@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from tendonfmu.diagnosis.result import FoundPlace
+from tendonfmu.files import counted
 from tendonfmu.model import LEFT_OUT
 
 Thresholds = tuple[float, float]
@@ -34,7 +35,7 @@ def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -
         return f"{sizes[0]}, at each of {len(told)} places"
     units = {_first(each)[1] for each in told}
     if len(units) > 1:  # for example everywhere and at a joint
-        return f"{sizes[0]}; other at {count_of(len(told) - 1, 'place')}"
+        return f"{sizes[0]}; other at {counted(len(told) - 1, 'place')}"
     largest = max(told, key=lambda each: abs(_first(each)[0]))
     return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(told)} places"
 
@@ -79,24 +80,6 @@ def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
 
 def _first(place: FoundPlace) -> tuple[float, str]:
     return next(iter(place.parameters.values()))
-
-
-def count_of(number: int, what: str) -> str:
-    """Return a number with a noun, such as "3 causes".
-
-    Parameters
-    ----------
-    number
-        How many.
-    what
-        Noun in the singular; an "s" makes the plural.
-
-    Returns
-    -------
-    str
-        Number and noun.
-    """
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def quantity(value: float, unit: str, *, sign: bool = False) -> str:

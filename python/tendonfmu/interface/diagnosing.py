@@ -22,11 +22,6 @@ from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text,
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import PhaseState
 
-_GAINS = (
-    "The gain of a cause compares the model that has all causes with one that lacks only this cause; the gain of the "
-    "diagnosis compares it with one that has none.",
-)
-
 
 class DiagnosisWarning(UserWarning):
     """A remark of a diagnosis on its recordings and its result; also in `Diagnosis.warnings`."""
@@ -120,8 +115,8 @@ class Diagnosis:
         return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:
-        lines = [*diagnosis_text.lines(self.found), *(_GAINS if self.found.causes else ())]
-        return html_of(repr(self)[1:-1], diagnosis_text.tables(self.found), lines, self.warnings)
+        tables, lines = diagnosis_text.tables(self.found), diagnosis_text.lines(self.found)
+        return html_of(repr(self)[1:-1], tables, lines, self.warnings)
 
 
 @with_checked_options

@@ -7,17 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.diagnosis import (
-    CONTACT,
-    UNKNOWN,
     Cause,
     DetectionGain,
     Diagnosis,
-    count_of,
     reported_causes,
     size_at,
     thresholds,
 )
-from tendonfmu.files import whole_file
+from tendonfmu.files import counted, whole_file
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
 from tendonfmu.report.diagnosis_text import (
     Names,
@@ -31,6 +28,7 @@ from tendonfmu.report.diagnosis_text import (
     hidden_sentences,
     left_of,
     left_sentence,
+    meaning_of_gain,
     names_of,
     next_sentence,
     parameter_rows,
@@ -145,7 +143,8 @@ def _tiles(found: Diagnosis) -> Iterator[Tile]:
     else:
         yield Tile(before, unit, f"error on {data}, all joints")
     if left := left_of(found):
-        yield Tile(left.told(left.noise), unit, "of what is left is noise: nothing that was recorded predicts it")
+        noise = "that nothing recorded predicts" if left.memory else "is noise: nothing recorded predicts it"
+        yield Tile(left.told(left.noise), unit, f"of what is left {noise}")
         if left.nameless > 0.0:
             yield Tile(left.told(left.nameless), unit, f"of what is left {words.no_name}")
 
@@ -163,7 +162,7 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
         first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
         yield f"Distinguishes: {first}; from {second}."
     if len(plan.separates) > _MOST:
-        yield f"And {count_of(len(plan.separates) - _MOST, 'more pair')}."
+        yield f"And {counted(len(plan.separates) - _MOST, 'more pair')}."
     if plan.makes_visible:
         titles = dict.fromkeys(title_of(where.effect) for where in plan.makes_visible)
         yield f"Makes visible: {'; '.join(titles)}."
@@ -199,28 +198,16 @@ def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     `certainty` is printed small. `places` has (joint, tendon, size) where the cause has numbers.
     """
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
-    where = cause.where.effect
-    meaning = {
-        CONTACT: "less error about the level of the new recordings than about that of the reference"
-        if cause.changed
-        else "less error on the training recordings without these stretches",
-        UNKNOWN: "less error if the predictable part were known",
-    }
-    others = "" if len(found.causes) < 2 else "; the other causes kept"
-    own = f"less error in means of 10 ms, without the slow bias{others}"
-    if found.kind == "change":
-        others = others.replace("causes", "changes")
-        own = f"less of the error that only the new recordings have{others}"
     # the tiles and the waterfall show r itself
     numbers = thresholds(found.extended_data)
-    sizes = [size_at(where, each.parameters, numbers) for each in cause.places]
+    sizes = [size_at(cause.where.effect, each.parameters, numbers) for each in cause.places]
     return {
         "title": _capital(cause.title),
         "full": at_place(_capital(cause.title), cause.where, names),
         "place": _capital(names.places(cause)),
         "size": cause.size,
         "long": len(cause.size) > _LONG,
-        "gain": f"{percent_interval(cause.gain)} {meaning.get(where, own)}",
+        "gain": f"{percent_interval(cause.gain)} {meaning_of_gain(found, cause)}",
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
@@ -300,7 +287,7 @@ def _method(found: Diagnosis) -> Iterator[str]:
     if text := tested_sentence(found):
         yield text
     if found.repeated:
-        yield f"{count_of(found.repeated, 'motion')} of the reference, made again, were compared sample by sample."
+        yield f"{counted(found.repeated, 'motion')} of the reference, made again, were compared sample by sample."
     yield f"The gain was measured on {unseen(found)}, by running both models. Seed {found.seed}."
 
 

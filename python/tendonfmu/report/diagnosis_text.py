@@ -7,9 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tendonfmu.diagnosis import (
     CONTACT,
     TITLES,
+    UNKNOWN,
     Cause,
     Diagnosis,
     FoundPlace,
@@ -18,6 +22,7 @@ from tendonfmu.diagnosis import (
     quantity,
     reported_causes,
 )
+from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.fit_summary import rounded
 from tendonfmu.statistics import Interval
@@ -27,6 +32,7 @@ _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight"
 _MOST_PLACES = 4  # listed at most
 _TOLD = 2  # invisible effects described one by one; more share a sentence
 _PLACED = 4  # of which so many are listed with their places
+_FALLEN = math.exp(-1.0)  # a correlation that has fallen to this is over, as that of one time constant
 Row = tuple[str, ...]
 
 
@@ -55,9 +61,8 @@ class Names:
     def places(self, cause: Cause) -> str:
         """Name the place of a cause, or count its places; "everywhere" for the whole finger."""
         place = self.place(cause.where)
-        if len(cause.places) < 2:
-            return place or "everywhere"
-        return f"{place}, {len(cause.places)} places" if place else f"{len(cause.places)} places"
+        several = counted(len(cause.places), "place") if len(cause.places) > 1 else ""
+        return ", ".join(each for each in (place, several) if each) or "everywhere"
 
 
 def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
@@ -143,8 +148,7 @@ def magnitude(value: float, unit: str) -> str:
 def headline(found: Diagnosis) -> str:
     """Return the verdict in one sentence, and a second one where something touches the finger."""
     count = len(found.causes)
-    what = "changes" if found.kind == "change" else "causes"
-    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {what}"
+    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {words_of(found.kind).one}s"
     text = words_of(found.kind).headlines[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
     if count == 1:
         cause = found.causes[0]
@@ -205,12 +209,15 @@ class Left:
         The rest.
     digits
         Decimals shown.
+    memory
+        How long what is left stays correlated, in words; empty for white noise, or where it is unknown.
     """
 
     whole: float
     noise: float
     nameless: float
     digits: int
+    memory: str
 
     def told(self, value: float) -> str:
         return f"{value:.{self.digits}f}"
@@ -224,7 +231,26 @@ def left_of(found: Diagnosis) -> Left | None:
         return None
     digits = len(rounded(whole).partition(".")[2])
     whole, noise = round(whole, digits), round(min(noise, whole), digits)
-    return Left(whole, noise, round(whole - noise, digits), digits)
+    return Left(whole, noise, round(whole - noise, digits), digits, _memory(found))
+
+
+def _memory(found: Diagnosis) -> str:
+    """Say over which time what is left is correlated, at the joint where it is longest: until 1/e of it remains."""
+    views = [view for view in found.views if view.kind == "autocorrelation"]
+    times = [_time_to_fall(view.x, view.after) for view in views if view.after[0] > _FALLEN]
+    if not times:
+        return ""
+    longest = max(times)
+    return f"{1e3 * longest:.2g} ms" if longest < math.inf else f"{views[0].x[-1]:.2g} s or more"
+
+
+def _time_to_fall(lag: NDArray[np.float64], correlation: NDArray[np.float64]) -> float:
+    """Return the lag (s) at which a correlation above `_FALLEN` first meets it; infinite if it stays above."""
+    below = np.flatnonzero(correlation <= _FALLEN)
+    if not len(below):
+        return math.inf
+    pair = [below[0], below[0] - 1]  # the lower value first, as np.interp wants
+    return float(np.interp(_FALLEN, correlation[pair], lag[pair]))
 
 
 def left_sentence(found: Diagnosis) -> str:
@@ -238,18 +264,21 @@ def left_sentence(found: Diagnosis) -> str:
     Returns
     -------
     str
-        How much is left, how much of that could be predicted, and how much is noise; empty where that is unknown.
+        How much is left, over which time it is correlated, and how much of it could be predicted; empty where that is
+        unknown. It is called noise only where it is white.
     """
     left, (_, unit) = left_of(found), unit_of(found)
     if left is None:
         return ""
-    whole = f"{left.told(left.whole)} {unit} are left"
+    whole = f"{left.told(left.whole)} {unit} are left" + (f", correlated over {left.memory}" if left.memory else "")
     if left.nameless <= 0.0:
-        return f"{whole}. Nothing that was recorded predicts any of it: to these sensors it is noise."
+        noise = "" if left.memory else ": to these sensors it is noise"
+        return f"{whole}. Nothing that was recorded predicts any of it{noise}."
+    rest = "nothing that was recorded predicts" if left.memory else "is noise to these sensors"
     little = "" if found.unexplained.unknown or found.kind == "change" else ", and is too little to matter"
     return (
         f"{whole}. {left.told(left.nameless)} of it {words_of(found.kind).no_name}{little}; "
-        f"the rest, {left.told(left.noise)}, is noise to these sensors."
+        f"the rest, {left.told(left.noise)}, {rest}."
     )
 
 
@@ -349,11 +378,10 @@ def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
         absorbed = [each for each in effects if each.absorbed]
         small = [each for each in effects if not each.absorbed]
         if absorbed:
-            them = "it" if len(absorbed) == 1 else "them"
-            are = _counted(absorbed)
-            yield f"{are} not visible in these data, since {absorbs} absorbs {them}: {_listed(absorbed)}."
+            since = f"since {absorbs} absorbs {'it' if len(absorbed) == 1 else 'them'}"
+            yield f"{_effects_are(absorbed)} not visible in these data, {since}: {_listed(absorbed)}."
         if small:
-            yield f"{_counted(small)} visible only if larger than usual{_limit(found)}: {_listed(small)}."
+            yield f"{_effects_are(small)} visible only if larger than usual{_limit(found)}: {_listed(small)}."
         return
     for each in effects:
         place = f", at {each.places}" if each.places else ""
@@ -369,8 +397,8 @@ def _limit(found: Diagnosis) -> str:
     return f" (a cause has to lower the error by {percent(max(needed))})" if needed else ""
 
 
-def _counted(effects: Sequence[Hidden]) -> str:
-    return f"{len(effects)} effect is" if len(effects) == 1 else f"{len(effects)} effects are"
+def _effects_are(effects: Sequence[Hidden]) -> str:
+    return f"{counted(len(effects), 'effect')} {'is' if len(effects) == 1 else 'are'}"
 
 
 def _listed(effects: Sequence[Hidden]) -> str:
@@ -382,9 +410,32 @@ def _listed(effects: Sequence[Hidden]) -> str:
 def next_sentence(found: Diagnosis) -> str:
     """Say what to record next."""
     sentence = found.experiment.sentence.rstrip(".")
-    if found.kind == "change" and not sentence:
-        return "No further recording is needed: nothing is left to distinguish."
-    return f"{sentence}." if sentence else "No further experiment is needed: nothing is left to distinguish."
+    what = "recording" if found.kind == "change" else "experiment"
+    return f"{sentence}." if sentence else f"No further {what} is needed: nothing is left to distinguish."
+
+
+def meaning_of_gain(found: Diagnosis, cause: Cause) -> str:
+    """Say what the gain of a cause is less of. The gain of the whole diagnosis is another: that of `error_sentence`."""
+    words = words_of(found.kind)
+    if cause.where.effect == CONTACT:
+        return (
+            "less error about the level of the new recordings than about that of the reference"
+            if cause.changed
+            else "less error on the training recordings without these stretches"
+        )
+    if cause.where.effect == UNKNOWN:
+        return "less error if the predictable part were known"
+    return words.own_gain + (f"; the other {words.one}s kept" if len(found.causes) > 1 else "")
+
+
+def own_gain_sentences(found: Diagnosis) -> Iterator[str]:
+    """Explain the column "own gain" of `tables`: one sentence for all causes whose gain has the same meaning."""
+    meanings: dict[str, list[str]] = {}
+    for k, cause in enumerate(reported_causes(found), start=1):
+        meanings.setdefault(meaning_of_gain(found, cause), []).append(str(k))
+    for meaning, numbers in meanings.items():
+        of = f" of {', '.join(numbers)}" if len(meanings) > 1 else ""
+        yield f"own gain{of}: {meaning}"
 
 
 # --- printed ----------------------------------------------------------------------------------------------------------
@@ -405,8 +456,7 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
     """
     names, causes = names_of(found), reported_causes(found)
     if causes:
-        first = "change" if found.kind == "change" else "cause"
-        headings: Row = (first, "place", "size", "gain", "may also be")
+        headings: Row = (words_of(found.kind).one, "place", "size", "own gain", "may also be")
         rows: list[Row] = [
             (
                 f"{k}. {cause.where.effect}",
@@ -459,6 +509,7 @@ def lines(found: Diagnosis) -> Iterator[str]:
         yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
         if confusion := confusion_sentence(cause, names):
             yield f"     {confusion}"
+    yield from own_gain_sentences(found)
     for sentence in (left_sentence(found), unknown_sentence(found)):
         if sentence:
             yield sentence

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.diagnosis import History, Line, count_of, quantity, share_of
+from tendonfmu.diagnosis import History, Line, quantity, share_of
+from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import Names, at_place, percent
 
 
 def headline(found: History) -> str:
     """Say in one sentence what has changed over all recordings."""
-    count = count_of(len(found.recordings), "recording")
+    count = counted(len(found.recordings), "recording")
     if not found.lines:
         return f"Nothing has changed in {count}."
-    return f"{count_of(len(found.lines), 'change')} in {count}."
+    return f"{counted(len(found.lines), 'change')} in {count}."
 
 
 def trend_sentence(line: Line, found: History, names: Names) -> str:
