@@ -222,6 +222,15 @@ def test_a_failure_keeps_the_file_that_was_there(tmp_path: Path) -> None:
 # --- before fmpy ------------------------------------------------------------------------------------------------------
 
 
+def test_the_texts_of_variables_stand_alone() -> None:
+    """A user of the FMU has no paper at hand whose equations the texts could number."""
+    for file in ("variables.json", "plant_variables.json"):
+        table = json.loads((ROOT / "modelDescription" / file).read_text("utf-8"))
+        texts = [group["description"] for group in table["groups"]]
+        texts += [text for _, text in table["parameters"].get("descriptions", [])]
+        assert len(texts) > 10 and not [text for text in texts if re.search(r"\b(eqs?|fig)\. ", text)]
+
+
 @pytest.mark.parametrize("description", repeated([TINY, FINGER], 0), ids=["tiny", "small"])
 def test_fmpy_finds_nothing(description: dict[str, Any], packed: Pack) -> None:
     assert validate_fmu(str(packed(description))) == []

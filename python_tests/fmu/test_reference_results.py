@@ -101,6 +101,21 @@ def test_the_manifest_lists_every_file_with_its_checksum(fmu: Path) -> None:
     assert roles["_ref.csv"] == "result" and roles[".exp"] == "experiment/smoke-test"
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_default_experiment_is_the_span_of_the_check(tmp_path: Path, fmi: int) -> None:
+    """So a client that simulates by defaults runs what the reference results are of; else 10 s in steps of 1 ms."""
+    time = table(INPUTS.read_bytes().replace(b'"', b""))["time"]
+    plain = tf.build(DESCRIPTION, tmp_path / "plain.fmu", fmi=fmi)
+    carrying = tf.build(DESCRIPTION, tmp_path / "carrying.fmu", reference=INPUTS, fmi=fmi)
+    of_run = ElementTree.fromstring(members(carrying)[EXPERIMENT])[0].attrib
+    for fmu, expected in ((plain, (0.0, 10.0, 0.001)), (carrying, (0.0, time[-1] - time[0], np.median(np.diff(time))))):
+        found = ElementTree.fromstring(members(fmu)["modelDescription.xml"]).find("DefaultExperiment")
+        assert found is not None
+        names = ("startTime", "stopTime", "stepSize")
+        assert [float(found.attrib[name]) for name in names] == pytest.approx(expected, rel=1e-9)
+        assert fmu == plain or [found.attrib[name] for name in names] == [of_run[name] for name in names]
+
+
 def test_the_manifest_has_the_attributes_of_fmi_s_schema(fmu: Path) -> None:
     """FMI's schema of all manifests names the attributes of the root; the rest is the layered standard's."""
     schema = etree.XMLSchema(

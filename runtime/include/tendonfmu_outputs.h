@@ -9,11 +9,11 @@
 typedef struct tendonfmu_outputs {
   /* [n] N·m: Torque of the tendons at joint i without friction and bias: estimate of the external torque */
   double* compensated_torque;
-  /* [n] N·m: Torque of the tendons at joint i, the transposed moment arms times the tendon forces (eq. 3) */
+  /* [n] N·m: Torque of the tendons at joint i, the transposed moment arms times the tendon forces */
   double* joint_torque;
-  /* [n] N·m: Modelled effective friction torque at joint i (eq. 10), bias included */
+  /* [n] N·m: Modelled effective friction torque at joint i, bias included */
   double* friction_torque;
-  /* [n] N·m: Effective bias at joint i (fig. 5) */
+  /* [n] N·m: Effective bias at joint i: friction torque that the model alone does not explain */
   double* bias_torque;
   /* [n] rad: Angle of joint i that the model uses */
   double* joint_angle;

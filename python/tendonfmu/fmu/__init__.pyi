@@ -22,7 +22,7 @@ from .parameter_set import check_parameter_set_path as check_parameter_set_path
 from .parameter_set import parameter_sets as parameter_sets
 from .parameter_set import write_parameter_set as write_parameter_set
 from .reference_results import bridged_rows as bridged_rows
-from .reference_results import reference_files as reference_files
+from .reference_results import reference_run as reference_run
 from .reference_results import related_members as related_members
 from .running import check_model as check_model
 from .running import columns_of as columns_of

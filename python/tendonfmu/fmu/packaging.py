@@ -102,6 +102,7 @@ def build_fmu(
     illustrated: bool = True,
     extra: Mapping[str, bytes] | None = None,
     fmi: int = 2,
+    experiment: Mapping[str, float] | None = None,
 ) -> Path:
     """Package the FMU of a finger description.
 
@@ -120,6 +121,8 @@ def build_fmu(
         Other files of the archive, such as those of `related_members`: path -> content.
     fmi
         Version of FMI, 2 or 3.
+    experiment
+        `start`, `stop` and `step` (s) of the default experiment, where they are not those of `describe_model`.
 
     Returns
     -------
@@ -131,7 +134,7 @@ def build_fmu(
     InputError
         The description is refused, binaries are missing, or the output cannot be written.
     """
-    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated, fmi=fmi)
+    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated, fmi=fmi, experiment=experiment)
     archive = pack(content | dict(extra or {}))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
@@ -179,7 +182,12 @@ def guid(resource: bytes, table: VariableTable) -> str:
 
 
 def members(
-    description: Finger, *, binaries: Path | None = None, illustrated: bool = True, fmi: int = 2
+    description: Finger,
+    *,
+    binaries: Path | None = None,
+    illustrated: bool = True,
+    fmi: int = 2,
+    experiment: Mapping[str, float] | None = None,
 ) -> dict[str, bytes]:
     """Return all files of the FMU.
 
@@ -187,7 +195,7 @@ def members(
     ----------
     description
         A valid description.
-    binaries, illustrated, fmi
+    binaries, illustrated, fmi, experiment
         See `build_fmu`.
 
     Returns
@@ -209,6 +217,7 @@ def members(
         model = in_arrays(model, table, group_sizes(len(description.data["joints"]), len(description.data["tendons"])))
     context: dict[str, Any] = {
         **model,
+        **({"default_experiment": experiment} if experiment else {}),
         "fmi": fmi,
         "model_identifier": identifier,
         "guid": guid(description.image, table),

@@ -37,6 +37,7 @@ UNEVEN = 1e-6  # share of a step by which a sample may be off the grid before it
 GAP = 1.5  # median steps; in a longer step samples were lost
 DIGITS = 12  # of the step: 0.002 s rather than 0.0020000000000000005 s
 
+_TIMES = {"start": "Time", "stop": "Time", "step": "Size"}  # how FMI names them: startTime, stopTime, stepSize
 _SPACE = "http://fmi-standard.org/fmi-ls-manifest"
 _ROOT_ATTRIBUTES = {
     "fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
@@ -70,8 +71,24 @@ class Related:
     description: str
 
 
-def reference_files(finger: Finger, recording: Recording, *, arrays: bool = False) -> list[Related]:
-    """Run a finger over a recording, and return inputs, outputs and tolerance as files.
+@dataclass(frozen=True)
+class ReferenceRun:
+    """The run of a finger over a recording, as an FMU carries it.
+
+    Attributes
+    ----------
+    files
+        Experiment, inputs, outputs and options.
+    experiment
+        `start`, `stop` and `step` (s), for the DefaultExperiment of the FMU.
+    """
+
+    files: list[Related]
+    experiment: dict[str, float]
+
+
+def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False) -> ReferenceRun:
+    """Run a finger over a recording; inputs, outputs and tolerance become files.
 
     Parameters
     ----------
@@ -86,8 +103,8 @@ def reference_files(finger: Finger, recording: Recording, *, arrays: bool = Fals
 
     Returns
     -------
-    list of Related
-        Experiment, inputs, outputs and options.
+    ReferenceRun
+        The files, and the span and step of the run.
 
     Raises
     ------
@@ -100,12 +117,13 @@ def reference_files(finger: Finger, recording: Recording, *, arrays: bool = Fals
     # taken by the initialisation.
     rows = np.maximum(np.arange(len(grid)) - 1, 0)
     reference = {name: values if name == "time" else values[rows] for name, values in outputs.items()}
-    name, stop = model_identifier(finger.name), float(grid.time[-1])
+    name = model_identifier(finger.name)
+    experiment = {"start": 0.0, "stop": float(grid.time[-1]), "step": step}
     inputs: Table = {"time": grid.time, **grid.groups}
-    return [
+    files = [
         Related(
             f"{name}.exp",
-            _experiments(name, stop, step, recording.path.name),
+            _experiments(name, experiment, recording.path.name),
             "experiment/smoke-test",
             "application/x-ma-hs-experiments",
             "The run that gave the reference results",
@@ -126,16 +144,17 @@ def reference_files(finger: Finger, recording: Recording, *, arrays: bool = Fals
         ),
         Related(
             f"{name}_ref.opt",
-            _options(stop, step),
+            _options(experiment),
             "configuration",
             "text/csv",
             "Step and tolerance of the comparison, in the form of the FMI cross-check",
         ),
     ]
+    return ReferenceRun(files, experiment)
 
 
 def bridged_rows(recording: Recording) -> tuple[int, int]:
-    """Count the rows that `reference_files` interpolates over gaps.
+    """Count the rows that `reference_run` interpolates over gaps.
 
     Parameters
     ----------
@@ -215,25 +234,24 @@ def _cell(value: Any) -> str:
     return repr(int(value) if isinstance(value, bool) else value)
 
 
-def _options(stop: float, step: float) -> bytes:
-    values = {"StartTime": 0.0, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE, "AbsTol": ABSOLUTE}
+def _options(experiment: Mapping[str, float]) -> bytes:
+    times = {f"{name.capitalize()}{of}": experiment[name] for name, of in _TIMES.items()}
+    values = {**times, "RelTol": RELATIVE, "AbsTol": ABSOLUTE}
     return "".join(f"{name},{value!r}\n" for name, value in values.items()).encode()
 
 
-def _experiments(name: str, stop: float, step: float, source: str) -> bytes:
+def _experiments(name: str, experiment: Mapping[str, float], source: str) -> bytes:
     root = etree.Element("Experiments", name=f"{name}: reference results")
-    experiment = etree.SubElement(
+    element = etree.SubElement(
         root,
         "Experiment",
         name=name,
         description=f"All outputs over {source}",
-        startTime=repr(0.0),
-        stopTime=repr(stop),
-        stepSize=repr(step),
+        **{f"{time}{of}": repr(experiment[time]) for time, of in _TIMES.items()},
         tolerance=repr(RELATIVE),
     )
-    etree.SubElement(experiment, "Stimuli", source=f"{name}_in.csv", type="text/csv")
-    etree.SubElement(experiment, "References", source=f"{name}_ref.csv", type="text/csv")
+    etree.SubElement(element, "Stimuli", source=f"{name}_in.csv", type="text/csv")
+    etree.SubElement(element, "References", source=f"{name}_ref.csv", type="text/csv")
     return _xml(root)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import check_output
-from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_files, related_members
+from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_run, related_members
 from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
 from tendonfmu.recordings import Recording, RecordingSource, belongs, read_recording
@@ -36,7 +36,8 @@ def build(
         The FMU to write, with a name that ends in .fmu.
     reference
         A recording of the finger: the FMU then carries its inputs, the outputs over it, and the tolerance of a
-        comparison. None: the FMU carries no reference results.
+        comparison, and its default experiment has the span and step of the recording. None: the FMU carries no
+        reference results, and its default experiment is 10 s in steps of 1 ms.
     ssv
         Parameter sets of SSP that the FMU shall carry, with names of its parameters, such as those of
         `FitResult.write`. One alone needs no list.
@@ -81,11 +82,13 @@ def build(
     _check_suffix(target)
     model = read_finger(finger)
     recording = None if reference is None else read_recording(reference)
-    related = [] if recording is None else reference_files(model, recording, arrays=fmi == 3)
-    related += parameter_sets(sets, model)
+    run = None if recording is None else reference_run(model, recording, arrays=fmi == 3)
+    related = [*(run.files if run else ()), *parameter_sets(sets, model)]
+    experiment = run.experiment if run else None
     for sentence in [] if recording is None else _doubts(model, recording):
         warnings.warn(sentence, InputWarning, stacklevel=3)  # at the call of tendonfmu.build
-    return build_fmu(model, target, binaries=folder, extra=related_members(related), fmi=fmi)
+    extra = related_members(related)
+    return build_fmu(model, target, binaries=folder, extra=extra, fmi=fmi, experiment=experiment)
 
 
 def _check_suffix(output: Path) -> None:
