@@ -117,7 +117,8 @@ def _numbers(cell: str, count: int | None, place: str, where: object) -> list[fl
     """The numbers of a cell: those of an array are separated by spaces."""
     found = [number(text, f"{where}, {place}") for text in cell.split() or [cell]]
     if count not in (None, len(found)):
-        raise BadFile(f"{where}, {place}: {len(found)} numbers; expected {count}, as in the row before")
+        many = "1 number" if len(found) == 1 else f"{len(found)} numbers"
+        raise BadFile(f"{where}, {place}: {many}; expected {count}, as in the row before")
     return found
 
 

@@ -429,7 +429,7 @@ def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
 
 
 def test_magnitudes_are_counted(case: Case) -> None:
-    with pytest.raises(InputError, match="magnitudes: 1 numbers; expected 2, one per column"):
+    with pytest.raises(InputError, match="magnitudes: 1 number; expected 2, one per column"):
         by_name("gravity").extended(case.data, Place(2), {}, [1.0])
 
 

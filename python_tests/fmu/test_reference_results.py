@@ -259,7 +259,7 @@ def test_cells_of_two_sizes_are_named(edited: Callable[[Edit], Path]) -> None:
         files[MANIFEST] = re.sub(rb' checksum="[^"]*"', b"", files[MANIFEST])
 
     done = check(edited(edit))
-    assert done.status == 2 and "line 3, column compensated_torque[1]: 1 numbers; expected 2" in done.err, done.err
+    assert done.status == 2 and "line 3, column compensated_torque[1]: 1 number; expected 2" in done.err, done.err
 
 
 def test_fmpy_finds_no_outlier(fmu: Path, tmp_path: Path) -> None:

@@ -95,7 +95,7 @@ def test_a_converted_file_is_a_recording(tmp_path: Path) -> None:
         (GOOD.replace("1001,5000", "1001"), ["line 4", "9 columns", "10"]),
         (GOOD.replace("0.002,-2049", "0.002,-2049,7"), ["line 4", "11 columns", "10"]),
         (GOOD.replace("0.002,", "0.001,"), ["line 4", "column 1", "time"]),
-        (GOOD[: -len(ROWS[1]) + 8], ["line 4", "1 rows before it are good"]),
+        (GOOD[: -len(ROWS[1]) + 8], ["line 4", "1 row before it is good"]),
         (b"\xff\xfe\x00%\n", ["da Vinci"]),
     ],
 )

@@ -121,4 +121,4 @@ def test_a_clock_that_was_reset_is_not_sorted_in_silence(tmp_path: Path) -> None
     form = FORMATS["CSV"]
     file = write(tmp_path, form, going_back(sound()))
     found = converted(file, form.map(disorder="sort"))
-    assert "time goes back at 1 places" in found.words and "40 rows with the time of another" in found.words
+    assert "time goes back at 1 place;" in found.words and "40 rows with the time of another" in found.words

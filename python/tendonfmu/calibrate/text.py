@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tendonfmu.calibrate.report import rms_of
+from tendonfmu.files import counted
 from tendonfmu.report import rounded
 
 Report = Mapping[str, Any]
@@ -39,7 +40,7 @@ def verdict(report: Report) -> tuple[str, str]:
     less = 1.0 - after / before if before > 0 else 0.0
     error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
-    built = f", with {'one cause' if causes == 1 else f'{causes} causes'} built into the model" if causes else ""
+    built = f", with {counted(causes, 'cause')} built into the model" if causes else ""
     alarms = f"; at most {per_hour(report)} false alarms an hour are expected in such motion."
     if less < 0:
         return (
@@ -156,7 +157,7 @@ def push_sentence(report: Report) -> str:
     """Say how many labelled pushes are found, and with how many false alarms."""
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
-    many = "no false alarm" if alarms == 0 else f"{alarms} false alarm{'s' if alarms > 1 else ''}"
+    many = "no false alarm" if alarms == 0 else counted(alarms, "false alarm")
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
     return (

@@ -10,6 +10,7 @@ import typer
 
 from tendonfmu.cli.console import NO, fail, print_json, print_tables, progress_bar, say, warn
 from tendonfmu.cli.options import AsJson, LeastGain, Progress, Quiet
+from tendonfmu.files import counted
 
 
 def register(app: typer.Typer) -> None:
@@ -104,7 +105,7 @@ def campaign(
         if row["error"]:
             warn(f"{row['name']}: {row['error']}")
     print_json(lambda: campaign_report(rows, len(listed)))
-    say(f"{output}: {len(rows)} of {len(listed)} cases, {failed} with an error")
+    say(f"{output}: {len(rows)} of {counted(len(listed), 'case')}, {failed} with an error")
     if failed:
-        fail(f"{output}: {failed} of {len(rows)} cases ended in an error; repeat them with --again")
+        fail(f"{output}: {failed} of {counted(len(rows), 'case')} ended in an error; repeat them with --again")
         raise typer.Exit(NO)

@@ -22,6 +22,7 @@ from tendonfmu.cli.options import (
     Seed,
 )
 from tendonfmu.cli.standard_streams import reads
+from tendonfmu.files import counted
 
 
 def register(app: typer.Typer) -> None:
@@ -163,7 +164,7 @@ def score(
     text = score_report.report_text(result.report)
     print_json(lambda: text)
     print_tables(score_text.tables(scored), score_text.lines(scored), left="")
-    say(f"{output}: {result.events} events, {result.false_alarms} false alarms")
+    say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")
     if figures is not None:
         from tendonfmu.report import score_files
 

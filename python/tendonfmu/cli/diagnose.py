@@ -25,6 +25,7 @@ from tendonfmu.cli.options import (
 from tendonfmu.cli.several_values import SeveralValues
 from tendonfmu.cli.standard_streams import check_table, name_of, write_table
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 
 
 def register(app: typer.Typer) -> None:
@@ -193,4 +194,4 @@ def discriminate(context: typer.Context, finger: Path, folder: Path, output: Pat
     write_table(output, columns)
     print_tables((), found.lines(), left="")
     print_json(lambda: found.report(output))
-    say(f"{name_of(output)}: {len(columns['time'])} rows, {columns['time'][-1]:g} s")
+    say(f"{name_of(output)}: {counted(len(columns['time']), 'row')}, {columns['time'][-1]:g} s")

@@ -10,6 +10,7 @@ import typer
 from tendonfmu.cli.console import print_json, say, warn
 from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +90,7 @@ def import_model(
     for sentence in finger.warnings:
         warn(sentence)
     _say_rows(model, "left out: ", finger.left_out)
-    say(f"{output}: {len(finger.data['joints'])} joints, {len(finger.data['tendons'])} tendons")
+    say(f"{output}: {counted(len(finger.data['joints']), 'joint')}, {counted(len(finger.data['tendons']), 'tendon')}")
     print_json(lambda: finger.report(model, output))
 
 
@@ -115,7 +116,7 @@ def export_model(
     written = export_numbers(finger, model, output)
     _say_rows(output, "", [change.line() for change in written.changes])
     _say_rows(output, "MJCF cannot express: ", written.left_out)
-    say(f"{output}: {len(written.changes)} numbers changed")
+    say(f"{output}: {counted(len(written.changes), 'number')} changed")
     print_json(lambda: written.report(finger, model, output))
 
 

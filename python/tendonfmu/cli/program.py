@@ -57,6 +57,7 @@ from tendonfmu.cli.options import (
 )
 from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_table
 from tendonfmu.errors import InputError, InputWarning, line_of
+from tendonfmu.files import counted
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning
@@ -336,7 +337,7 @@ def excite(
         write_text(report, text)
     print_json(lambda: text)
     print_tables(excite_text.tables(result), excite_text.lines(result), left="cannot be identified")
-    say(f"{name_of(output)}: {len(result.motion.time)} rows, {result.motion.time[-1]:g} s")
+    say(f"{name_of(output)}: {counted(len(result.motion.time), 'row')}, {result.motion.time[-1]:g} s")
 
 
 @app.command()
@@ -473,7 +474,7 @@ def fit(
         found.write(ssv)
     print_json(lambda: text)
     print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
-    say(f"{output}: {len(fitting.parameters_)} numbers estimated")
+    say(f"{output}: {counted(len(fitting.parameters_), 'number')} estimated")
     if report is not None:
         say(f"{report}: all results, as JSON")
     if ssv is not None:

@@ -17,6 +17,7 @@ from scipy.signal import lfilter
 
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
 from tendonfmu.detect.free_motion import NEVER, FreePart
+from tendonfmu.files import counted
 from tendonfmu.model import DEFAULTS, native, number_of
 
 Numbers = NDArray[np.float64]
@@ -123,8 +124,8 @@ def learn_rest(
     if 60.0 * hours < LEAST_MINUTES or len(rests) < LEAST_RESTS:
         return None, [
             _left_out(
-                f"{len(rests)} rests of {60.0 * hours:.2g} min in all; expected at least {LEAST_RESTS} of more than "
-                f"{LEAST_REST:g} s and {LEAST_MINUTES:g} min in all"
+                f"{counted(len(rests), 'rest')} of {60.0 * hours:.2g} min in all; expected at least {LEAST_RESTS} of "
+                f"more than {LEAST_REST:g} s and {LEAST_MINUTES:g} min in all"
             )
         ]
     allowed = max(0, allowed_alarms(hours, rate, confidence))
@@ -140,8 +141,8 @@ def learn_rest(
     sentences = []
     if limit > rate:
         sentences.append(
-            f"contact.rest: {len(rests)} rests of {60.0 * hours:.3g} min support at most {limit:.3g} false alarms per "
-            f"hour of rest at confidence {confidence:g}, not {rate:g}"
+            f"contact.rest: {counted(len(rests), 'rest')} of {60.0 * hours:.3g} min: at most {limit:.3g} false alarms "
+            f"per hour of rest are supported at confidence {confidence:g}, not {rate:g}"
         )
     return found, sentences
 

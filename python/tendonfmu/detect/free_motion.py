@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import sample_seconds
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.model import Finger, native, number_of
 from tendonfmu.recordings import Held, Recording, prepare
 
@@ -159,7 +160,7 @@ def require_no_contact(recording: Recording) -> None:
         first = int(np.flatnonzero(label)[0])
         raise InputError(
             f"{recording.path}: column contact, row {first + 1}: 1 at {recording.time[first]:.6g} s, and in "
-            f"{int(label.sum())} samples; expected 0 throughout: false alarms are counted in free motion"
+            f"{counted(int(label.sum()), 'sample')}; expected 0 throughout: false alarms are counted in free motion"
         )
     reference = recording.groups.get("external_torque")
     if reference is None:

@@ -12,7 +12,7 @@ from tendonfmu.detect.score_report import Scored
 from tendonfmu.detect.summary import FACTORS, RocPoint, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
-from tendonfmu.files import check_output, check_output_folder
+from tendonfmu.files import check_output, check_output_folder, counted
 from tendonfmu.model import FingerSource
 from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
 
@@ -172,7 +172,7 @@ def _gaps(recording: Recording) -> list[str]:
     if not found:
         return []
     first = found[0]
-    more = f", and {len(found) - 1} more gaps" if len(found) > 1 else ""
+    more = f", and {counted(len(found) - 1, 'more gap')}" if len(found) > 1 else ""
     return [
         f"{recording.path}: gap of {recording.time[first] - recording.time[first - 1]:.4g} s after row {first}"
         f"{more}: the finger runs over it like an FMU, and a gap is no free time"

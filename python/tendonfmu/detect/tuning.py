@@ -32,6 +32,7 @@ from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.detect.support import NotEnough, hours_by_pretension, supported
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ConstructorArguments, check_given_once, own_copy
+from tendonfmu.files import are, counted
 from tendonfmu.model import FingerSource, description_text, finger_from_data, read_finger
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
@@ -429,12 +430,13 @@ class ContactTuning(ConstructorArguments):
         alarms = sum(each.alarms for each in self.loop_)
         if alarms > self.allowed_:
             self.warnings_.append(
-                f"the tuned finger alarms {alarms} times in {60 * self.hours_:.1f} min even with bounds "
+                f"the tuned finger alarms {counted(alarms, 'time')} in {60 * self.hours_:.1f} min even with bounds "
                 f"{self.level_raised_:.2f} times as high; expected at most {self.allowed_}"
             )
         if held > self.allowed_:
             self.warnings_.append(
-                f"{held} alarms in the held-out halves, {self.allowed_} are allowed: the rate is not supported"
+                f"{counted(held, 'alarm')} in the held-out halves, {self.allowed_} {are(self.allowed_)} "
+                "allowed: the rate is not supported"
             )
         self.warnings_ += self._sentences()
 
@@ -457,7 +459,10 @@ class ContactTuning(ConstructorArguments):
             )
         start = sum(each.at_start for each in self.loop_)
         if start:
-            found.append(f"{start} alarms within 2 s of a start are not counted: bias.initial_variance is too small")
+            found.append(
+                f"{counted(start, 'alarm')} within 2 s of a start {are(start)} not counted: bias.initial_variance is "
+                "too small"
+            )
         wide = [self.start_.joint_names[j] for j in np.flatnonzero(self.deviation_.too_wide)]
         if wide:
             found.append(f"compensated_torque_std is too large at {', '.join(wide)}: bounds alone exceed the residuals")

@@ -46,6 +46,7 @@ from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.unseen_effects import unseen_effects
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
+from tendonfmu.files import counted
 from tendonfmu.model import Finger, FingerSource, read_finger
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
@@ -306,7 +307,8 @@ class _Result:
             found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
         elif folds.folds < 8:
             found.append(
-                f"only {folds.stretches} stretches of 2 s: {folds.folds} parts are held out in place of 8, so a cause "
+                f"only {counted(folds.stretches, 'stretch', 'stretches')} of 2 s: "
+                f"{folds.folds} parts are held out in place of 8, so a cause "
                 "has to be larger to be certain; record a minute"
             )
         return found

@@ -32,6 +32,7 @@ from tendonfmu.estimate.previous_fit import CHANGE, PreviousFit, read_previous_f
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, Knowledge, judge_numbers
+from tendonfmu.files import counted
 from tendonfmu.model import FingerSource, description_text, read_finger
 from tendonfmu.recordings import (
     FitRecording,
@@ -439,8 +440,7 @@ def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
     if at_bound:
         some = ", ".join(number.number.path for number in at_bound[:3])
         more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
-        many = f"{len(at_bound)} numbers" if len(at_bound) > 1 else "1 number"
-        found.append(f"{many} ended at a bound: {some}{more}")
+        found.append(f"{counted(len(at_bound), 'number')} ended at a bound: {some}{more}")
     return found
 
 
@@ -457,10 +457,10 @@ def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
     if far > MOST_LAG_ONE:
         samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
-        counted = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
+        count = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
         found.append(
             f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
-            f"effect, or the noise is correlated; {counted}, treat the standard errors with caution"
+            f"effect, or the noise is correlated; {count}, treat the standard errors with caution"
         )
     return found
 

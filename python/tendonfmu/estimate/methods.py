@@ -22,6 +22,7 @@ from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimato
 from tendonfmu.estimate.files import with_values
 from tendonfmu.estimate.previous_fit import PreviousFit, known_information
 from tendonfmu.estimate.structure import Structure
+from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
@@ -299,7 +300,7 @@ def learn_batch(
         converged=found.converged,
         weights=weights,
         innovations=[],
-        warnings=[] if found.converged else [f"not converged after {passes} passes over the data"],
+        warnings=[] if found.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
     )
 
 
@@ -339,7 +340,7 @@ def _fitted(
 
 
 def _slack(samples: int) -> str:
-    return f"the filter did not learn from {samples} samples in which the model found a tendon slack"
+    return f"the filter did not learn from {counted(samples, 'sample')} in which the model found a tendon slack"
 
 
 def learn_ekf(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.model import moment_arms, pretension_vector
 from tendonfmu.statistics import quintic
 
@@ -77,8 +78,8 @@ class _Patterns:
         arms = moment_arms(data)
         if np.linalg.matrix_rank(arms) == len(arms):
             raise InputError(
-                f"--vary-tension {variation.lowest:g}:{variation.highest:g}: {len(arms)} tendons at "
-                f"{arms.shape[1]} joints hold no tension; expected more tendons than joints"
+                f"--vary-tension {variation.lowest:g}:{variation.highest:g}: {counted(len(arms), 'tendon')} at "
+                f"{counted(arms.shape[1], 'joint')} hold no tension; expected more tendons than joints"
             )
         pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
         self._project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)

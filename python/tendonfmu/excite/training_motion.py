@@ -33,6 +33,7 @@ from tendonfmu.estimate import (
 from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
 from tendonfmu.excite.joint_coverage import JointCoverage, joint_coverage
 from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.files import counted
 from tendonfmu.model import Finger, balanced_forces, native, pretension_vector, read_finger
 
 RIG_FORMAT = "tendonfmu-rig-1"
@@ -152,7 +153,7 @@ def read_subject(path: Path) -> Subject:
 def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[float, float]] | None:
     links = (data.get("physics") or {}).get("links") or []
     if len(links) != joints:
-        raise InputError(f"{path}: physics.links: {len(links)} links; expected one per joint, {joints}")
+        raise InputError(f"{path}: physics.links: {counted(len(links), 'link')}; expected one per joint, {joints}")
     limits = []
     for k, link in enumerate(links, start=1):
         try:

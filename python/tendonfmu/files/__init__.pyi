@@ -1,3 +1,4 @@
+from .counting import are as are
 from .counting import counted as counted
 from .extras import require_extra as require_extra
 from .finite_numbers import finite as finite

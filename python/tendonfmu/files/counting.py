@@ -1,9 +1,9 @@
-"""Numbers with their noun, for messages."""
+"""Numbers with their noun and verb, for messages."""
 
 from __future__ import annotations
 
 
-def counted(number: int, noun: str) -> str:
+def counted(number: int, noun: str, plural: str = "") -> str:
     """Write a number with its noun.
 
     Parameters
@@ -11,11 +11,18 @@ def counted(number: int, noun: str) -> str:
     number
         How many.
     noun
-        In the singular; an "s" makes the plural.
+        In the singular.
+    plural
+        Where it is more than the singular with an "s".
 
     Returns
     -------
     str
-        Such as `1 joint` or `2 joints`.
+        Such as `1 joint`, `2 joints` or `3 passes`.
     """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+def are(number: int) -> str:
+    """Return the verb for a number of things: "is" for one, else "are"."""
+    return "is" if number == 1 else "are"

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files.counting import are, counted
 from tendonfmu.files.extras import require_extra
 from tendonfmu.files.mcap_table import write_mcap
 from tendonfmu.files.writing import whole_file
@@ -183,8 +184,8 @@ def _read_csv(file: Path, check_names: CheckNames, flags: Collection[str]) -> Ta
         columns = _parse_by_field(file, names, read, rows, flags, cut_off)
     if cut_off:
         raise InputError(
-            f"{file}: truncated last line, row {len(rows) + 1}: {cut_off!r}; expected {len(names)} numbers "
-            f"and a line end; the {len(rows)} rows before it are good"
+            f"{file}: truncated last line, row {len(rows) + 1}: {cut_off!r}; expected {counted(len(names), 'number')} "
+            f"and a line end; the {counted(len(rows), 'row')} before it {are(len(rows))} good"
         )
     return {names[i]: columns[:, k] for k, i in enumerate(read)}
 
@@ -235,11 +236,11 @@ def _parse_by_field(
     for row, fields in _fields(file, lines, 1):
         if len(fields) < len(names) and row == len(lines) and not cut_off:
             raise InputError(
-                f"{file}: truncated last line, row {row}: {len(fields)} of {len(names)} columns; "
-                f"the {row - 1} rows before it are good"
+                f"{file}: truncated last line, row {row}: {len(fields)} of {counted(len(names), 'column')}; "
+                f"the {counted(row - 1, 'row')} before it {are(row - 1)} good"
             )
         if len(fields) != len(names):
-            raise InputError(f"{file}: row {row}: {len(fields)} fields; expected {len(names)}")
+            raise InputError(f"{file}: row {row}: {counted(len(fields), 'field')}; expected {len(names)}")
         parsed.append([_parse_field(file, names[i], row, fields[i], flags) for i in read])
     return np.array(parsed, dtype=np.float64).reshape(len(parsed), len(read))
 

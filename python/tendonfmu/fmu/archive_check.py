@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 
 # An FMU of `tendonfmu build` has some 4 MB in 200 files; what is larger by far is no FMU and would fill the disk.
 LARGEST_UNPACKED, MOST_MEMBERS = 1 << 30, 10_000
@@ -38,7 +39,7 @@ def check_members(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
     if len(members) > MOST_MEMBERS:
-        raise InputError(f"{path}: {len(members)} files in it; expected an FMU, of at most {MOST_MEMBERS}")
+        raise InputError(f"{path}: {counted(len(members), 'file')} in it; expected an FMU, of at most {MOST_MEMBERS}")
     size = sum(member.file_size for member in members)  # no more is unpacked, whatever the data hold
     if size > LARGEST_UNPACKED:
         raise InputError(f"{path}: {size / 1e9:.3g} GB when unpacked; expected an FMU, of at most 1.07 GB")

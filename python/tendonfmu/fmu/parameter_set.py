@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import check_output, whole_file
+from tendonfmu.files import check_output, counted, whole_file
 from tendonfmu.fmu.model_variables import NOT_IN_XML, read_table
 from tendonfmu.fmu.packaging import package_file
 from tendonfmu.fmu.reference_results import Related
@@ -222,5 +222,7 @@ def parameter_sets(paths: Sequence[Path], finger: Finger) -> list[Related]:
         if any(each.name == path.name for each in found):
             raise InputError(f"{path}: a second file of this name; expected different names")
         count = len(read_parameter_set(path, finger))
-        found.append(Related(path.name, path.read_bytes(), "parameter", MIME_TYPE, f"Values of {count} parameters"))
+        found.append(
+            Related(path.name, path.read_bytes(), "parameter", MIME_TYPE, f"Values of {counted(count, 'parameter')}")
+        )
     return found

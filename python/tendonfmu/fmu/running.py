@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import FORMATS
+from tendonfmu.files import FORMATS, counted
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
 from tendonfmu.model import (
     FLAGS,
@@ -139,8 +139,9 @@ def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
     """
     time, angles = outputs["time"], outputs["joint_angle"]
     return (
-        f"{len(time)} samples in {time[-1] - time[0]:.6g} s, "
-        f"joint angles {angles.min():.3g} to {angles.max():.3g} rad, {int(outputs['contact'].sum())} samples in contact"
+        f"{counted(len(time), 'sample')} in {time[-1] - time[0]:.6g} s, "
+        f"joint angles {angles.min():.3g} to {angles.max():.3g} rad, "
+        f"{counted(int(outputs['contact'].sum()), 'sample')} in contact"
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tendonfmu.errors import InputError, InputWarning
-from tendonfmu.files import check_output
+from tendonfmu.files import are, check_output, counted
 from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_run, related_members
 from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
@@ -102,7 +102,8 @@ def _doubts(finger: Finger, recording: Recording) -> list[str]:
     rows, invented = bridged_rows(recording)
     if invented:
         found.append(
-            f"{recording.path}: gaps, over which {invented} of {rows} rows of the reference are interpolated; expected "
+            f"{recording.path}: gaps, over which {invented} of {counted(rows, 'row')} of the reference "
+            f"{are(invented)} interpolated; expected "
             "a recording without gaps, such as a part of this one"
         )
     return found

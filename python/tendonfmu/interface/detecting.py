@@ -13,7 +13,7 @@ import numpy as np
 
 from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
 from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
-from tendonfmu.files import write_text
+from tendonfmu.files import counted, write_text
 from tendonfmu.interface.notebook import html_of
 from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
@@ -164,7 +164,8 @@ class ScoreResult:
     scored: Scored
 
     def __repr__(self) -> str:
-        return f"<ScoreResult: {self.found} of {self.events} events found, {self.false_alarms} false alarms>"
+        alarms = counted(self.false_alarms, "false alarm")
+        return f"<ScoreResult: {self.found} of {counted(self.events, 'event')} found, {alarms}>"
 
     @property
     def events(self) -> int:

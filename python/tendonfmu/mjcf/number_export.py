@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError, InternalError, own_fault
-from tendonfmu.files import whole_file
+from tendonfmu.files import counted, whole_file
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.tendon_choice import motors_of
@@ -231,7 +231,7 @@ def _inexpressible(data: Mapping[str, Any]) -> Iterator[str]:
         rows = [effect for effect in effects(data) if effect.kind == kind]
         sizes = [side["coulomb"] for effect in rows for law in effect.laws for side in sides(law)]
         if rows:
-            yield f"{kind} at {len(rows)} places: {words}; coulomb {min(sizes):.3g} to {max(sizes):.3g}"
+            yield f"{kind} at {counted(len(rows), 'place')}: {words}; coulomb {min(sizes):.3g} to {max(sizes):.3g}"
     others = Counter(row["effect"] for row in extension_rows(data) if row["effect"] not in WRITTEN)
     if others:
         yield "extensions: " + ", ".join(f"{count} {effect}" for effect, count in others.items())

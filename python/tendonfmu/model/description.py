@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import write_text
+from tendonfmu.files import counted, write_text
 from tendonfmu.model import native
 from tendonfmu.model.description_path import with_values_at
 from tendonfmu.model.description_text import description_text
@@ -57,7 +57,7 @@ class Finger:
     image: bytes
 
     def __repr__(self) -> str:
-        return f"<Finger {self.name}: {self.joints} joints, {self.tendons} tendons>"
+        return f"<Finger {self.name}: {counted(self.joints, 'joint')}, {counted(self.tendons, 'tendon')}>"
 
     @property
     def name(self) -> str:
@@ -467,7 +467,7 @@ def _summary_lines(counts: Counts) -> list[str]:
         f"tendons            {counts.tendons}: {', '.join(counts.tendon_names)}{loops}",
         f"moment arms        {1e3 * counts.moment_arms[0]:.4g} to {1e3 * counts.moment_arms[1]:.4g} mm",
         f"stiffness          {counts.stiffness[0]:.4g} to {counts.stiffness[1]:.4g} N/m",
-        f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counts.working_points} working points",
+        f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counted(counts.working_points, 'working point')}",
         f"friction laws      {sum(counts.laws.values())}: {laws}{asymmetric}",
         f"covers             {counts.covers}",
         f"parameters         {counts.parameters}, {counts.tunable_parameters} of them tunable",

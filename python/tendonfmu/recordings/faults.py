@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.files import counted
 from tendonfmu.model import Finger
 from tendonfmu.recordings.recording import Recording
 
@@ -86,7 +87,7 @@ def gap_sentences(recording: Recording) -> Iterator[str]:
             "the parts before and after it are fitted as separate recordings"
         )
     if len(found) > 3:
-        yield f"{len(found) - 3} more gaps; every part is fitted as a separate recording"
+        yield f"{counted(len(found) - 3, 'more gap')}; every part is fitted as a separate recording"
 
 
 def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.files import counted
+from tendonfmu.files import are, counted
 from tendonfmu.model import Finding
 from tendonfmu.recordings.channels import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
@@ -259,7 +259,7 @@ def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]
             "lost",
             path,
             ("time",),
-            f"{clock.lost} of {len(time) + clock.lost} samples are missing ({_percent(share)}), steps of "
+            f"{clock.lost} of {len(time) + clock.lost} samples {are(clock.lost)} missing ({_percent(share)}), steps of "
             f"{clock.step:.4g} s",
             "a log that drops samples",
             "record with a larger buffer, or fewer channels",
@@ -316,7 +316,8 @@ def coarse(path: Path, found: Coarse) -> Finding:
         "coarse",
         path,
         (found.column,),
-        f"moves by {found.range:.4g} {unit} in {round(found.range / found.step)} steps of {found.step:.4g} {unit}",
+        f"moves by {found.range:.4g} {unit} in {counted(round(found.range / found.step), 'step')} of "
+        f"{found.step:.4g} {unit}",
         "a log rounded to few digits, or a coarse sensor",
         "log more digits, or record a larger motion",
     )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 from tendonfmu.model import (
     INPUTS_OF_SOURCE,
     Finger,
@@ -202,7 +203,8 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     parts, short = _parts(recording.time)
     warnings = [*gap_sentences(recording), *rate_sentences(recording, finger), *silent_tendons(recording, finger)]
     if short.any() and parts:
-        warnings.append(f"{int(short.sum())} samples in parts of fewer than {FEWEST} between gaps are left out")
+        few = int(short.sum())
+        warnings.append(f"{counted(few, 'sample')} in parts of fewer than {FEWEST} between gaps {are(few)} left out")
     stuck, sentences = _stuck(recording, finger, kinematics)
     faulty = (short | stuck) & ~contact
     usable = ~(faulty | contact)
@@ -210,7 +212,8 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     held_out = _held_out(recording, parts, held) & usable
     model = model_alone(finger.data, [_arrays(recording, part) for part in parts], parts, len(recording), kinematics)
     if contact.any():
-        warnings.append(f"{int(contact.sum())} samples labelled contact are left out: no column external_torque")
+        out = int(contact.sum())
+        warnings.append(f"{counted(out, 'sample')} labelled contact {are(out)} left out: no column external_torque")
     return FitRecording(
         recording=recording,
         kinematics=kinematics,
@@ -244,8 +247,8 @@ def _parts(time: Numbers) -> tuple[list[slice], Flags]:
 def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, contact: Flags) -> None:
     if not parts:
         raise InputError(
-            f"{recording.path}: {len(recording)} samples without a gap at most; expected at least {FEWEST}, and some "
-            "minutes of motion for a sound fit"
+            f"{recording.path}: {counted(len(recording), 'sample')} without a gap at most; expected at least {FEWEST}, "
+            "and some minutes of motion for a sound fit"
         )
     if usable.sum() >= FEWEST:
         return
@@ -253,7 +256,8 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
     if not contact.any():
         why = "the others are left out for a stuck sensor"
     raise InputError(
-        f"{recording.path}: {int(usable.sum())} samples to fit to: {why}; expected at least {FEWEST} without contact"
+        f"{recording.path}: {counted(int(usable.sum()), 'sample')} to fit to: {why}; expected at least "
+        f"{FEWEST} without contact"
     )
 
 
@@ -313,8 +317,9 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
                 "expected a working one"
             )
         out |= lost
+        many = int(lost.sum())
         sentences.append(
-            f"{what}: a stuck sensor; {int(lost.sum())} samples until {SETTLING:g} s after it are left out"
+            f"{what}: a stuck sensor; {counted(many, 'sample')} until {SETTLING:g} s after it {are(many)} left out"
         )
     return out, sentences
 

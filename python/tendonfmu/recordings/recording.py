@@ -64,7 +64,9 @@ class Recording:
 
     def _words(self) -> str:
         sizes = [f"{array.shape[1]} {name}" for name, array in self.groups.items()]
-        labelled = [] if self.contact is None else [f"{int(self.contact.sum())} samples labelled {self.label}"]
+        labelled = (
+            [] if self.contact is None else [f"{counted(int(self.contact.sum()), 'sample')} labelled {self.label}"]
+        )
         duration = self.time[-1] - self.time[0] if len(self) else 0.0
         return ", ".join([f"{counted(len(self), 'sample')} in {duration:.6g} s", *sizes, *labelled])
 
@@ -157,7 +159,7 @@ class Recording:
             raise InputError(f"{file}: no samples; expected at least one")
         for group, values in (groups if label is None else {**groups, LABEL: label}).items():
             if len(values) != len(times):
-                raise InputError(f"{file}: {group}: {len(values)} rows; expected {len(times)} as of time")
+                raise InputError(f"{file}: {group}: {counted(len(values), 'row')}; expected {len(times)} as of time")
             if values.ndim == 2 and not values.shape[1]:
                 raise InputError(f"{file}: {group}: no columns; expected one per {GROUP_PER[group]}")
         check_sizes(file, {group: values.shape[1] for group, values in groups.items()})
@@ -258,8 +260,8 @@ class Recording:
             expected = tendons if GROUP_PER[name] == "tendon" else joints
             if array.shape[1] != expected:
                 raise InputError(
-                    f"{self.path}: {array.shape[1]} columns {name}[...], expected {expected}: "
-                    f"the finger has {joints} joints and {tendons} tendons"
+                    f"{self.path}: {counted(array.shape[1], 'column')} {name}[...], expected {expected}: "
+                    f"the finger has {counted(joints, 'joint')} and {counted(tendons, 'tendon')}"
                 )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.model import RANGES, moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
@@ -122,7 +123,9 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
     """
     reach = max(NEIGHBOURS)
     if len(time) < FEWEST:
-        raise InputError(f"recording of {len(time)} samples: expected at least {FEWEST} to estimate noise from")
+        raise InputError(
+            f"recording of {counted(len(time), 'sample')}: expected at least {FEWEST} to estimate noise from"
+        )
     at = np.arange(reach, len(time) - reach)
     distance = np.stack([time[at + offset] - time[at] for offset in NEIGHBOURS])  # [4, K]
     weights = np.stack([_lagrange(distance, k) for k in range(len(NEIGHBOURS))])
@@ -134,7 +137,9 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
     whole = np.lib.stride_tricks.sliding_window_view(steps, 2 * reach).max(axis=1) <= GAP * np.median(steps)
     left = left[whole]
     if len(left) < FEWEST - 2 * reach:
-        raise InputError(f"recording of {len(left)} samples without a gap: expected at least {FEWEST - 2 * reach}")
+        raise InputError(
+            f"recording of {counted(len(left), 'sample')} without a gap: expected at least {FEWEST - 2 * reach}"
+        )
     blocks = [left[begin : begin + BLOCK] for begin in range(0, len(left) - BLOCK + 1, BLOCK)] or [left]
     variance = np.stack([(block**2).mean(axis=0) for block in blocks])
     return np.array([_of_blocks(column) for column in variance.T])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
 
@@ -87,7 +88,7 @@ def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
     then = np.full(2, factor * changed.reference.value)
     yield Panel(
         title="In each of the new recordings",
-        alt=f"Size of this change in each of {len(changed.by)} new recordings, in their order",
+        alt=f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
         x_label="new recording, in the order given",
         y_label=f"{changed.number.replace('_', ' ')} ({told})",
         curves=(Curve("after_line", x, value), Curve("start", np.array([1.0, x[-1]]), then)),

@@ -7,6 +7,7 @@ from itertools import groupby
 
 from tendonfmu.estimate import EffectCoverage, Verdict, counts_by_kind, identifiability
 from tendonfmu.excite import ExciteResult
+from tendonfmu.files import counted
 
 Row = tuple[str, ...]
 KEYS = ("static", "coulomb", "stribeck_velocity", "viscous")
@@ -113,8 +114,8 @@ def lines(result: ExciteResult) -> Iterator[str]:
     verdicts = judgement.verdicts
     known = sum(verdict.identifiable for verdict in verdicts)
     yield (
-        f"{known} of {len(verdicts)} numbers can be identified one by one, "
-        f"{judgement.directions} independent combinations of them; each joint's bias is tracked as well"
+        f"{known} of {counted(len(verdicts), 'number')} can be identified one by one, "
+        f"{counted(judgement.directions, 'independent combination')} of them; each joint's bias is tracked as well"
     )
     for cause, count in identifiability.causes(verdicts).items():
         yield f"  {count} not: {identifiability.CAUSES[cause]}"

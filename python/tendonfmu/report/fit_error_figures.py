@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.drawing import Dots, MatrixPanel, Panel, Sheet
 from tendonfmu.estimate import FitPicture, identifiability
+from tendonfmu.files import are, counted
 
 Numbers = NDArray[np.float64]
 
@@ -148,8 +149,8 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
     above = int(np.count_nonzero(np.abs(np.triu(matrix, 1)) > 0.9))
     panel = MatrixPanel(
         title="Correlation of the estimates",
-        alt=f"Correlation matrix of {len(order)} unknowns, ordered by joint and tendon; {above} pairs "
-        "are correlated by more than 0.9.",
+        alt=f"Correlation matrix of {len(order)} unknowns, ordered by joint and tendon; {counted(above, 'pair')} "
+        f"{are(above)} correlated by more than 0.9.",
         matrix=matrix,
         groups=groups,
         marked=_marked(matrix),

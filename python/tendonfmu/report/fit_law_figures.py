@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.drawing import Band, Curve, Panel, Sheet
 from tendonfmu.estimate import FitPicture, LawBands, LawCurve, asymmetric, numbers_of
+from tendonfmu.files import are, counted
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
 
 Numbers = NDArray[np.float64]
@@ -40,7 +41,8 @@ def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
     desk = _Desk(picture)
     pairs = list(zip(effects(picture.start), effects(picture.fitted), strict=True))
     drawn = pairs[:LAWS_DRAWN]
-    hidden = f" {len(pairs) - len(drawn)} further laws of the finger are not drawn." if len(pairs) > len(drawn) else ""
+    more = len(pairs) - len(drawn)
+    hidden = f" {counted(more, 'further law')} of the finger {are(more)} not drawn." if more else ""
     for tendon in sorted({fitted.tendon for _, fitted in drawn}):
         here = [(start, fitted) for start, fitted in drawn if fitted.tendon == tendon]
         name = picture.tendon_names[tendon - 1] if tendon else ""

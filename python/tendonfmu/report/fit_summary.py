@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tendonfmu.estimate import FitPicture, identifiability, verdicts
+from tendonfmu.files import counted
 from tendonfmu.report.page import Tile
 
 _METHODS = {
@@ -247,7 +248,7 @@ def _what(picture: FitPicture) -> Iterator[str]:
     used, held = (sum(each[key] for each in recordings) for key in ("used", "held_out"))
     one = len(recordings) == 1
     source = f"one recording of {seconds:.4g} s" if one else f"{len(recordings)} recordings of {seconds:.4g} s together"
-    finger = f"{_count(picture.joint_names, 'joint')}, {_count(picture.tendon_names, 'tendon')}"
+    finger = f"{counted(len(picture.joint_names), 'joint')}, {counted(len(picture.tendon_names), 'tendon')}"
     sentence = (
         f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
         f"from {source}: {_thousands(used)} samples"
@@ -255,11 +256,8 @@ def _what(picture: FitPicture) -> Iterator[str]:
     yield sentence + (f"; {_thousands(held)} more were held out to judge the result." if held else ".")
     out = sum(each.get("contact_left_out") or 0 for each in recordings)
     if out:
-        yield f"{_thousands(out)} samples with contact were left out."
-
-
-def _count(names: Sequence[str], what: str) -> str:
-    return f"{len(names)} {what}" + ("" if len(names) == 1 else "s")
+        samples = "sample with contact was" if out == 1 else "samples with contact were"
+        yield f"{_thousands(out)} {samples} left out."
 
 
 def _thousands(number: int) -> str:
@@ -268,7 +266,7 @@ def _thousands(number: int) -> str:
 
 def _how(report: Mapping[str, Any]) -> Iterator[str]:
     method = _METHODS.get(report["method"], str(report["method"]))
-    rounds = "" if report["method"] == "ekf" else f", {report['passes']} passes over the data"
+    rounds = "" if report["method"] == "ekf" else f", {counted(report['passes'], 'pass', 'passes')} over the data"
     yield f"{method}{rounds}, {report['seconds']:.3g} s."
 
 
@@ -289,7 +287,7 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
             )
         yield text + "."
     if many:
-        yield f"{len(many)} recordings not trained on: {_range(many)} of the torque are left."
+        yield f"{counted(len(many), 'recording')} not trained on: {_range(many)} of the torque are left."
 
 
 def _apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:

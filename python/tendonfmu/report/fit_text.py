@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tendonfmu.estimate import Fitted, FrictionFit, verdicts
+from tendonfmu.files import counted
 
 Row = tuple[str, ...]
 EXAMPLES = 3  # paths listed for each reason
@@ -94,9 +95,9 @@ def lines(fit: FrictionFit) -> Iterator[str]:
     held = sum(each["held_out"] for each in report["recordings"])
     left = sum(each["contact_left_out"] + each["faulty_left_out"] for each in report["recordings"])
     ended = "converged" if report["converged"] else "NOT converged"
-    passes = f", {report['passes']} passes" if report["passes"] else ""
+    passes = f", {counted(report['passes'], 'pass', 'passes')}" if report["passes"] else ""
     yield (
-        f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {used} samples, "
+        f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {counted(used, 'sample')}, "
         f"{held} held out, {left} left out"
     )
     innovations = report["innovations"]

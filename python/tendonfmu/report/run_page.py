@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from tendonfmu.files import check_output, check_output_folder, write_text
+from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.report.page import Tile, render
 from tendonfmu.report.run_figures import run_sheets
 
@@ -100,7 +100,7 @@ def run_page(numbers: Mapping[str, Any], table: Mapping[str, NDArray[Any]], labe
 def _tiles(run: Mapping[str, Any]) -> Iterator[Tile]:
     seconds, contact = run["duration"], run["contact"]
     length = (f"{seconds / 60:.3g}", "min") if seconds >= 120 else (f"{seconds:.3g}", "s")
-    yield Tile(*length, f"recorded, {run['samples']} samples")
+    yield Tile(*length, f"recorded, {counted(run['samples'], 'sample')}")
     free = [(each["free_joint_torque_rms"], each["free_compensated_torque_rms"]) for each in run["joints"]]
     if all(None not in pair for pair in free):
         torque, left = (sum(value**2 for value in values) ** 0.5 for values in zip(*free, strict=True))

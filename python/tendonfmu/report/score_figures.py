@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
+from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.figure_data import Interval
 from tendonfmu.statistics import intervals as statistics_intervals
@@ -271,7 +272,7 @@ def event_figure(scored: Scored) -> EventFigure:
         "missed, in\nan alarm before": found.masked,
     }
     return EventFigure(
-        title=f"{scored.subject.finger.name}: {len(rows)} events",
+        title=f"{scored.subject.finger.name}: {counted(len(rows), 'event')}",
         begin=-BEFORE,
         end=end,
         torque=torque,
@@ -301,9 +302,9 @@ def _row(track: Track, at: Numbers) -> Numbers:
 
 def roc_figure(scored: Scored, points: Sequence[RocPoint]) -> RocFigure:
     shares, rates = [point.found_share for point in points], [point.false_alarms_per_hour for point in points]
-    minutes = scored.summary.free_minutes
+    events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
     return RocFigure(
-        title=f"{scored.subject.finger.name}: {scored.summary.events} events, {minutes:.3g} min of free time",
+        title=f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time",
         factors=np.array([point.factor for point in points]),
         found=np.array([each.value for each in shares]),
         found_low=np.array([each.low for each in shares]),
@@ -336,7 +337,7 @@ def delay_figure(scored: Scored) -> DelayFigure:
         end = TAIL * known["ninety_percent"].value
     within = [statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)]
     return DelayFigure(
-        title=f"{scored.subject.finger.name}: {len(delays)} of {total} events found",
+        title=f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found",
         delays=delays,
         share=np.array([each.value for each in within]),
         low=np.array([each.low for each in within]),

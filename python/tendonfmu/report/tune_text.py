@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tendonfmu.detect import ContactTuning, rate_limit
+from tendonfmu.files import are, counted
 
 Row = tuple[str, ...]
 
@@ -68,7 +69,7 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
     percent = 100 * tuning.confidence
     held, limit = tuning.held_out_
     yield (
-        f"as it runs: {alarms} false alarms in {60 * tuning.hours_:.1f} min, at most "
+        f"as it runs: {counted(alarms, 'false alarm')} in {60 * tuning.hours_:.1f} min, at most "
         f"{rate_limit(alarms, tuning.hours_, tuning.confidence):.3g} per hour ({percent:g} %)"
     )
     if alarms:
@@ -77,7 +78,7 @@ def lines(tuning: ContactTuning) -> Iterator[str]:
         yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
     yield (
         f"held out: {held} in blocks that the bounds were not chosen on, at most {limit:.3g} per hour; "
-        f"{tuning.allowed_} are allowed for {tuning.rate_:.3g}"
+        f"{tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g}"
     )
     low, high = tuning.forces_
     yield f"chosen at mean tendon forces of {low:.3g} to {high:.3g} N; beyond them thresholds are extrapolated"

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import Node, Table, read_table
+from tendonfmu.files import Node, Table, counted, read_table
 from tendonfmu.statistics import LARGEST_SEED, Draws
 
 Array = NDArray[np.float64]
@@ -174,7 +174,7 @@ def _from_file(motion: Node, joints: Joints) -> Motion:
     if has_column and not motion.member("pretension").absent:
         motion.member("pretension").refuse(f"nothing, since {file} has a column pretension")
     pretension = _plateaus(table) if has_column else _pretension(motion)
-    return Motion(knots, pretension, f"{len(time)} rows of {file.name}, {time[0]:g} to {time[-1]:g} s", file)
+    return Motion(knots, pretension, f"{counted(len(time), 'row')} of {file.name}, {time[0]:g} to {time[-1]:g} s", file)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from tendonfmu.files import counted
 from tendonfmu.model import count
 from tendonfmu.simulate.plant import Plant
 from tendonfmu.simulate.rig import Rig, read_rig
@@ -41,7 +42,8 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
     finger = count(rig.finger)
     masses = [float(link["mass"]) for link in physics["links"]]
     contacts = finger.pulleys + finger.edges + finger.laws["friction"] + finger.laws["load_friction"]
-    kinds = f"{finger.pulleys} pulleys, {finger.edges} edges, {finger.laws['friction']} joints"
+    counts = {"pulley": finger.pulleys, "edge": finger.edges, "joint": finger.laws["friction"]}
+    kinds = ", ".join(counted(number, kind) for kind, number in counts.items())
     settings = plant.settings
     accuracy = (
         f"relative tolerance {settings.relative_tolerance:g}"

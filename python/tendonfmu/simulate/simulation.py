@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.files import counted
 from tendonfmu.simulate.plant import MEASURED, TRUE, Array, Plant, Statistics, refused_by, require_plant
 from tendonfmu.simulate.rig import Rig
 
@@ -51,11 +52,9 @@ class Simulation:
         """Describe what was simulated, in lines of text."""
         time = self.recording["time"]
         pushes = len(rig.expanded["pushes"])
-        counted = "1 push" if pushes == 1 else f"{pushes} pushes"
-        contact = f", {counted}, {self.contact_seconds:.2f} s in contact" if pushes else ""
-        return [
-            f"{len(time)} samples, {time[-1]:.3f} s of {rig.name}{contact}; {self.integrator}: {self.work.steps} steps"
-        ]
+        contact = f", {counted(pushes, 'push', 'pushes')}, {self.contact_seconds:.2f} s in contact" if pushes else ""
+        length = f"{counted(len(time), 'sample')}, {time[-1]:.3f} s"
+        return [f"{length} of {rig.name}{contact}; {self.integrator}: {counted(self.work.steps, 'step')}"]
 
     def report(self, rig: Rig, written: Mapping[str, Path]) -> dict[str, Any]:
         """Return what `tendonfmu simulate --json` prints. written: name of a table -> its file."""

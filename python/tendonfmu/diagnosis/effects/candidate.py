@@ -16,6 +16,7 @@ from typing import Any
 from tendonfmu.diagnosis.effects.description_edit import Edit, add_to_number, apply_edits, raise_to
 from tendonfmu.diagnosis.span import Span
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 
 Data = Mapping[str, Any]
 
@@ -142,7 +143,7 @@ class Variant:
         start from a number that is present.
         """
         if len(magnitudes) != self.count:
-            raise InputError(f"magnitudes: {len(magnitudes)} numbers; expected {self.count}, one per column")
+            raise InputError(f"magnitudes: {counted(len(magnitudes), 'number')}; expected {self.count}, one per column")
         if self.secant_rows:
             factor = min(max(float(magnitudes[0]), 0.2), 5.0)
             rows = [dict(row) for row in self.secant_rows]

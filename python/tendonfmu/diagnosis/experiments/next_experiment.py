@@ -30,6 +30,7 @@ from tendonfmu.diagnosis.result import Experiment, Where
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
+from tendonfmu.files import counted
 from tendonfmu.model import NativeError, moment_arms
 from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
 from tendonfmu.statistics import KNOTS, regular_blocks
@@ -455,7 +456,7 @@ def _sentence(told: Sequence[Answer]) -> str:
     what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
     apart = "the predictions then differ by" if rival is not None else "an ordinary effect then leaves"
     more = len(told) - 1
-    others = f". It also answers {more} more such question{'s' * (more > 1)}" if more else ""
+    others = f". It also answers {counted(more, 'more such question')}" if more else ""
     return (
         f"Record {first.entry.words}: it distinguishes {what}; {apart} {_times(first.distance)} the noise, now "
         f"{_times(first.now)}{others}"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.recordings.converters.log import (
     LONGEST,
     NUMBER,
@@ -118,7 +119,7 @@ class ArraysLog:
         prefix = arrays[0].topic
         title = prefix.rstrip("/.") or "top"
         if any(topic.name == title for topic in self.topics):
-            title = f"{title} ({arrays[0].shape[0]} rows)"
+            title = f"{title} ({counted(arrays[0].shape[0], 'row')})"
         self.topics.append(Topic(title, tuple(fields), arrays[0].shape[0], prefix))
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:

@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 
 COLUMNS = 10
 SPINDLE_COUNTS = 8192  # a turn
@@ -79,7 +80,8 @@ def _read(file: Path) -> NDArray[np.float64]:
         fields = line.split(",")
         if len(fields) != COLUMNS:
             raise InputError(
-                f"{file}: line {i}: {len(fields)} columns; expected {COLUMNS} ({k} rows before it are good)"
+                f"{file}: line {i}: {counted(len(fields), 'column')}; expected {COLUMNS} "
+                f"({counted(k, 'row')} before it {are(k)} good)"
             )
         for column, field in enumerate(fields):
             try:

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 
 Array = NDArray[np.float64]
 
@@ -89,11 +90,11 @@ def _read(file: Path) -> tuple[Array, Array, Array]:
             raise InputError(f"{file}: no variable {name}; expected {', '.join(SERIES)} and gtau of the EMPS benchmark")
     gain = _numbers(file, "gtau", content["gtau"])
     if gain.size != 1:
-        raise InputError(f"{file}: gtau: {gain.size} numbers; expected one, in N/V")
+        raise InputError(f"{file}: gtau: {counted(gain.size, 'number')}; expected one, in N/V")
     time, position, voltage = (_numbers(file, name, content[name]) for name in SERIES)
     for name, series in (("qm", position), ("vir", voltage)):
         if len(series) != len(time):
-            raise InputError(f"{file}: {name}: {len(series)} samples; expected {len(time)}, as many as of t")
+            raise InputError(f"{file}: {name}: {counted(len(series), 'sample')}; expected {len(time)}, as many as of t")
     return time, position, float(gain[0]) * voltage
 
 
@@ -126,7 +127,9 @@ def _numbers(file: Path, name: str, value: Any) -> Array:
 def _step(file: Path, time: Array, least: int) -> float:
     """Return the step (s). It must be equal between all samples, since filter and differences assume it."""
     if len(time) < least:
-        raise InputError(f"{file}: t: {len(time)} samples; expected at least {least}, {LEAST} times --decimation")
+        raise InputError(
+            f"{file}: t: {counted(len(time), 'sample')}; expected at least {least}, {LEAST} times --decimation"
+        )
     steps = np.diff(time)
     step = float(np.median(steps))
     uneven = ~((steps > 0) & (np.abs(steps - step) <= 0.01 * step))

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.recordings.converters.units import nearest
 
 # Columns of some rows, by name: float64, int64 or bool arrays [N]; texts as an Arrow array. Times that the format
@@ -180,10 +181,12 @@ def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
 
 def _numbered(log: Log, number: int, where: str) -> tuple[Topic, str]:
     if len(log.topics) != 1:
-        raise InputError(f"{where}.column = {number}: {log.file} has {len(log.topics)} topics; expected a name")
+        raise InputError(
+            f"{where}.column = {number}: {log.file} has {counted(len(log.topics), 'topic')}; expected a name"
+        )
     fields = log.topics[0].fields
     if number > len(fields):
-        raise InputError(f"{where}.column = {number}: {log.file} has {len(fields)} columns")
+        raise InputError(f"{where}.column = {number}: {log.file} has {counted(len(fields), 'column')}")
     name = fields[number - 1].name
     occurs = sum(field.name == name for field in fields)
     return log.topics[0], name if occurs == 1 else f"{NUMBERED}{number}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import require_extra
+from tendonfmu.files import are, counted, require_extra
 from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import Block, Topic
 from tendonfmu.recordings.converters.mcap_records import McapRecords
@@ -73,7 +73,7 @@ class McapLog:
                 if channel is not None:
                     yield Received(channel[0], record.log_time, record.publish_time, _late(channel[1], record.data))
         if records.cut:
-            self.notes.append(f"{part}: {records.cut}; {kept} messages are kept")
+            self.notes.append(f"{part}: {records.cut}; {counted(kept, 'message')} {are(kept)} kept")
 
     def _decoder(self, channel: Any, schema: Any, types: Ros2Types) -> Decoder | None:
         encoding = channel.message_encoding
@@ -92,11 +92,8 @@ class McapLog:
         """Read fields; see `log.Log`."""
         self.notes.clear()
         collector = Collector(wanted)
-        for received in self._messages():
-            yield from collector.add(received)
-        yield from collector.rest()
-        if collector.damaged:
-            self.notes.append(f"{self.file}: {collector.damaged} damaged messages are left out")
+        yield from collector.blocks(self._messages())
+        self.notes.extend(collector.notes(self.file))
 
 
 def _late(decode: Decoder, data: bytes) -> Callable[[], Any]:

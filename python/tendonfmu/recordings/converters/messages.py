@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.log import LONGEST, NUMBER, OTHER, TEXT, TIME, Block, Field, Topic
 
 LOG_TIME, PUBLISH_TIME = "@log_time", "@publish_time"
@@ -208,9 +210,22 @@ class Collector:
             topic: [_getter_of(name[len(topic) + 1 :]) for name in names] for topic, names in wanted.items()
         }
         self._rows: dict[str, list[list[Any]]] = {topic: [] for topic in wanted}
-        self.damaged = 0
+        self._damaged = 0
 
-    def add(self, received: Received) -> Iterator[tuple[str, Block]]:
+    def blocks(self, messages: Iterable[Received]) -> Iterator[tuple[str, Block]]:
+        """Take all messages; yield the blocks of their topics."""
+        for received in messages:
+            yield from self._add(received)
+        for topic, rows in self._rows.items():
+            if rows:
+                yield topic, self._block(topic)
+
+    def notes(self, file: Path) -> list[str]:
+        """Return what is to be said of the messages of a file: how many were damaged."""
+        out = self._damaged
+        return [f"{file}: {counted(out, 'damaged message')} {are(out)} left out"] if out else []
+
+    def _add(self, received: Received) -> Iterator[tuple[str, Block]]:
         """Take a message; yield its topic's block if it is full."""
         getters = self._getters.get(received.topic)
         if getters is None:
@@ -220,18 +235,12 @@ class Collector:
             try:
                 content = received.decode()
             except ValueError:
-                self.damaged += 1
+                self._damaged += 1
                 return
         rows = self._rows[received.topic]
         rows.append([get(received if of_time else content) for of_time, get in getters])
         if len(rows) >= ROWS:
             yield received.topic, self._block(received.topic)
-
-    def rest(self) -> Iterator[tuple[str, Block]]:
-        """Yield what has been collected since the last block of each topic."""
-        for topic, rows in self._rows.items():
-            if rows:
-                yield topic, self._block(topic)
 
     def _block(self, topic: str) -> Block:
         rows, self._rows[topic] = self._rows[topic], []

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 from tendonfmu.model import DEFAULTS
 from tendonfmu.recordings.converters.column_map import Joint
 
@@ -42,7 +43,7 @@ def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[d
     """
     time = parts["time"]
     if len(time) < LEAST:
-        raise InputError(f"{file}: {len(time)} samples; expected at least {LEAST} of a one-joint machine")
+        raise InputError(f"{file}: {counted(len(time), 'sample')}; expected at least {LEAST} of a one-joint machine")
     torque, angle = (
         parts[word] for word in (("torque", "angle") if joint.kind == "turning" else ("force", "position"))
     )
@@ -67,7 +68,7 @@ def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[d
         columns["contact"] = parts["contact"]
     begin = first_motion(file, velocity)
     if begin:
-        notes.append(f"{file}: {begin} samples at rest before the first motion are left out")
+        notes.append(f"{file}: {counted(begin, 'sample')} at rest before the first motion {are(begin)} left out")
     return {name: values[begin:] for name, values in columns.items()}, cutoff, notes
 
 

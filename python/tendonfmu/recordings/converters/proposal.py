@@ -10,6 +10,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import FORMAT, UNDECIDED
 from tendonfmu.recordings.converters.element_order import Order, in_order, matched, order_of
 from tendonfmu.recordings.converters.field_groups import KNOWN, Member, field_groups, words_of
@@ -165,6 +166,10 @@ def _doubtful(line: Line, orders: Sequence[Order]) -> Line:
 # --- lines ------------------------------------------------------------------------------------------------------------
 
 
+def _looking(number: int, name: str) -> str:
+    return f"{counted(number, 'field')} look{'s' if number == 1 else ''} like {name}"
+
+
 def _finger(found: Inspection, slots: Slots, by_name: Container[str]) -> list[Line]:
     """Return the lines of a finger. by_name: tendon positions that are known only by names like those of the forces."""
     present = {name: [each for each in members if each] for name, members in slots.items()}
@@ -179,14 +184,15 @@ def _finger(found: Inspection, slots: Slots, by_name: Container[str]) -> list[Li
                 line = _line(found, f"{name}[{k + 1}]", name, member[1], count > len(present[name]))
                 lines.append(_by_name(line) if _name(member) in by_name else line)
             else:
-                why = f"{len(present.get(name, []))} fields look like {name}, and {count} tendons are needed"
+                seen = len(present.get(name, []))
+                why = f"{_looking(seen, name)}, and {counted(count, 'tendon')} {are(count)} needed"
                 lines.append(Line(f"{name}[{k + 1}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
     for name in OF_JOINTS:
         for k, each in enumerate(slots.get(name, []), start=1):
             if each is not None:
                 lines.append(_line(found, f"{name}[{k}]", name, each[1], False))
             else:
-                why = f"{len(present[name])} fields look like {name}, and the log has more joints"
+                why = f"{_looking(len(present[name]), name)}, and the log has more joints"
                 lines.append(Line(f"{name}[{k}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
     return lines
 
@@ -213,7 +219,7 @@ def _joint(found: Inspection, groups: dict[str, list[Member]]) -> list[Line]:
             lines.append(line)
         elif key != "velocity":
             names = ", ".join(str(each.field.name) for _, each in members[:8])
-            why = f"{len(members)} fields may be it: {names}" if members else "no field looks like it"
+            why = f"{counted(len(members), 'field')} may be it: {names}" if members else "no field looks like it"
             lines.append(Line(key, UNDECIDED, UNDECIDED, NOT_SURE, why))
     return lines
 
@@ -240,7 +246,8 @@ def _line(found: Inspection, column: str, group: str, summary: FieldSummary, sho
     if short and sure == SURE:
         sure = "likely"
     if summary.missing:
-        why += f'; {summary.missing} of {summary.count} values are missing: see "missing" in "log"'
+        values = f"{summary.missing} of {counted(summary.count, 'value')} {are(summary.missing)} missing"
+        why += f'; {values}: see "missing" in "log"'
     return Line(column, _source(found, summary), guess.unit, sure, why)
 
 
@@ -255,7 +262,8 @@ def _time(found: Inspection, beside: Member | None) -> Line:
     faults = ""
     if clock.backwards or clock.repeated:
         faults = (
-            f'; it goes back {clock.backwards} times and stands still {clock.repeated} times: see "disorder" in "log"'
+            f"; it goes back {counted(clock.backwards, 'time')} and stands still {counted(clock.repeated, 'time')}: "
+            'see "disorder" in "log"'
         )
     if clock.stamp:
         return Line("time", source, clock.stamp, SURE, f"its values are points in time{faults}")

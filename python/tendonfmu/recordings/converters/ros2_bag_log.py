@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import require_extra
+from tendonfmu.files import are, counted, require_extra
 from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import Block, Log, Topic
 from tendonfmu.recordings.converters.mcap_log import McapLog
@@ -114,7 +114,8 @@ class Db3Log:
         finally:
             connection.close()
         if cut or _is_short(part):
-            self.notes.append(f"{part}: the file is cut off ({cut or 'pages are missing'}); {kept} messages are kept")
+            kept_words = f"{counted(kept, 'message')} {are(kept)} kept"
+            self.notes.append(f"{part}: the file is cut off ({cut or 'pages are missing'}); {kept_words}")
 
     def _topics(self, part: Path, connection: sqlite3.Connection) -> dict[int, tuple[str, Any]]:
         definitions: dict[str, tuple[str, str]] = {}
@@ -147,11 +148,8 @@ class Db3Log:
         """Read fields; see `log.Log`."""
         self.notes.clear()
         collector = Collector(wanted)
-        for received in self._messages():
-            yield from collector.add(received)
-        yield from collector.rest()
-        if collector.damaged:
-            self.notes.append(f"{self.file}: {collector.damaged} damaged messages are left out")
+        yield from collector.blocks(self._messages())
+        self.notes.extend(collector.notes(self.file))
 
 
 def _connect(part: Path) -> sqlite3.Connection:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import ColumnMap, MappedColumn, read_map
 from tendonfmu.recordings.converters.log import Log, Topic, find_field
 from tendonfmu.recordings.converters.log_file import open_log
@@ -163,7 +164,8 @@ class Conversion:
                     f"{self.log.file}: no samples{f' of {name}' if name else ''}; expected at least one row"
                 )
             if reader.left_out:
-                self.notes.append(f"{self.log.file}: {reader.left_out} rows without a number are left out")
+                out = reader.left_out
+                self.notes.append(f"{self.log.file}: {counted(out, 'row')} without a number {are(out)} left out")
 
     def _in_blocks(self) -> Iterator[dict[str, Series]]:
         readers = self._readers()

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, TEXT, Block, Field, Topic
 from tendonfmu.recordings.converters.text_layout import (
@@ -166,7 +167,7 @@ class TextLog:
             block, count = self._parse(text, places, texts, row)
             row += count
             yield "", block
-        self.notes = [*self._hints, *(f"{note}; {row} rows are kept" for note in self._tail_notes)]
+        self.notes = [*self._hints, *(f"{note}; {counted(row, 'row')} {are(row)} kept" for note in self._tail_notes)]
 
     def _place(self, name: str) -> int:
         if name.startswith(NUMBERED) and name not in self.layout.names:
@@ -221,7 +222,7 @@ class TextLog:
             fields = fields_of(line, layout.separator)
             if len(fields) != len(layout.names):
                 raise InputError(
-                    f"{self.file}: row {k}: {len(fields)} fields between {layout.separator!r}; expected "
+                    f"{self.file}: row {k}: {counted(len(fields), 'field')} between {layout.separator!r}; expected "
                     f"{len(layout.names)}, as in the first line"
                 )
             for name, place in places.items():

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import MappedColumn
 from tendonfmu.recordings.converters.log import TIME_NAMES, Topic
 from tendonfmu.recordings.converters.stamps import nanoseconds
@@ -156,9 +157,11 @@ class TopicRows:
         moved = int(np.count_nonzero(np.diff(time) < 0))
         again = np.flatnonzero(np.diff(time[order]) == 0) + 1
         if moved:
-            notes.append(f"{self._file}: time goes back at {moved} places; the rows are sorted by time")
+            notes.append(f"{self._file}: time goes back at {counted(moved, 'place')}; the rows are sorted by time")
         if again.size:
-            notes.append(f"{self._file}: {again.size} rows with the time of another are left out")
+            notes.append(
+                f"{self._file}: {counted(again.size, 'row')} with the time of another {are(again.size)} left out"
+            )
         return rows.only(np.delete(order, again))
 
 
