@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import inspect
 import json
 import os
@@ -17,6 +18,7 @@ import typer
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
+import map_cases
 from command import Answer, Call
 from fmu_binary import FINGER
 from plant_fmu_rig import fmu_rig
@@ -296,6 +298,19 @@ def test_parquet_comes_from_standard_input(call: Call, feed: Feed, case: dict[st
     assert call("run", "finger.json", "-", "-o", "piped.csv").status == 0
     assert call("run", "finger.json", "recording.csv", "-o", "file.csv").status == 0
     assert (tmp_path / "piped.csv").read_bytes() == (tmp_path / "file.csv").read_bytes()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_log_is_converted_in_a_pipe(call: Call, feed: Feed, tmp_path: Path, packed: bool) -> None:
+    log, _ = map_cases.written(tmp_path)
+    assert call("convert", "table", str(log), "--map", "map.json", "-o", "file.csv").status == 0
+    feed(gzip.compress(log.read_bytes()) if packed else log.read_bytes())
+    answer = call("convert", "table", "-", "--map", "map.json", "-o", "-")
+    assert answer.status == 0 and answer.out == (tmp_path / "file.csv").read_text("utf-8")
+    assert answer.err.splitlines()[-1].startswith("standard output: 3 samples")
+    feed(log.read_bytes())
+    assert call("convert", "inspect", "-", "-o", "proposed.json").status == 0
+    assert json.loads((tmp_path / "proposed.json").read_text("utf-8"))["format"] == "tendonfmu-map-1"
 
 
 def test_messages_and_reports_name_standard_input(call: Call, feed: Feed, case: dict[str, str], tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,7 @@ import typer
 
 from tendonfmu.cli.console import print_json, print_tables, say, warn
 from tendonfmu.cli.options import AsJson, Quiet
+from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_blocks, write_table
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ def register(app: typer.Typer) -> None:
     app.command()(convert)
 
 
+@reads("file")
 def convert(
     source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, or inspect")],
     file: Annotated[
@@ -98,11 +101,9 @@ def convert(
 
 
 def _convert_data_set(source: str, file: Path, output: Path, options: Mapping[str, float]) -> dict[str, Any]:
-    from tendonfmu.files import check_format, check_output, write_table
     from tendonfmu.recordings import convert_file
 
-    check_format(output)
-    check_output(output, file)
+    check_table(output, file)
     table = convert_file(source, file, options)
     write_table(output, table)
     return _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
@@ -150,15 +151,15 @@ def _print_inspection(found: Inspection, proposal: Proposal) -> None:
 
 def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
     """Convert a log by its map, and write the description of a one-joint machine."""
-    from tendonfmu.files import check_output, check_output_format
+    from tendonfmu.files import check_output
 
     if map_file is None:
         raise InputError(
             f"convert {TABLE}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
         )
-    check_output_format(output)
-    for each in [output] if finger is None else [output, finger]:
-        check_output(each, file, map_file)
+    check_table(output, file, map_file)
+    if finger is not None:
+        check_output(finger, file, map_file)
     if finger is not None and finger.resolve() == output.resolve():
         raise InputError(f"{finger}: the same file for recording and description; expected two names")
     if finger is None:
@@ -168,7 +169,6 @@ def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path
 
 def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, Any]:
     """Convert a log; if its map allows, only some rows are in memory at any time."""
-    from tendonfmu.files import write_blocks
     from tendonfmu.recordings import Conversion
 
     conversion = Conversion(file, map_file)
@@ -186,7 +186,7 @@ def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, An
 
 
 def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
-    from tendonfmu.files import write_table, write_text
+    from tendonfmu.files import write_text
     from tendonfmu.recordings import convert_table, describe_joint, description_text
 
     log = convert_table(file, map_file)
@@ -205,11 +205,11 @@ def _written(output: Path, count: int, duration: float, notes: list[str]) -> dic
 
     for note in notes:
         # what the user should look at: doubtful units, and logs that were cut off
-        if ": warning: " in note or " are kept" in note:
+        if ": warning: " in note or re.search(" (is|are) kept$", note):
             warn(note.replace(": warning: ", ": ", 1))
         else:
             say(note)
-    say(f"{output}: {counted(count, 'sample')}, {duration:.3f} s")
+    say(f"{name_of(output)}: {counted(count, 'sample')}, {duration:.3f} s")
     return {
         "format": "tendonfmu-conversion-1",
         "recording": str(output),

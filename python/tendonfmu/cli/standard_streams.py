@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path, PosixPath, WindowsPath
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -21,7 +21,17 @@ else:
     OwnPath = PosixPath if os.name == "posix" else WindowsPath
 
 DASH = Path("-")
-_ZIP, _PARQUET = b"PK\x03\x04", b"PAR1"
+# how a file begins -> its suffix; what is none of these is a table in text
+_BEGINNINGS = {
+    b"PK\x03\x04": ".fmu",
+    b"PAR1": ".parquet",
+    b"MATLAB": ".mat",
+    b"\x89HDF": ".h5",
+    b"\x89MCAP": ".mcap",
+    b"\x1f\x8b": ".csv.gz",
+    b"{": ".json",
+    b"[": ".json",
+}
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -73,12 +83,11 @@ def _files(value: Any) -> list[Path]:
 
 
 def _kept(content: bytes, folder: Path) -> Path:
-    """Write the content of standard input to a file whose suffix says what it is: JSON, FMU, Parquet or CSV."""
+    """Write the content of standard input to a file whose suffix says what it is."""
     if not content.strip():
         raise InputError("-: standard input is empty; expected a finger description (JSON), an FMU or a recording")
     start = content[:100].lstrip(b"\xef\xbb\xbf \t\r\n")
-    kinds = {".fmu": start.startswith(_ZIP), ".parquet": start.startswith(_PARQUET), ".json": start[:1] in (b"{", b"[")}
-    suffix = next((suffix for suffix, found in kinds.items() if found), ".csv")
+    suffix = next((suffix for begin, suffix in _BEGINNINGS.items() if start.startswith(begin)), ".csv")
     file = StandardInput(folder, f"standard_input{suffix}")
     file.write_bytes(content)
     return file
@@ -107,13 +116,18 @@ def check_table(output: Path, *inputs: Path) -> None:
 
 def write_table(output: Path, table: Mapping[str, NDArray[Any]]) -> None:
     """Write columns [N] to a .csv, .parquet or .mcap file, or as CSV to standard output."""
+    write_blocks(output, [table])
+
+
+def write_blocks(output: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    """Write a table that comes in blocks of rows, as `write_table` does; only one block is in memory."""
     from tendonfmu.files import csv_lines
-    from tendonfmu.files import write_table as write_file
+    from tendonfmu.files import write_blocks as write_file
 
     if output == DASH:
-        print_csv(csv_lines(table))
+        print_csv(csv_lines(blocks))
     else:
-        write_file(output, table)
+        write_file(output, blocks)
 
 
 def name_of(output: Path) -> str:

@@ -18,6 +18,8 @@ from .tables import write_blocks as write_blocks
 from .tables import write_table as write_table
 from .writing import check_output as check_output
 from .writing import check_output_folder as check_output_folder
+from .writing import in_use as in_use
 from .writing import is_about as is_about
+from .writing import remove_left_behind as remove_left_behind
 from .writing import whole_file as whole_file
 from .writing import write_text as write_text

@@ -296,24 +296,25 @@ def write_blocks(path: str | os.PathLike[str], blocks: Iterable[Mapping[str, NDA
         write(temporary, map(_columns, blocks))
 
 
-def csv_lines(table: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+def csv_lines(blocks: Iterable[Mapping[str, NDArray[Any]]]) -> Iterator[str]:
     """Yield the lines of a CSV file.
 
     Parameters
     ----------
-    table
-        Columns [N]. Numbers read back the same; flags become 0 and 1.
+    blocks
+        Columns [N] of the same names, blocks of rows. Numbers read back the same; flags become 0 and 1.
 
     Yields
     ------
     str
         The names, then each row, with its line end.
     """
-    columns = _columns(table)
-    yield ",".join(columns) + "\n"
-    # repr gives the shortest digits that read back as the same number
-    for row in zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True):
-        yield ",".join(row) + "\n"
+    for k, columns in enumerate(map(_columns, blocks)):
+        if k == 0:
+            yield ",".join(columns) + "\n"
+        # repr gives the shortest digits that read back as the same number
+        for row in zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True):
+            yield ",".join(row) + "\n"
 
 
 def _columns(table: Mapping[str, NDArray[Any]]) -> Table:
@@ -324,8 +325,7 @@ def _columns(table: Mapping[str, NDArray[Any]]) -> Table:
 
 def _write_csv(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
     with open(file, "w", encoding="utf-8", newline="\n") as out:
-        for k, columns in enumerate(blocks):
-            out.writelines(itertools.islice(csv_lines(columns), 1 if k else 0, None))
+        out.writelines(csv_lines(blocks))
 
 
 def _write_parquet(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tendonfmu.diagnosis import Diagnosis
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.files import check_output, check_output_folder, is_about, write_text
+from tendonfmu.files import check_output, check_output_folder, in_use, is_about, remove_left_behind, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
 from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
@@ -86,9 +86,11 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
 @contextmanager
 def _folder_beside(folder: Path) -> Iterator[Path]:
     """Make a temporary folder on the same disk. Its removal is not interrupted."""
+    remove_left_behind(folder.absolute())
     name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
     try:
-        yield Path(name)
+        with in_use(Path(name)):
+            yield Path(name)
     finally:
         with uninterrupted():
             shutil.rmtree(name, ignore_errors=True)

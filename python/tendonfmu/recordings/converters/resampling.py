@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import counted
+from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import ColumnMap, Resampling
 from tendonfmu.recordings.recording import LABEL
 
@@ -63,10 +63,9 @@ def on_one_clock(
                 f'{limit:.4g} s, or "resample": {{"gaps": "leave out"}} or a "largest_gap" in the map'
             )
         in_gap |= gaps
-    if in_gap.any():
-        notes.append(
-            f"{file}: {np.count_nonzero(in_gap)} of {counted(len(time), 'sample')} lie in gaps and are left out"
-        )
+    lost = int(np.count_nonzero(in_gap))
+    if lost:
+        notes.append(f"{file}: {lost} of {counted(len(time), 'sample')} in gaps {are(lost)} left out")
         time = time[~in_gap]
     if not len(time):
         raise InputError(f'{file}: no sample outside gaps; expected a smaller "rate" or a larger "largest_gap"')
