@@ -7,11 +7,7 @@ class bound_estimator {
  public:
   bound_estimator(const nb::bytes& image, const std::optional<group_row>& group,
                   const std::optional<number_row>& scale) {
-    if (group || scale) {
-      create(image, nullptr, nullptr); /* how many numbers are expected, before they are read */
-      check_length(group ? group->shape(0) : parameters(), "group");
-      check_length(scale ? scale->shape(0) : parameters(), "scale");
-    }
+    expect_all_numbers(image, group, scale);
     create(image, group ? group->data() : nullptr, scale ? scale->data() : nullptr);
   }
 

@@ -29,6 +29,29 @@ inline nb::object as_array(std::vector<double> values, std::vector<std::size_t> 
   return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
 }
 
+// group and scale have a number for each of the description. It is counted by the finger alone: an estimator without
+// them may refuse what they allow, such as a law of 0 whose scale is given.
+inline void expect_all_numbers(const nb::bytes& image, const std::optional<group_row>& group,
+                               const std::optional<number_row>& scale) {
+  if (!group && !scale) {
+    return;
+  }
+  char message[600] = "";
+  const std::unique_ptr<tendonfmu_finger, decltype(&tendonfmu_destroy)> finger(
+      tendonfmu_create(image.data(), image.size(), message, sizeof message), &tendonfmu_destroy);
+  if (!finger) {
+    throw nb::value_error(message);
+  }
+  const std::size_t count = tendonfmu_parameter_count(finger.get());
+  const auto expect = [count](std::size_t length, const char* name) {
+    if (length != count) {
+      throw nb::value_error((std::string(name) + ": expected " + std::to_string(count) + " numbers").c_str());
+    }
+  };
+  expect(group ? group->shape(0) : count, "group");
+  expect(scale ? scale->shape(0) : count, "scale");
+}
+
 inline void expect_rows(const std::optional<number_rows>& rows, std::size_t samples, std::size_t columns,
                         const char* name) {
   if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {

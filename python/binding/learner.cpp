@@ -8,11 +8,7 @@ class bound_learner {
   bound_learner(const nb::bytes& image, const std::optional<group_row>& group, const std::optional<number_row>& scale,
                 double prior_std, std::size_t block, double parameter_drift) {
     const tendonfmu_learner_options options{prior_std, block, parameter_drift};
-    if (group || scale) {
-      create(image, nullptr, nullptr, options); /* how many numbers are expected, before they are read */
-      check_length(group ? group->shape(0) : parameters(), "group");
-      check_length(scale ? scale->shape(0) : parameters(), "scale");
-    }
+    expect_all_numbers(image, group, scale);
     create(image, group ? group->data() : nullptr, scale ? scale->data() : nullptr, options);
   }
 
@@ -101,11 +97,6 @@ class bound_learner {
   void expect(tendonfmu_status status) const {
     if (status != TENDONFMU_OK) {
       throw nb::value_error(tendonfmu_learner_last_error(get()));
-    }
-  }
-  void check_length(std::size_t length, const char* name) const {
-    if (length != parameters()) {
-      throw nb::value_error((std::string(name) + ": expected " + std::to_string(parameters()) + " numbers").c_str());
     }
   }
 

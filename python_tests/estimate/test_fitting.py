@@ -361,6 +361,19 @@ def test_the_prior_holds_what_the_data_do_not_know() -> None:
     assert viscous.scale == 0.5
 
 
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_friction_that_starts_at_0_is_found_with_a_scale(method: str) -> None:
+    """Nothing else in this finger says how large the friction of a joint may be: the refusal asks for the scale."""
+    finger, truth = small_finger(), shared().fit(made_recording()).parameters_["joints[1].friction.coulomb"]
+    for joint in finger["joints"]:
+        if joint.get("friction") is not None:
+            joint["friction"] = {"coulomb": 0.0, "static": 0.0, "stribeck_velocity": 0.01}
+    with pytest.raises(InputError, match=r"joints\[1\].friction.coulomb = 0: .* expected a scale"):
+        shared(finger, method=method).fit(made_recording())
+    found = shared(finger, method=method, scale=["joints[*].friction.coulomb=0.01"]).fit(made_recording())
+    assert found.parameters_["joints[1].friction.coulomb"] == pytest.approx(truth, rel=0.3)
+
+
 # --- refused options --------------------------------------------------------------------------------------------------
 
 
