@@ -1,0 +1,90 @@
+"""Rules of the last check of causes, on made-up residuals and places: they take no fit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+from fit_cases import small_finger
+from tendonfmu.diagnosis import cause_gains
+from tendonfmu.diagnosis import diagnosis as whole
+from tendonfmu.diagnosis.effects import Place, by_name
+from tendonfmu.diagnosis.effects.friction_law_places import law_of
+from tendonfmu.diagnosis.extension_fit import Accepted
+
+HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
+
+
+def bench(nominal: list[Any], tests: Any = ()) -> Any:
+    """A bench without a search. A model is here its residuals [N, n] over each of the recordings."""
+    made = cause_gains._Bench.__new__(cause_gains._Bench)
+    made._training = cast("Any", [SimpleNamespace(at=k, held_out=held) for k, held in enumerate(HELD_OUT)])
+    made._tests, made.nominal = tests, cast("Any", SimpleNamespace(data=nominal))
+    made._found = cast("Any", SimpleNamespace(estimation=SimpleNamespace(online=lambda data: data)))
+    return made
+
+
+def residuals(*held_out: float, elsewhere: float) -> list[Any]:
+    """Residuals at the three held-out samples, and at all others."""
+    first, second, third = held_out
+    return [
+        np.array([[first], [second], [elsewhere], [elsewhere]]),
+        np.array([[third], [elsewhere], [elsewhere], [elsewhere]]),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("model", "holds"),
+    [
+        (residuals(1.0, 1.0, 1.0, elsewhere=9.0), True),  # as good where neither was fitted; the rest does not count
+        (residuals(1.0, 1.0, 1.1, elsewhere=0.0), False),  # worse there, however good elsewhere
+        (residuals(1.2, 1.0, 0.5, elsewhere=1.0), True),  # worse in one recording, better in all
+        (residuals(1.0, np.nan, 1.0, elsewhere=1.0), True),  # a sample without a residual counts for nothing
+        (residuals(np.nan, 1.0, 1.5, elsewhere=1.0), False),
+    ],
+)
+def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(
+    monkeypatch: pytest.MonkeyPatch, model: list[Any], holds: bool
+) -> None:
+    """So a gain on held-out parts is never negative."""
+    monkeypatch.setattr(cause_gains, "residual_of", lambda data, recording: data[recording.at])
+    nominal = residuals(1.0, 1.0, 1.0, elsewhere=1.0)
+    assert bench(nominal).holds(SimpleNamespace(data=model)) is holds
+    assert bench(nominal, tests=("a recording",)).holds(SimpleNamespace(data=model))  # judged on that one
+
+
+# --- experiments are planned for laws of the nominal description ------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("shape", "law"), [({}, ""), ({"viscous": 1.0}, ""), ({"pulley": 1.0, "x": 2.0}, "pulley"), ({"load": 1.0}, "load")]
+)
+def test_a_shape_says_which_law_of_a_place_it_is_of(shape: dict[str, float], law: str) -> None:
+    assert law_of(shape) == law
+
+
+def in_nominal(data: Any, effect: Accepted) -> bool:
+    search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
+    return whole._Result._is_in_nominal(cast("Any", SimpleNamespace(_found=search)), effect)
+
+
+def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Joint 1 of the nominal finger has friction of its own; friction by the load is a cause of the extended one."""
+    span = SimpleNamespace(speed=np.ones(2), tendon_speed=np.full((4, 2), 0.01))
+    monkeypatch.setattr(whole, "span_of", lambda data, recordings: span)
+    stribeck, nominal = by_name("stribeck"), small_finger()
+    flat = {"coulomb": 0.006, "static": 0.006, "stribeck_velocity": 0.1}
+    nominal["joints"][0] = {"name": "base", "friction": flat}
+    nominal["joints"][1] = {"name": "tip"}
+    extended = {**nominal, "joints": [{**nominal["joints"][0], "load_friction": flat}, nominal["joints"][1]]}
+    own, of_load = Accepted(stribeck, Place(1), {"stribeck_velocity": 0.1}), Accepted(stribeck, Place(1), {"load": 1.0})
+    assert in_nominal(nominal, own) and in_nominal(extended, own)
+    assert in_nominal(extended, of_load) and not in_nominal(nominal, of_load)
+    assert not in_nominal(nominal, Accepted(stribeck, Place(2), {}))  # no law at joint 2
+    curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
+    assert not in_nominal(curved, own)  # the law has what the effect would add
