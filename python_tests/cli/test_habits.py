@@ -255,6 +255,22 @@ def test_a_fault_is_3_and_an_interruption_130(
     )
 
 
+def page_of(name: str) -> str:
+    """What the reference says of a command: its row in the list, the pages named there, and what all have in common."""
+    (row,) = re.findall(rf"^\| .*`{name}\b.*$", PAGE.partition("## Options")[0], re.MULTILINE)
+    folder = ROOT / "docs" / "reference" / "commands"
+    pages = [(folder / link).read_text("utf-8") for link in re.findall(r"\]\(([^)#]+\.md)", row)]
+    return "\n".join([row, *pages, PAGE.partition("## Options")[2]])
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_is_in_the_reference(name: str) -> None:
+    page = page_of(name)
+    options = [option for each in COMMANDS[name].params for option in (*each.opts, *each.secondary_opts)]
+    missing = [option for option in options if option.startswith("-") and not re.search(rf"(?<![\w-]){option}\b", page)]
+    assert not missing
+
+
 def test_the_page_has_every_status() -> None:
     assert [int(number) for number in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)] == [0, 1, 2, 3, 130, 143]
 
