@@ -20,6 +20,7 @@ from tendonfmu.report import (
     Tile,
     at_place,
     cards_of,
+    diagnosis_numbers,
     diagnosis_page,
     diagnosis_sheets,
     diagnosis_text,
@@ -110,13 +111,13 @@ def _tile(story: Story, chapter: str) -> Tile:
 def _tile_of_cause(found: Diagnosis) -> Tile:
     factor, unit = unit_of(found)
     before, after = (
-        rounded(factor * diagnosis_text.together(each.test_rms)) for each in (found.nominal, found.extended)
+        rounded(factor * diagnosis_numbers.together(each.test_rms)) for each in (found.nominal, found.extended)
     )
     if not found.causes:
         return Tile(before, unit, "error on an unseen recording; no cause was found")
     first = found.causes[0]
     cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
-    meaning = f"error on an unseen recording: {diagnosis_text.percent(found.gain.value)} less with {cause}"
+    meaning = f"error on an unseen recording: {diagnosis_numbers.percent(found.gain.value)} less with {cause}"
     return Tile(f"{before} → {after}", unit, meaning)
 
 

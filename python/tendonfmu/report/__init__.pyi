@@ -1,3 +1,4 @@
+from . import diagnosis_numbers as diagnosis_numbers
 from . import diagnosis_page as diagnosis_page
 from . import diagnosis_report as diagnosis_report
 from . import diagnosis_text as diagnosis_text
@@ -12,6 +13,7 @@ from . import tune_text as tune_text
 from .diagnosis_figures import diagnosis_sheets as diagnosis_sheets
 from .diagnosis_files import check_folder as check_folder
 from .diagnosis_files import write_diagnosis as write_diagnosis
+from .diagnosis_numbers import unit_of as unit_of
 from .diagnosis_page import cards_of as cards_of
 from .diagnosis_report import REPORT as REPORT
 from .diagnosis_text import Names as Names
@@ -20,7 +22,6 @@ from .diagnosis_text import confusion_sentence as confusion_sentence
 from .diagnosis_text import error_sentence as error_sentence
 from .diagnosis_text import left_sentence as left_sentence
 from .diagnosis_text import names_of as names_of
-from .diagnosis_text import unit_of as unit_of
 from .diagnosis_waterfall import waterfall_of as waterfall_of
 from .figure_data import CompensationFigure as CompensationFigure
 from .figure_data import JointCurves as JointCurves

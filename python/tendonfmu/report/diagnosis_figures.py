@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
+from tendonfmu.report.diagnosis_numbers import unit_of
+from tendonfmu.report.diagnosis_text import Names, at_place, names_of
 from tendonfmu.report.diagnosis_words import Words, words_of
 
 Numbers = NDArray[np.float64]

@@ -16,6 +16,7 @@ from tendonfmu.diagnosis import (
 )
 from tendonfmu.files import counted, whole_file
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
+from tendonfmu.report.diagnosis_numbers import left_of, percent, percent_interval, probability, together, unit_of
 from tendonfmu.report.diagnosis_text import (
     Names,
     at_place,
@@ -26,21 +27,15 @@ from tendonfmu.report.diagnosis_text import (
     headline,
     hidden,
     hidden_sentences,
-    left_of,
     left_sentence,
     meaning_of_gain,
     names_of,
     next_sentence,
     parameter_rows,
-    percent,
-    percent_interval,
     place_rows,
-    probability,
     tested_sentence,
     title_of,
-    together,
     too_small_sentence,
-    unit_of,
     unseen,
 )
 from tendonfmu.report.diagnosis_waterfall import waterfall_of

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tendonfmu.diagnosis import Diagnosis
-from tendonfmu.report.diagnosis_text import Names, at_place, left_of, unit_of
+from tendonfmu.report.diagnosis_numbers import left_of, unit_of
+from tendonfmu.report.diagnosis_text import Names, at_place
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.fit_summary import rounded
 

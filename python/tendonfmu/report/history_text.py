@@ -8,7 +8,8 @@ from typing import Any
 
 from tendonfmu.diagnosis import History, Line, quantity, share_of
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_text import Names, at_place, percent
+from tendonfmu.report.diagnosis_numbers import percent
+from tendonfmu.report.diagnosis_text import Names, at_place
 
 
 def headline(found: History) -> str:
