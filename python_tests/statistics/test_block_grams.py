@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, grams_of, series_with, waves
-from tendonfmu.statistics.block_grams import MEMORY, Grams, bounded, standard_error
+from tendonfmu.statistics.block_grams import MEMORY, Grams, Products, bounded, standard_error
 from tendonfmu.statistics.folds import make_folds
 from tendonfmu.statistics.splines import basis, bias_splines, without
 
@@ -230,6 +230,6 @@ def test_unused_blocks_do_not_matter(made: tuple[Numbers, Numbers, Numbers]) -> 
         own = [each.copy() for each in (target, nominal, values)]
         for each in own:
             each[700:900] += spoilt
-        return Grams(make_folds(series), own[0], own[1], own[2], splines, np.full(4, np.nan))
+        return Grams(Products(make_folds(series), own[1], own[2], splines), own[0], np.full(4, np.nan))
 
     assert grams(1e3).error(MIX, *FREE)[0] == grams(0.0).error(MIX, *FREE)[0]

@@ -14,7 +14,7 @@ from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Sh
 from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.block_grams import Grams
+from tendonfmu.statistics.block_grams import Grams, Products
 from tendonfmu.statistics.folds import make_folds
 from tendonfmu.statistics.splines import bias_splines
 
@@ -67,7 +67,7 @@ def grams_of(target: Numbers, nominal: Array, values: Array, scale: Numbers | No
     """With splines of a slow bias; scale: of the nominal numbers, nothing known of them where it is None."""
     series = series_with(target)
     known = np.full(nominal.shape[2], np.nan) if scale is None else scale
-    return Grams(make_folds(series), target, nominal, values, bias_splines(series), known)
+    return Grams(Products(make_folds(series), nominal, values, bias_splines(series)), target, known)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from tendonfmu.statistics import (
     TRENDS,
     Folds,
     Grams,
+    Products,
     SampleBlocks,
     Splines,
     bias_splines,
@@ -114,7 +115,8 @@ def look(
         progress=progress,
     )
     folds = make_folds(series)
-    grams = Grams(folds, series.target, columns.nominal, columns.values, splines, nominal_scale(data))
+    products = Products(folds, columns.nominal, columns.values, splines)
+    grams = Grams(products, series.target, nominal_scale(data))
     return View(data, recordings, predicted, series, splines, columns, folds, grams, least)
 
 

@@ -26,7 +26,7 @@ from tendonfmu.diagnosis.starting_point import Start, scan
 from tendonfmu.model import Finger, moment_arms
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
 from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
-from tendonfmu.statistics import Grams, make_folds
+from tendonfmu.statistics import Grams, Products, make_folds
 
 Numbers = NDArray[np.float64]
 
@@ -251,5 +251,6 @@ def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Gr
                 target[rows] = zero_phase(target[rows], cutoff, 1.0 / grid.step)
                 nominal[rows] = zero_phase(nominal[rows], cutoff, 1.0 / grid.step)
     folds = make_folds(series)
-    grams = Grams(folds, target, nominal, columns.values, bias_of(plain, series), nominal_scale(plain))
+    products = Products(folds, nominal, columns.values, bias_of(plain, series))
+    grams = Grams(products, target, nominal_scale(plain))
     return float(np.sqrt(grams.without / max(len(folds.rows) * target.shape[1], 1)))

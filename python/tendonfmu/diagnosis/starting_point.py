@@ -24,7 +24,7 @@ from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.model import EFFECT_NUMBERS, moment_arms
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import Grams, make_folds
+from tendonfmu.statistics import Grams, Products, make_folds
 
 Numbers = NDArray[np.float64]
 
@@ -152,9 +152,8 @@ def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: G
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
     columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
-    grams = Grams(
-        make_folds(series), series.target, columns.nominal, columns.values, bias_of(plain, series), nominal_scale(plain)
-    )
+    products = Products(make_folds(series), columns.nominal, columns.values, bias_of(plain, series))
+    grams = Grams(products, series.target, nominal_scale(plain))
     return grams.errors_of(series.target[:, :, None] + moved)
 
 

@@ -161,59 +161,23 @@ class Products:
 class Grams:
     """Products of a target, of the nominal model's columns and of candidates, by fold.
 
+    The nominal numbers are refitted without each fold.
+
     Parameters
     ----------
-    folds
-        Folds of the blocks.
+    products
+        Products of the columns.
     target
         [B, n] (N·m).
-    nominal
-        Derivatives by the nominal numbers [B, n, u].
-    values
-        Derivatives by the candidates [B, n, c].
-    splines
-        Splines of the slow bias [B, s].
     scale
         How far each nominal number is expected to move [u]. This ridge decides if the data do not.
+    judged
+        Folds [f] whose errors count, by default all. The others are only learned from.
     """
 
     def __init__(
-        self,
-        folds: Folds,
-        target: Numbers,
-        nominal: Array,
-        values: Array,
-        splines: Splines,
-        scale: Numbers,
+        self, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None
     ) -> None:
-        """Multiply, and refit the nominal numbers without each fold."""
-        self._begin(Products(folds, nominal, values, splines), target, scale, None)
-
-    @classmethod
-    def of(cls, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None) -> Grams:
-        """Make grams of existing products and a target.
-
-        Parameters
-        ----------
-        products
-            Products of the columns.
-        target
-            [B, n] (N·m).
-        scale
-            How far each nominal number is expected to move [u].
-        judged
-            Folds [f] whose errors count, by default all. The others are only learned from.
-
-        Returns
-        -------
-        Grams
-            With the same folds as the products.
-        """
-        found = cls.__new__(cls)
-        found._begin(products, target, scale, judged)
-        return found
-
-    def _begin(self, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None) -> None:
         folds = self.folds = products.folds
         self.nominal_count, self.count, self._table = products.nominal_count, products.count, products.table
         self._judged = np.ones(folds.folds, dtype=bool) if judged is None else judged

@@ -227,7 +227,7 @@ class ChangeSearch:
             places.append(slice(at, at + own.shape[2]))
             at += own.shape[2]
         every = chosen.with_own(np.concatenate(parts, axis=2))
-        grams = Grams.of(every, self._target_now(), self._scales(self.changes), counted)
+        grams = Grams(every, self._target_now(), self._scales(self.changes), counted)
         errors = []
         for each, place in zip(options, places, strict=True):
             mix = np.eye(at)[:, place]
@@ -321,7 +321,7 @@ class ChangeSearch:
         left = [each for each in self.hypotheses if each.effect not in known]
         products, judged = self._products(None)
         chosen = products.chosen(self._together(self.changes), None)
-        return Selection(Grams.of(chosen, self._target_now(), self._scales(self.changes), judged), left, self._least)
+        return Selection(Grams(chosen, self._target_now(), self._scales(self.changes), judged), left, self._least)
 
     @property
     def new_recordings(self) -> list[int]:
@@ -350,7 +350,7 @@ class ChangeSearch:
             used = np.flatnonzero(alone.hypothesis.mix.any(axis=1))
             target = target + self._values @ self._mixed(alone)
         products, judged = self._products(unseen)
-        return Grams.of(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
+        return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
     def grams_of_recording(self, number: int, only: int) -> Grams:
         """Return the products with one change in one new recording as the only candidate.
@@ -365,7 +365,7 @@ class ChangeSearch:
         nominal = np.concatenate([self._shared, *shared], axis=2)
         products = Products(self.folds, nominal, of[only], self._splines)
         scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
-        return Grams.of(products, self._target_now() + column[:, :, 0], scale, self.judged)
+        return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
 
     def _target_now(self) -> Numbers:
         return self._target - self.moved() if self.changes else self._target
