@@ -17,6 +17,25 @@ HOT_INLINE void quad_store(double* to, quad a) {
   _mm256_store_pd(to, a);
 }
 
+HOT_INLINE quad quad_of_halves(const double* low, const double* high) {
+  return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(low)), _mm_loadu_pd(high), 1);
+}
+
+HOT_INLINE void quad_load_pairs(const double* const from[4], quad* first, quad* second) {
+  const quad a = quad_of_halves(from[0], from[2]), b = quad_of_halves(from[1], from[3]);
+  *first = _mm256_unpacklo_pd(a, b);
+  *second = _mm256_unpackhi_pd(a, b);
+}
+
+HOT_INLINE void quad_store_lanes(double* const to[4], const quad row[4]) {
+  const quad even01 = _mm256_unpacklo_pd(row[0], row[1]), odd01 = _mm256_unpackhi_pd(row[0], row[1]);
+  const quad even23 = _mm256_unpacklo_pd(row[2], row[3]), odd23 = _mm256_unpackhi_pd(row[2], row[3]);
+  _mm256_storeu_pd(to[0], _mm256_permute2f128_pd(even01, even23, 0x20));
+  _mm256_storeu_pd(to[1], _mm256_permute2f128_pd(odd01, odd23, 0x20));
+  _mm256_storeu_pd(to[2], _mm256_permute2f128_pd(even01, even23, 0x31));
+  _mm256_storeu_pd(to[3], _mm256_permute2f128_pd(odd01, odd23, 0x31));
+}
+
 HOT_INLINE quad quad_set(double x) {
   return _mm256_set1_pd(x);
 }
@@ -87,6 +106,10 @@ HOT_INLINE quad quad_drop(quad_mask m, quad a) {
 
 HOT_INLINE quad quad_min(quad a, quad b) {
   return _mm256_min_pd(a, b);
+}
+
+HOT_INLINE quad quad_max(quad a, quad b) {
+  return _mm256_max_pd(a, b);
 }
 
 HOT_INLINE quad quad_sqrt(quad a) {

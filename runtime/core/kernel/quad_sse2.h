@@ -22,6 +22,21 @@ HOT_INLINE void quad_store(double* to, quad a) {
   _mm_store_pd(to + 2, a.high);
 }
 
+HOT_INLINE void quad_load_pairs(const double* const from[4], quad* first, quad* second) {
+  const quad a = {_mm_loadu_pd(from[0]), _mm_loadu_pd(from[2])}, b = {_mm_loadu_pd(from[1]), _mm_loadu_pd(from[3])};
+  *first = QUAD_BOTH_HALVES(_mm_unpacklo_pd, a, b);
+  *second = QUAD_BOTH_HALVES(_mm_unpackhi_pd, a, b);
+}
+
+HOT_INLINE void quad_store_lanes(double* const to[4], const quad row[4]) {
+  for (int k = 0; k < 4; k += 2) {
+    _mm_storeu_pd(to[0] + k, _mm_unpacklo_pd(row[k].low, row[k + 1].low));
+    _mm_storeu_pd(to[1] + k, _mm_unpackhi_pd(row[k].low, row[k + 1].low));
+    _mm_storeu_pd(to[2] + k, _mm_unpacklo_pd(row[k].high, row[k + 1].high));
+    _mm_storeu_pd(to[3] + k, _mm_unpackhi_pd(row[k].high, row[k + 1].high));
+  }
+}
+
 HOT_INLINE quad quad_set(double x) {
   return (quad){_mm_set1_pd(x), _mm_set1_pd(x)};
 }
@@ -97,6 +112,10 @@ HOT_INLINE quad quad_drop(quad_mask m, quad a) {
 
 HOT_INLINE quad quad_min(quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_min_pd, a, b);
+}
+
+HOT_INLINE quad quad_max(quad a, quad b) {
+  return QUAD_BOTH_HALVES(_mm_max_pd, a, b);
 }
 
 HOT_INLINE quad quad_sqrt(quad a) {

@@ -11,6 +11,7 @@
 #include "kinematics.h"
 #include "position_filter.h"
 #include "sensor_fault.h"
+#include "sliding_places.h"
 #include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
@@ -93,6 +94,22 @@ HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   return quad_sum(sum) / (double)f->tendons;
 }
 
+/* 0 unless anything that the extensions are about to remember is infinite or NaN */
+HOT_INLINE double extension_probe(const tendonfmu_finger* f) {
+  const size_t count = f->shape.extension_memory, whole = count / 8 * 8;
+  const quad zero = quad_set(0.0);
+  quad probe[2] = {zero, zero};
+  double rest = 0.0;
+  for (size_t k = 0; k < whole; k += 8) {
+    probe[0] = quad_add(probe[0], quad_mul(zero, quad_load(f->scratch.extension + k)));
+    probe[1] = quad_add(probe[1], quad_mul(zero, quad_load(f->scratch.extension + k + 4)));
+  }
+  for (size_t k = whole; k < count; ++k) {
+    rest += 0.0 * f->scratch.extension[k];
+  }
+  return quad_sum(quad_add(probe[0], probe[1])) + rest;
+}
+
 /* 0 when anything that is about to be remembered is not finite, or its square would not be */
 HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
@@ -104,9 +121,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
     probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
     probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
   }
-  for (size_t k = 0; k < f->shape.extension_memory; ++k) {
-    probe += 0.0 * s->extension[k];
-  }
+  probe += extension_probe(f);
   return probe == 0.0 && (!filters_position(f) || filter_is_finite(f)) &&
          (!f->derived.settings.watches_sensors || sensors_are_finite(f));
 }
@@ -282,13 +297,14 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (f->shape.extension_count) {
     follow_signals(f, step, velocity_gain);
     advance_extensions(f, time, step);
+    advance_sliding_places(f, step, first);
     follow_memories(f);
+  }
+  if (f->extensions.friction) {
+    find_grips(f);
   }
   speed_thresholds(f, first);
   const int transitions = friction_values(f);
-  if (f->extensions.friction) {
-    grip_friction(f);
-  }
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);
