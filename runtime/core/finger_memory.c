@@ -58,6 +58,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->edge_angle = take_numbers(c, angles);
   d->edge_angle_row = take(c, n * sizeof(size_t));
   d->edge_record = take(c, n * lanes * sizeof(uint32_t));
+  d->can_hold = take(c, n * lanes / 4);
   d->joint_law = take_numbers(c, joints * LAW_NUMBERS);
   d->load_law = take_numbers(c, joints * LAW_NUMBERS);
   d->cover_stiffness = take_numbers(c, joints);

@@ -103,9 +103,10 @@ typedef struct derived_numbers {
   double* edge_segment;   /* [records × 2] angle at which the segment begins, 1/length; 0 outside the grid */
   double* edge_angle;     /* per joint: [most points × M], ∞ where an edge has fewer */
   size_t* edge_angle_row; /* [n] where the angles of a joint begin, in numbers */
-  uint32_t* edge_record;  /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
-  double* joint_law;      /* [N × LAW_NUMBERS] T_jv0 */
-  double* load_law;       /* [N × LAW_NUMBERS] T_jvf */
+  unsigned char* can_hold; /* [n × M / 4] 0: |F| of the four slots is at no joint, their moment arms are 0 */
+  uint32_t* edge_record;   /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
+  double* joint_law;       /* [N × LAW_NUMBERS] T_jv0 */
+  double* load_law;        /* [N × LAW_NUMBERS] T_jvf */
   double *cover_stiffness, *cover_rest;                /* [N] */
   double *contact_threshold, *contact_per_force;       /* [N] */
   double* initial_torque;                              /* [N] */

@@ -133,6 +133,20 @@ HOT_INLINE void keep_magnitude(const tendonfmu_finger* f, double* stuck, double*
   }
 }
 
+/* whether F of four slots is 0 without a look at the laws: nothing moves, now or before, or slides; where
+ * friction_bound.h wants |F| of what sticks, only where it can hold no joint */
+HOT_INLINE int nothing_acts(const tendonfmu_finger* f, size_t slot, quad_mask moving) {
+  int acts = quad_mask_bits(quad_either(moving, moved_before(f, slot)));
+  if (f->derived.settings.bounds_friction) {
+    acts |= f->derived.can_hold[slot / 4];
+  }
+  if (f->extensions.friction) {
+    const quad share = quad_abs(quad_load(f->scratch.grip + slot));
+    acts |= quad_mask_bits(quad_both(slides_at(f, slot), quad_greater(share, quad_set(0.0))));
+  }
+  return !acts;
+}
+
 /* F_B and F_A of four tendons at joint j, from slot `at` on; returns whether any of them comes to rest or begins to
  * move */
 HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
@@ -140,6 +154,11 @@ HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
   const double before = angle_before(s->angle, j);
   const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
   const quad_mask moving = moves_at(f, at, 0, speed);
+  if (nothing_acts(f, at, moving)) {
+    quad_store(s->edge + at, quad_set(0.0));
+    quad_store(s->pulley + at, quad_set(0.0));
+    return 0;
+  }
   const quad_mask decided = takes_side(f, at, moving, speed, f->derived.settings.tendon_threshold);
   const slot_view* view = view_at(f, at, v, decided, before);
   const quad edge = edges_magnitude(view, quad_set(before), speed);
@@ -189,7 +208,7 @@ HOT_INLINE int friction_values(tendonfmu_finger* f) {
 HOT_INLINE quad without_slack(quad force, quad_mask bidirectional, quad_mask* slack) {
   const quad_mask negative = quad_only_first(quad_greater(quad_set(0.0), force), bidirectional);
   *slack = quad_either(*slack, negative);
-  return quad_drop(negative, force);
+  return quad_select(bidirectional, force, quad_max(quad_set(0.0), force));
 }
 
 /* the force as it multiplies an F or a b */
@@ -197,34 +216,32 @@ HOT_INLINE quad acting_force(quad force, quad_mask bidirectional) {
   return quad_select(bidirectional, quad_abs(force), force);
 }
 
-/* f_A and f_B along every tendon, as a recursion, and what they make at each joint: the sums over the tendons in eqs.
- * (8) and (10), accumulated into tendon_friction [n] and load [n] */
-HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
+/* f_A and f_B along four tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
+ * in eqs. (8) and (10), accumulated into tendon_friction [n] and load [n] */
+HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, quad* tendon_friction, quad* load) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, last = (f->joints - 1) * lanes;
-  for (size_t i = 0; i < lanes; i += 4) {
-    const quad zero = quad_set(0.0);
-    const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
-    quad_mask slack = quad_greater(zero, zero);
-    quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
-    for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
-      const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
-      const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
-      force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
-      const quad force_between = acting_force(force, bidirectional); /* f_Bj */
-      lost = quad_add(lost, edge_loss);
-      if (at < last) {
-        const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
-        force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
-        lost = quad_add(lost, pulley_loss);
-      }
-      tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
-      load[j] = quad_add(load[j], force_between);
-      quad_store(s->force_at + at, force_at);
-      quad_store(s->force_between + at, force_between);
+  const quad zero = quad_set(0.0);
+  const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
+  quad_mask slack = quad_greater(zero, zero);
+  quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
+  for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
+    const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
+    const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
+    force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
+    const quad force_between = acting_force(force, bidirectional); /* f_Bj */
+    lost = quad_add(lost, edge_loss);
+    if (at < last) {
+      const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
+      force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
+      lost = quad_add(lost, pulley_loss);
     }
-    quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
+    tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
+    load[j] = quad_add(load[j], force_between);
+    quad_store(s->force_at + at, force_at);
+    quad_store(s->force_between + at, force_between);
   }
+  quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
 }
 
 /* T_j of eq. (10), with the joint's own friction and cover of eq. (8) */
@@ -232,20 +249,19 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const derived_numbers* d = &f->derived;
   quad tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];
-  for (size_t j = 0; j < f->joints; ++j) {
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
     tendon_friction[j] = load[j] = quad_set(0.0);
   }
-  propagate_forces(f, tendon_friction, load);
-  for (size_t j = 0; j < f->joints; ++j) {
-    s->friction[j] = quad_sum(tendon_friction[j]);
-    s->load[j] = quad_sum(load[j]);
+  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+    propagate_four(f, i, tendon_friction, load);
   }
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad bend = quad_sub(quad_load(s->angle + j), quad_load(d->cover_rest + j));
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);
-    const quad load_friction = quad_mul(quad_load(s->load_friction + j), quad_load(s->load + j));
+    const quad sum = quad_sums(load + j), load_friction = quad_mul(quad_load(s->load_friction + j), sum);
     const quad joint_friction = quad_add(quad_load(s->joint_friction + j), load_friction);
-    quad_store(s->friction + j, quad_add(quad_add(quad_load(s->friction + j), joint_friction), cover));
+    quad_store(s->load + j, sum);
+    quad_store(s->friction + j, quad_add(quad_add(quad_sums(tendon_friction + j), joint_friction), cover));
   }
 }
 

@@ -121,6 +121,16 @@ HOT_INLINE double quad_sum(quad a) {
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));
 }
 
+/* {a0 + a2, a1 + a3, b0 + b2, b1 + b3} */
+HOT_INLINE quad quad_half_sums(quad a, quad b) {
+  return _mm256_add_pd(_mm256_permute2f128_pd(a, b, 0x20), _mm256_permute2f128_pd(a, b, 0x31));
+}
+
+HOT_INLINE quad quad_sums(const quad row[4]) {
+  const quad even = quad_half_sums(row[0], row[2]), odd = quad_half_sums(row[1], row[3]);
+  return _mm256_add_pd(_mm256_unpacklo_pd(even, odd), _mm256_unpackhi_pd(even, odd));
+}
+
 HOT_INLINE quad quad_scale(quad a, quad shifted) {
   return _mm256_castsi256_pd(
       _mm256_add_epi64(_mm256_castpd_si256(a), _mm256_slli_epi64(_mm256_castpd_si256(shifted), 52)));

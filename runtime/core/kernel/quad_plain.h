@@ -184,6 +184,13 @@ HOT_INLINE double quad_sum(quad a) {
   return (a.lane[0] + a.lane[2]) + (a.lane[1] + a.lane[3]);
 }
 
+/* lane i: quad_sum(row[i]) */
+HOT_INLINE quad quad_sums(const quad row[4]) {
+  quad r;
+  QUAD_EACH(r.lane[i] = quad_sum(row[i]));
+  return r;
+}
+
 /* a · 2^k, where the low bits of the double `shifted` hold the integer k (see exponential.h) */
 HOT_INLINE quad quad_scale(quad a, quad shifted) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) + (quad_bits(shifted.lane[i]) << 52)));

@@ -129,6 +129,15 @@ HOT_INLINE double quad_sum(quad a) {
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));
 }
 
+HOT_INLINE __m128d quad_two_sums(quad a, quad b) {
+  const __m128d s = _mm_add_pd(a.low, a.high), t = _mm_add_pd(b.low, b.high);
+  return _mm_add_pd(_mm_unpacklo_pd(s, t), _mm_unpackhi_pd(s, t));
+}
+
+HOT_INLINE quad quad_sums(const quad row[4]) {
+  return (quad){quad_two_sums(row[0], row[1]), quad_two_sums(row[2], row[3])};
+}
+
 HOT_INLINE __m128d quad_scale_half(__m128d a, __m128d shifted) {
   return _mm_castsi128_pd(_mm_add_epi64(_mm_castpd_si128(a), _mm_slli_epi64(_mm_castpd_si128(shifted), 52)));
 }
