@@ -253,6 +253,17 @@ static void clear_grids(tendonfmu_finger* f) {
   }
 }
 
+/* F_B of a slot acts at its joint and all behind, F_A one joint before, too */
+static void find_what_can_hold(tendonfmu_finger* f) {
+  const size_t lanes = f->tendon_lanes, slots = f->joints * lanes;
+  memset(f->derived.can_hold, 0, slots / 4);
+  for (size_t slot = 0; slot < slots; ++slot) {
+    for (size_t at = slot < lanes ? slot : slot - lanes; at < slots; at += lanes) {
+      f->derived.can_hold[slot / 4] |= f->derived.moment_arm[at] != 0.0;
+    }
+  }
+}
+
 static void derive_routing(tendonfmu_finger* f) {
   double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS] = {0}, inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
   const size_t n = f->joints, m = f->tendons, lanes = f->tendon_lanes;
@@ -310,6 +321,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
+    find_what_can_hold(finger);
   }
   find_extensions(finger);
   recall_rows(finger);

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "slot_view.h"
+#include "presliding_step.h"
 
 /* --- the table ------------------------------------------------------------------------------------------------------
  */
@@ -84,6 +84,72 @@ static void find_named_slots(tendonfmu_finger* f) {
   }
 }
 
+/* whether a slot that the row would act on is in the layer of another one: what no description says, but an image can
+ */
+static int shares_a_slot(const tendonfmu_finger* f, const extension_row* row) {
+  const size_t members = friction_members(f, row->place);
+  for (size_t k = 0; k < members; ++k) {
+    const size_t slot = friction_slot(f, row->place, k);
+    if (!row_yields(f, row, slot) && f->extensions.acting.offset[slot] < f->shape.extension_memory) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+static void put_into_layers(tendonfmu_finger* f, const extension_row* row) {
+  const size_t members = friction_members(f, row->place), joint_row = f->joints * f->tendon_lanes;
+  const size_t begin = (size_t)(row->next - f->scratch.extension);
+  for (size_t k = 0; k < members; ++k) {
+    const size_t slot = friction_slot(f, row->place, k);
+    const int yields = row_yields(f, row, slot);
+    const sliding_layer* layer = yields ? &f->extensions.overruled : &f->extensions.acting;
+    const double threshold =
+        slot < joint_row ? f->derived.settings.tendon_threshold : f->derived.settings.joint_threshold;
+    layer->displacement[slot] = row->parameters[0];
+    layer->distance[slot] = presliding_distance(row->place, row->parameters[0], threshold);
+    layer->offset[slot] = (uint32_t)(begin + PRESLIDING_NUMBERS * k);
+    layer->taken[slot / 4] = 1;
+    ++*(yields ? &f->extensions.yielding : &f->extensions.sliding);
+  }
+}
+
+static void clear_layer(const tendonfmu_finger* f, const sliding_layer* layer) {
+  memset(layer->taken, 0, f->slots / 4);
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    layer->displacement[slot] = layer->distance[slot] = 1.0;
+    layer->offset[slot] = (uint32_t)f->shape.extension_memory;
+  }
+}
+
+/* the layers, and what a step finds in scratch of slots that slide */
+static void find_sliding(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  clear_layer(f, &f->extensions.acting);
+  clear_layer(f, &f->extensions.overruled);
+  f->extensions.sliding = f->extensions.yielding = 0;
+  f->extensions.only_slides = 1;
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    s->slides[slot] = 0.0;
+  }
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    extension_row* row = f->extensions.row + f->extensions.signals + r;
+    row->in_layer = row->effect->slides && !shares_a_slot(f, row);
+    f->extensions.only_slides &= row->in_layer;
+    for (size_t k = 0; row->effect->slides && k < friction_members(f, row->place); ++k) {
+      const size_t slot = friction_slot(f, row->place, k);
+      s->slides[slot] = row_yields(f, row, slot) ? s->slides[slot] : 1.0;
+    }
+    if (row->in_layer) {
+      put_into_layers(f, row);
+    }
+  }
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    s->grip[slot] = s->others[slot] = 1.0;
+    s->bias_grip[slot] = s->slides[slot] != 0.0 ? 0.0 : 1.0;
+  }
+}
+
 void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
@@ -97,6 +163,7 @@ void find_extensions(tendonfmu_finger* f) {
   f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction, &offset);
   find_axis_cosines(f);
   find_named_slots(f);
+  find_sliding(f);
 }
 
 const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
@@ -133,7 +200,7 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
                                       .joint_threshold = f->derived.settings.joint_threshold};
   for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
     const extension_row* row = f->extensions.row + r;
-    if (row->effect->advance) {
+    if (row->effect->advance && !row->in_layer) {
       row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
     }
   }
@@ -233,111 +300,43 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direct
   return slope;
 }
 
-/* into scratch, for every slot of the sample being taken */
-static void find_grips(tendonfmu_finger* f) {
-  finger_scratch* s = &f->scratch;
+/* what a row that slides makes of one of its slots */
+static void slide_at(tendonfmu_finger* f, const extension_row* row, size_t k, size_t slot) {
+  const double* place = row->next + PRESLIDING_NUMBERS * k;
+  f->scratch.grip[slot] *= place[PRESLIDING_SHARE];
+  f->scratch.kept[slot] = place[PRESLIDING_KEPT];
+}
+
+static void grip_row(tendonfmu_finger* f, const extension_row* row) {
+  const finger_scratch* s = &f->scratch;
+  const size_t members = friction_members(f, row->place);
+  for (size_t k = 0; k < members; ++k) {
+    const size_t slot = friction_slot(f, row->place, k);
+    if (row_yields(f, row, slot)) {
+      continue;
+    }
+    if (row->effect->slides) {
+      slide_at(f, row, k, slot);
+      continue;
+    }
+    const double value = row->effect->grip(row->place, row->parameters, row->next, k).value;
+    s->grip[slot] *= value;
+    s->bias_grip[slot] *= value;
+    s->others[slot] *= value;
+  }
+}
+
+void find_grips(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  if (f->extensions.only_slides) {
+    return; /* the shares stand there already, the rest in find_sliding() */
+  }
   for (size_t slot = 0; slot < f->slots; ++slot) {
-    s->grip[slot] = s->bias_grip[slot] = s->others[slot] = 1.0;
-    s->slides[slot] = 0.0;
+    s->grip[slot] = s->others[slot] = 1.0;
+    s->bias_grip[slot] = s->slides[slot] != 0.0 ? 0.0 : 1.0;
   }
   for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    const size_t members = friction_members(f, row->place);
-    for (size_t k = 0; k < members; ++k) {
-      const size_t slot = friction_slot(f, row->place, k);
-      if (row_yields(f, row, slot)) {
-        continue;
-      }
-      const effect_grip grip = row->effect->grip(row->place, row->parameters, row->next, k);
-      s->grip[slot] *= grip.value;
-      s->bias_grip[slot] *= grip.slides ? 0.0 : grip.value;
-      if (grip.slides) {
-        s->slides[slot] = 1.0;
-        s->kept[slot] = grip.kept;
-      } else {
-        s->others[slot] *= grip.value;
-      }
-    }
-  }
-}
-
-static double magnitude(const double* law, int negative, double speed) {
-  return law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed).value;
-}
-
-/* |F_B| with its working points */
-static double edge_magnitude(const tendonfmu_finger* f, size_t slot, int negative, double speed) {
-  const size_t j = slot / f->tendon_lanes;
-  const double angle = j ? f->scratch.angle[j - 1] : 0.0;
-  const size_t record = f->derived.edge_record[slot] + slot_segment(f, j, slot % f->tendon_lanes, angle);
-  const double* segment = f->derived.edge_segment + 2 * record;
-  const double below = magnitude(f->derived.edge_law + record * LAW_NUMBERS, negative, speed);
-  if (segment[1] == 0.0) {
-    return below;
-  }
-  const double above = magnitude(f->derived.edge_law + (record + 1) * LAW_NUMBERS, negative, speed);
-  return below + (angle - segment[0]) * segment[1] * (above - below);
-}
-
-/* the two friction values of a slot, where they stand in scratch */
-typedef struct slot_values {
-  double *friction[2], *stuck[2];
-} slot_values;
-
-static slot_values values_of(const tendonfmu_finger* f, size_t slot) {
-  const finger_scratch* s = &f->scratch;
-  const size_t joint_row = f->joints * f->tendon_lanes;
-  double *stuck = s->edge_stuck + slot, *other_stuck = s->pulley_stuck + slot;
-  if (slot >= joint_row) {
-    return (slot_values){{s->joint_friction + slot - joint_row, s->load_friction + slot - joint_row},
-                         {stuck, other_stuck}};
-  }
-  return (slot_values){{s->edge + slot, slot >= f->tendon_lanes ? s->pulley + slot : NULL}, {stuck, other_stuck}};
-}
-
-/* by step 2, hysteresis included */
-static int slot_moves(const tendonfmu_finger* f, size_t slot, int at_joint, double speed) {
-  const finger_scratch* s = &f->scratch;
-  return speed > (f->remembered.moving[slot] > 0.5 ? s->stop_below : s->start_above)[at_joint];
-}
-
-static void slide(tendonfmu_finger* f, size_t slot, const slot_values* at) {
-  const derived_numbers* d = &f->derived;
-  const size_t joint_row = f->joints * f->tendon_lanes;
-  const finger_scratch* s = &f->scratch;
-  const double v = s->velocity[slot], share = s->grip[slot], others = s->others[slot], speed = fabs(v);
-  const double threshold = slot < joint_row ? d->settings.tendon_threshold : d->settings.joint_threshold;
-  const int negative = sliding_side(v, threshold, f->remembered.side[slot]);
-  const int own = slot >= joint_row;
-  const size_t law = (own ? slot - joint_row : slot) * LAW_NUMBERS;
-  const double first = own ? magnitude(d->joint_law + law, negative, speed) : edge_magnitude(f, slot, negative, speed);
-  *at->friction[0] = share * first;
-  s->whole_edge[slot] = others * first;
-  if (at->friction[1]) {
-    const double second = magnitude((own ? d->load_law : d->pulley_law) + law, negative, speed);
-    *at->friction[1] = share * second;
-    s->whole_pulley[slot] = others * second;
-  }
-  const int stands = d->settings.bounds_presliding && !slot_moves(f, slot, own, speed);
-  *at->stuck[0] = stands ? s->whole_edge[slot] : 0.0;
-  *at->stuck[1] = stands && at->friction[1] ? s->whole_pulley[slot] : 0.0;
-}
-
-void grip_friction(tendonfmu_finger* f) {
-  const finger_scratch* s = &f->scratch;
-  find_grips(f);
-  for (size_t slot = 0; slot < f->slots; ++slot) {
-    const slot_values at = values_of(f, slot);
-    if (s->slides[slot] != 0.0) {
-      slide(f, slot, &at);
-    } else if (s->grip[slot] != 1.0) {
-      for (int k = 0; k < 2; ++k) {
-        if (at.friction[k]) {
-          *at.friction[k] *= s->grip[slot];
-          *at.stuck[k] *= s->grip[slot];
-        }
-      }
-    }
+    grip_row(f, friction_row(f, r));
   }
 }
 

@@ -66,11 +66,12 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
 
-/* What every other effect will remember; angles, velocities and forces are known. */
+/* What every other effect will remember, but for the rows in the layers of what slides; angles, velocities and forces
+ * are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
 
-/* F of every slot with a friction row, in scratch, from the laws and what the rows make of it. */
-void grip_friction(tendonfmu_finger* finger);
+/* What the friction rows make of F at every slot, into scratch; after what slides has been advanced. */
+void find_grips(tendonfmu_finger* finger);
 
 /* b of every slot with a friction row, in scratch. */
 void grip_jumps(tendonfmu_finger* finger);

@@ -2,6 +2,8 @@
 
 #include "finger_memory.h"
 
+#include "presliding_step.h"
+
 #include <string.h>
 
 /* Every array begins at a multiple of 64 bytes, a cache line. The rows of the state follow each other without gaps,
@@ -56,6 +58,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->edge_angle = take_numbers(c, angles);
   d->edge_angle_row = take(c, n * sizeof(size_t));
   d->edge_record = take(c, n * lanes * sizeof(uint32_t));
+  d->can_hold = take(c, n * lanes / 4);
   d->joint_law = take_numbers(c, joints * LAW_NUMBERS);
   d->load_law = take_numbers(c, joints * LAW_NUMBERS);
   d->cover_stiffness = take_numbers(c, joints);
@@ -84,10 +87,18 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 
+static void lay_out_layer(sliding_layer* layer, size_t slots, cursor* c) {
+  layer->displacement = take_numbers(c, slots);
+  layer->distance = take_numbers(c, slots);
+  layer->offset = take(c, slots * sizeof(uint32_t));
+  layer->taken = take(c, slots / 4);
+}
+
+/* behind all memory of the extensions there is room for a place where nothing slides */
 static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->extensions.row = take(c, f->shape.extension_count * sizeof(extension_row));
   f->derived.axis_cosine = take_numbers(c, f->shape.extension_count ? f->joints * f->joints : 0);
-  f->scratch.extension = take_numbers(c, f->shape.extension_memory);
+  f->scratch.extension = take_numbers(c, f->shape.extension_memory + PRESLIDING_NUMBERS);
   const size_t slots = f->shape.extension_count ? f->slots : 0;
   f->scratch.grip = take_numbers(c, slots);
   f->scratch.bias_grip = take_numbers(c, slots);
@@ -97,6 +108,8 @@ static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->scratch.whole_edge = take_numbers(c, slots);
   f->scratch.whole_pulley = take_numbers(c, slots);
   f->extensions.is_named = take(c, slots);
+  lay_out_layer(&f->extensions.acting, slots, c);
+  lay_out_layer(&f->extensions.overruled, slots, c);
 }
 
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
@@ -112,7 +125,7 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
                    starts * (slots + joints) + drifts * 5 * joints + rests * (5 * joints + 5 * tendons) +
                    sensors * (SENSOR_ROWS * tendons + joints) + f->shape.extension_memory;
-  f->state = take_numbers(c, f->state_count);
+  f->state = take_numbers(c, f->state_count + (f->shape.extension_count ? PRESLIDING_NUMBERS : 0));
   double* run = f->state;
   s->scalar = part(&run, STATE_SCALARS);
   double** const joint_rows[] = {

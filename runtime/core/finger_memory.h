@@ -68,12 +68,24 @@ typedef struct extension_row {
   size_t offset;         /* of its memory among the effect_memory; not of signals */
   double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
   double* next_slopes;
+  int in_layer; /* 1: of friction, the kernels advance what it remembers */
 } extension_row;
+
+/* Slots that slide at all times, at most one row's place at each, so that the kernels take four at a time. */
+typedef struct sliding_layer {
+  double *displacement, *distance; /* [n × M + N] as in presliding_step.h; 1 where nothing slides */
+  uint32_t* offset; /* [n × M + N] where the numbers of the place begin in the extensions' memory; behind all of them
+                       where nothing slides */
+  unsigned char* taken; /* [(n × M + N) / 4] 1: something slides among the four */
+} sliding_layer;
 
 /* The rows by what they act on, each part in the description's order: signals, friction, torques. */
 typedef struct extension_rows {
   extension_row* row;
   size_t signals, friction, torques; /* how many of each */
+  size_t sliding, yielding;          /* places in the layers that follow */
+  sliding_layer acting, overruled;   /* the latter: a row everywhere, where another one names the place */
+  int only_slides;                   /* every friction row stands in the layers: what acts is their share alone */
   unsigned char* is_named;           /* [n × M + N] 1: a row of an effect that yields names the place */
 } extension_rows;
 
@@ -91,9 +103,10 @@ typedef struct derived_numbers {
   double* edge_segment;   /* [records × 2] angle at which the segment begins, 1/length; 0 outside the grid */
   double* edge_angle;     /* per joint: [most points × M], ∞ where an edge has fewer */
   size_t* edge_angle_row; /* [n] where the angles of a joint begin, in numbers */
-  uint32_t* edge_record;  /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
-  double* joint_law;      /* [N × LAW_NUMBERS] T_jv0 */
-  double* load_law;       /* [N × LAW_NUMBERS] T_jvf */
+  unsigned char* can_hold; /* [n × M / 4] 0: |F| of the four slots is at no joint, their moment arms are 0 */
+  uint32_t* edge_record;   /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
+  double* joint_law;       /* [N × LAW_NUMBERS] T_jv0 */
+  double* load_law;        /* [N × LAW_NUMBERS] T_jvf */
   double *cover_stiffness, *cover_rest;                /* [N] */
   double *contact_threshold, *contact_per_force;       /* [N] */
   double* initial_torque;                              /* [N] */

@@ -2,16 +2,16 @@
 
 #include "effect_facts.h"
 
-#include <float.h>
-#include <math.h>
-
-#include "friction_law.h"
-
-/* F = ζ·|F(v)|, dζ = (s − ζ)·|dx|/D with s = sgn(dx), integrated exactly over each sample (Dahl 1968 with exponent 1).
- * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
+#include "presliding_step.h"
 
 /* per velocity of the place */
-enum { SHARE, BY_DISPLACEMENT, BY_MOTION, KEPT, MEMORY_ROWS }; /* motion: velocity, or travel by a position filter */
+enum {
+  SHARE = PRESLIDING_SHARE,
+  BY_DISPLACEMENT = PRESLIDING_BY_DISPLACEMENT,
+  BY_MOTION = PRESLIDING_BY_MOTION,
+  KEPT = PRESLIDING_KEPT,
+  MEMORY_ROWS = PRESLIDING_NUMBERS
+};
 
 static size_t member_count(effect_place place, size_t joints, size_t tendons) {
   return place.joint != EFFECT_NOWHERE ? 1 : is_everywhere(place) ? joints * (tendons + 1) : joints;
@@ -49,42 +49,34 @@ static double travel_of(const effect_sample* sample, int at_joint, size_t at) {
   return (at_joint ? sample->velocity[at] : sample->tendon_velocity[at]) * sample->step;
 }
 
-/* D of a velocity of a tendon (0) or joint (1) */
 static double distance_of(effect_place place, double displacement, const effect_sample* sample, int at_joint) {
-  if (!is_everywhere(place)) {
-    return displacement;
-  }
-  const double distance = displacement * (at_joint ? sample->joint_threshold : sample->tendon_threshold);
-  return distance > DBL_MIN ? distance : DBL_MIN;
-}
-
-/* finite: no slope may be a reason to refuse a sample */
-static double bounded(double slope) {
-  return slope > 1e290 ? 1e290 : slope < -1e290 ? -1e290 : slope;
+  return presliding_distance(place, displacement, at_joint ? sample->joint_threshold : sample->tendon_threshold);
 }
 
 static void advance_member(double displacement, double distance, double travel, const effect_sample* sample,
                            const double* before, double* after) {
-  const double side = travel < 0.0 ? -1.0 : 1.0;
-  const double ratio = fabs(travel) / distance, kept = law_exponential(ratio), left = side - before[SHARE];
-  after[KEPT] = travel == 0.0 ? 1.0 : kept;
-  after[SHARE] = travel == 0.0 ? before[SHARE] : side - left * kept;
-  /* nothing is left of where it was: slopes of 0, however short the displacement */
-  const int lasts = ratio < 700.0;
-  after[BY_DISPLACEMENT] =
-      lasts ? bounded(kept * (before[BY_DISPLACEMENT] - bounded(left * ratio / displacement))) : 0.0;
-  const double by_travel = left * kept * side, by_motion = sample->travel ? by_travel : by_travel * sample->step;
-  after[BY_MOTION] = lasts && !sample->first ? bounded(by_motion / distance) : 0.0;
+  const quad zero = quad_set(0.0), later = quad_set(sample->first ? 0.0 : 1.0);
+  const presliding_places place = {.displacement = quad_set(displacement),
+                                   .distance = quad_set(distance),
+                                   .travel = quad_set(travel),
+                                   .by_motion = quad_set(sample->travel ? 1.0 : sample->step),
+                                   .has_slopes = quad_greater(later, zero)};
+  quad numbers[MEMORY_ROWS];
+  presliding_step(&place, quad_set(before[SHARE]), quad_set(before[BY_DISPLACEMENT]), numbers);
+  for (int k = 0; k < MEMORY_ROWS; ++k) {
+    after[k] = numbers[k].lane[0];
+  }
 }
 
+/* the kernels do the same for all rows at once */
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
                     double* after) {
   const size_t count = member_count(place, sample->joints, sample->tendons);
-  const double distance[2] = {distance_of(place, values[0], sample, 0), distance_of(place, values[0], sample, 1)};
   for (size_t k = 0; k < count; ++k, before += MEMORY_ROWS, after += MEMORY_ROWS) {
     const member_of_place member = find_member(place, sample, k);
     const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
-    advance_member(values[0], distance[member.at_joint], travel, sample, before, after);
+    const double distance = distance_of(place, values[0], sample, member.at_joint);
+    advance_member(values[0], distance, travel, sample, before, after);
   }
 }
 
@@ -99,8 +91,7 @@ static void advance_slope(effect_place place, const double* values, const effect
     const double slope = member.at_joint ? direction->motion[member.at] : direction->tendon_motion[member.at];
     double after[MEMORY_ROWS];
     advance_member(values[0], distance, travel, sample, before + row, after);
-    slope_after[row + SHARE] =
-        law_exponential(fabs(travel) / distance) * slope_before[row + SHARE] + after[BY_MOTION] * slope;
+    slope_after[row + SHARE] = after[KEPT] * slope_before[row + SHARE] + after[BY_MOTION] * slope;
     for (size_t k = BY_DISPLACEMENT; k < MEMORY_ROWS; ++k) {
       slope_after[row + k] = 0.0; /* only the share is read */
     }
@@ -119,6 +110,6 @@ static effect_grip grip(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_presliding = {
-    PRESLIDING_FACTS,   .kind = EFFECT_FRICTION,        .yields = 1,  .state_count = state_count,
+    PRESLIDING_FACTS,   .kind = EFFECT_FRICTION,        .yields = 1,  .slides = 1, .state_count = state_count,
     .advance = advance, .advance_slope = advance_slope, .grip = grip,
 };

@@ -63,7 +63,8 @@ HOT_INLINE double angle_before(const double* angle, size_t j) {
 HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad velocity, quad_mask moving, double angle) {
   slot_view* view = f->scratch.view + slot / 4;
   const int moves = quad_mask_bits(moving), known = (int)view->key[0];
-  const int resting = known < 0 ? negative_bits(quad_load(f->remembered.side + slot)) : known;
+  const int held = known < 0 || f->extensions.friction; /* what slides may be on another side than it remembers */
+  const int resting = held ? negative_bits(quad_load(f->remembered.side + slot)) : known;
   const int negative = (negative_bits(velocity) & moves) | (resting & ~moves);
   const quad q = quad_set(angle);
   const quad_mask inside = quad_both(quad_at_least(q, quad_load(view->low)), quad_greater(quad_load(view->high), q));
@@ -73,56 +74,131 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
   return view;
 }
 
+/* lanes that slide at all times */
+HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
+  return quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
+}
+
+/* lanes whose law is that of the sign of v; what slides at all times knows no hysteresis */
+HOT_INLINE quad_mask takes_side(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad speed,
+                                double threshold) {
+  if (!f->extensions.friction) {
+    return moving;
+  }
+  const quad_mask fast = quad_greater(speed, quad_set(threshold)), slides = slides_at(f, slot);
+  return quad_either(quad_both(slides, fast), quad_only_first(moving, slides));
+}
+
 /* F(v) with the sign of v where |v| > v_min, 0 where the effect sticks (fig. 2b) */
 HOT_INLINE quad when_moving(quad_mask moving, quad magnitude, quad velocity) {
   return quad_keep(moving, quad_with_sign(magnitude, velocity));
 }
 
-/* |F| of the lanes that stick, which is what stiction can hold */
-HOT_INLINE void keep_stuck(double* to, quad_mask moving, quad magnitude) {
-  quad_store(to, quad_drop(moving, magnitude));
+/* F of four slots from |F| of the law: as fig. 5 has it, or ζ·|F| of what slides at all times, and what the friction
+ * rows make of it */
+HOT_INLINE quad acting_friction(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad magnitude,
+                                quad velocity) {
+  const quad by_motion = when_moving(moving, magnitude, velocity);
+  if (!f->extensions.friction) {
+    return by_motion;
+  }
+  return quad_mul(quad_load(f->scratch.grip + slot), quad_select(slides_at(f, slot), magnitude, by_motion));
 }
 
-/* F_B and F_A of every tendon, T_jv0 and T_jvf of every joint, at the velocities in scratch; returns whether any slot
- * comes to rest or begins to move */
-HOT_INLINE int friction_values(tendonfmu_finger* f) {
+/* |F| of what slides as it would be at ζ = 1 */
+HOT_INLINE quad whole_magnitude(const tendonfmu_finger* f, size_t slot, quad magnitude) {
+  return quad_mul(quad_load(f->scratch.others + slot), magnitude);
+}
+
+/* |F| of the lanes that stick, which is what stiction can hold */
+HOT_INLINE void keep_stuck(const tendonfmu_finger* f, double* to, size_t slot, quad_mask moving, quad magnitude) {
+  quad stuck = quad_drop(moving, magnitude);
+  if (f->extensions.friction) {
+    const quad_mask slides = slides_at(f, slot);
+    const quad whole =
+        f->derived.settings.bounds_presliding ? quad_drop(moving, whole_magnitude(f, slot, magnitude)) : quad_set(0.0);
+    stuck = quad_select(slides, whole, quad_mul(quad_load(f->scratch.grip + slot), stuck));
+  }
+  quad_store(to + slot, stuck);
+}
+
+/* what friction_bound.h and unlearned_friction.h read of one effect at four slots */
+HOT_INLINE void keep_magnitude(const tendonfmu_finger* f, double* stuck, double* whole, size_t slot, quad_mask moving,
+                               quad magnitude) {
+  if (f->derived.settings.bounds_friction) {
+    keep_stuck(f, stuck, slot, moving, magnitude);
+  }
+  if (f->extensions.friction && f->derived.settings.has_start_share) {
+    quad_store(whole + slot, whole_magnitude(f, slot, magnitude));
+  }
+}
+
+/* whether F of four slots is 0 without a look at the laws: nothing moves, now or before, or slides; where
+ * friction_bound.h wants |F| of what sticks, only where it can hold no joint */
+HOT_INLINE int nothing_acts(const tendonfmu_finger* f, size_t slot, quad_mask moving) {
+  int acts = quad_mask_bits(quad_either(moving, moved_before(f, slot)));
+  if (f->derived.settings.bounds_friction) {
+    acts |= f->derived.can_hold[slot / 4];
+  }
+  if (f->extensions.friction) {
+    const quad share = quad_abs(quad_load(f->scratch.grip + slot));
+    acts |= quad_mask_bits(quad_both(slides_at(f, slot), quad_greater(share, quad_set(0.0))));
+  }
+  return !acts;
+}
+
+/* F_B and F_A of four tendons at joint j, from slot `at` on; returns whether any of them comes to rest or begins to
+ * move */
+HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
   const finger_scratch* s = &f->scratch;
-  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  const int bounds = f->derived.settings.bounds_friction;
+  const double before = angle_before(s->angle, j);
+  const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
+  const quad_mask moving = moves_at(f, at, 0, speed);
+  if (nothing_acts(f, at, moving)) {
+    quad_store(s->edge + at, quad_set(0.0));
+    quad_store(s->pulley + at, quad_set(0.0));
+    return 0;
+  }
+  const quad_mask decided = takes_side(f, at, moving, speed, f->derived.settings.tendon_threshold);
+  const slot_view* view = view_at(f, at, v, decided, before);
+  const quad edge = edges_magnitude(view, quad_set(before), speed);
+  quad_store(s->edge + at, acting_friction(f, at, moving, edge, v));
+  keep_magnitude(f, s->edge_stuck, s->whole_edge, at, moving, edge);
+  if (j > 0) { /* before the first joint there is no pulley */
+    const quad pulley = laws_magnitude(view->other, speed);
+    quad_store(s->pulley + at, acting_friction(f, at, moving, pulley, v));
+    keep_magnitude(f, s->pulley_stuck, s->whole_pulley, at, moving, pulley);
+  }
+  return transition_bits(f, at, moving);
+}
+
+/* T_jv0 and T_jvf of four joints; the same */
+HOT_INLINE int friction_of_joints(tendonfmu_finger* f, size_t j) {
+  const finger_scratch* s = &f->scratch;
+  const size_t at = f->joints * f->tendon_lanes + j;
+  const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
+  const quad_mask moving = moves_at(f, at, 1, speed);
+  const quad_mask decided = takes_side(f, at, moving, speed, f->derived.settings.joint_threshold);
+  const slot_view* view = view_at(f, at, v, decided, 0.0);
+  const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
+  quad_store(s->joint_friction + j, acting_friction(f, at, moving, own, v));
+  quad_store(s->load_friction + j, acting_friction(f, at, moving, load, v));
+  keep_magnitude(f, s->edge_stuck, s->whole_edge, at, moving, own);
+  keep_magnitude(f, s->pulley_stuck, s->whole_pulley, at, moving, load);
+  return transition_bits(f, at, moving);
+}
+
+/* F of every slot at the velocities in scratch; returns whether any comes to rest or begins to move */
+HOT_INLINE int friction_values(tendonfmu_finger* f) {
+  const size_t lanes = f->tendon_lanes;
   int transitions = 0;
   for (size_t j = 0; j < f->joints; ++j) {
-    const double before = angle_before(s->angle, j);
     for (size_t at = j * lanes; at < (j + 1) * lanes; at += 4) {
-      const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
-      const quad_mask moving = moves_at(f, at, 0, speed);
-      const slot_view* view = view_at(f, at, v, moving, before);
-      const quad edge = edges_magnitude(view, quad_set(before), speed);
-      quad_store(s->edge + at, when_moving(moving, edge, v));
-      if (bounds) {
-        keep_stuck(s->edge_stuck + at, moving, edge);
-      }
-      if (j > 0) { /* before the first joint there is no pulley */
-        const quad pulley = laws_magnitude(view->other, speed);
-        quad_store(s->pulley + at, when_moving(moving, pulley, v));
-        if (bounds) {
-          keep_stuck(s->pulley_stuck + at, moving, pulley);
-        }
-      }
-      transitions |= transition_bits(f, at, moving);
+      transitions |= friction_of_tendons(f, j, at);
     }
   }
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    const quad v = quad_load(s->velocity + joint_row + j), speed = quad_abs(v);
-    const quad_mask moving = moves_at(f, joint_row + j, 1, speed);
-    const slot_view* view = view_at(f, joint_row + j, v, moving, 0.0);
-    const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
-    quad_store(s->joint_friction + j, when_moving(moving, own, v));
-    quad_store(s->load_friction + j, when_moving(moving, load, v));
-    if (bounds) {
-      keep_stuck(s->edge_stuck + joint_row + j, moving, own);
-      keep_stuck(s->pulley_stuck + joint_row + j, moving, load);
-    }
-    transitions |= transition_bits(f, joint_row + j, moving);
+    transitions |= friction_of_joints(f, j);
   }
   return transitions != 0;
 }
@@ -132,7 +208,7 @@ HOT_INLINE int friction_values(tendonfmu_finger* f) {
 HOT_INLINE quad without_slack(quad force, quad_mask bidirectional, quad_mask* slack) {
   const quad_mask negative = quad_only_first(quad_greater(quad_set(0.0), force), bidirectional);
   *slack = quad_either(*slack, negative);
-  return quad_drop(negative, force);
+  return quad_select(bidirectional, force, quad_max(quad_set(0.0), force));
 }
 
 /* the force as it multiplies an F or a b */
@@ -140,34 +216,32 @@ HOT_INLINE quad acting_force(quad force, quad_mask bidirectional) {
   return quad_select(bidirectional, quad_abs(force), force);
 }
 
-/* f_A and f_B along every tendon, as a recursion, and what they make at each joint: the sums over the tendons in eqs.
- * (8) and (10), accumulated into tendon_friction [n] and load [n] */
-HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
+/* f_A and f_B along four tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
+ * in eqs. (8) and (10), accumulated into tendon_friction [n] and load [n] */
+HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, quad* tendon_friction, quad* load) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, last = (f->joints - 1) * lanes;
-  for (size_t i = 0; i < lanes; i += 4) {
-    const quad zero = quad_set(0.0);
-    const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
-    quad_mask slack = quad_greater(zero, zero);
-    quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
-    for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
-      const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
-      const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
-      force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
-      const quad force_between = acting_force(force, bidirectional); /* f_Bj */
-      lost = quad_add(lost, edge_loss);
-      if (at < last) {
-        const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
-        force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
-        lost = quad_add(lost, pulley_loss);
-      }
-      tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
-      load[j] = quad_add(load[j], force_between);
-      quad_store(s->force_at + at, force_at);
-      quad_store(s->force_between + at, force_between);
+  const quad zero = quad_set(0.0);
+  const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
+  quad_mask slack = quad_greater(zero, zero);
+  quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
+  for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
+    const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
+    const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
+    force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
+    const quad force_between = acting_force(force, bidirectional); /* f_Bj */
+    lost = quad_add(lost, edge_loss);
+    if (at < last) {
+      const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
+      force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
+      lost = quad_add(lost, pulley_loss);
     }
-    quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
+    tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
+    load[j] = quad_add(load[j], force_between);
+    quad_store(s->force_at + at, force_at);
+    quad_store(s->force_between + at, force_between);
   }
+  quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
 }
 
 /* T_j of eq. (10), with the joint's own friction and cover of eq. (8) */
@@ -175,20 +249,19 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const derived_numbers* d = &f->derived;
   quad tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];
-  for (size_t j = 0; j < f->joints; ++j) {
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
     tendon_friction[j] = load[j] = quad_set(0.0);
   }
-  propagate_forces(f, tendon_friction, load);
-  for (size_t j = 0; j < f->joints; ++j) {
-    s->friction[j] = quad_sum(tendon_friction[j]);
-    s->load[j] = quad_sum(load[j]);
+  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+    propagate_four(f, i, tendon_friction, load);
   }
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad bend = quad_sub(quad_load(s->angle + j), quad_load(d->cover_rest + j));
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);
-    const quad load_friction = quad_mul(quad_load(s->load_friction + j), quad_load(s->load + j));
+    const quad sum = quad_sums(load + j), load_friction = quad_mul(quad_load(s->load_friction + j), sum);
     const quad joint_friction = quad_add(quad_load(s->joint_friction + j), load_friction);
-    quad_store(s->friction + j, quad_add(quad_add(quad_load(s->friction + j), joint_friction), cover));
+    quad_store(s->load + j, sum);
+    quad_store(s->friction + j, quad_add(quad_add(quad_sums(tendon_friction + j), joint_friction), cover));
   }
 }
 

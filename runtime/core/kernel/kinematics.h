@@ -4,13 +4,27 @@
 
 #include "finger_memory.h"
 
-/* Σ over the tendons of row[i]·x[i] */
-HOT_INLINE double tendon_sum(const double* row, const double* x, size_t lanes) {
+/* Σ over the tendons of row[i]·x[i], as four lanes that are still to be summed */
+HOT_INLINE quad tendon_lane_sums(const double* row, const double* x, size_t lanes) {
   quad sum = quad_mul(quad_load(row), quad_load(x));
   for (size_t i = 4; i < lanes; i += 4) {
     sum = quad_add(sum, quad_mul(quad_load(row + i), quad_load(x + i)));
   }
-  return quad_sum(sum);
+  return sum;
+}
+
+HOT_INLINE double tendon_sum(const double* row, const double* x, size_t lanes) {
+  return quad_sum(tendon_lane_sums(row, x, lanes));
+}
+
+/* the same of four joints from j on, one a lane: matrix [n × M] times x [M] */
+HOT_INLINE quad tendon_sums(const tendonfmu_finger* f, const double* matrix, const double* x, size_t j) {
+  quad sum[4];
+  for (size_t k = 0; k < 4; ++k) {
+    const double* row = matrix + (j + k) * f->tendon_lanes;
+    sum[k] = j + k < f->joints ? tendon_lane_sums(row, x, f->tendon_lanes) : quad_set(0.0);
+  }
+  return quad_sums(sum);
 }
 
 /* q = R⁺·x1 with x1 = x0 − f0/k, into angle [n]; position is overwritten by x1 */
@@ -19,8 +33,8 @@ HOT_INLINE void angles_from_tendons(const tendonfmu_finger* f, const double* for
     const quad stretch = quad_mul(quad_load(force + i), quad_load(f->derived.inverse_stiffness + i));
     quad_store(position + i, quad_sub(quad_load(position + i), stretch));
   }
-  for (size_t j = 0; j < f->joints; ++j) {
-    angle[j] = tendon_sum(inverse_in_use(f) + j * f->tendon_lanes, position, f->tendon_lanes);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(angle + j, tendon_sums(f, inverse_in_use(f), position, j));
   }
 }
 

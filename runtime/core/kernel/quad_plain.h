@@ -59,6 +59,19 @@ HOT_INLINE void quad_store(double* to, quad a) {
   QUAD_EACH(to[i] = a.lane[i]);
 }
 
+/* lane i of first and second: from[i][0], from[i][1], wherever these stand */
+HOT_INLINE void quad_load_pairs(const double* const from[4], quad* first, quad* second) {
+  QUAD_EACH(first->lane[i] = from[i][0]);
+  QUAD_EACH(second->lane[i] = from[i][1]);
+}
+
+/* to[i][k] = lane i of row[k], k = 0 to 3, wherever these stand */
+HOT_INLINE void quad_store_lanes(double* const to[4], const quad row[4]) {
+  for (int k = 0; k < 4; ++k) {
+    QUAD_EACH(to[i][k] = row[k].lane[i]);
+  }
+}
+
 HOT_INLINE quad quad_set(double x) {
   quad r;
   QUAD_EACH(r.lane[i] = x);
@@ -150,9 +163,15 @@ HOT_INLINE quad quad_drop(quad_mask m, quad a) {
   return a;
 }
 
-/* the smaller one; neither is NaN */
+/* the smaller one; b where one is NaN */
 HOT_INLINE quad quad_min(quad a, quad b) {
   QUAD_EACH(a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]);
+  return a;
+}
+
+/* the larger one; b where one is NaN */
+HOT_INLINE quad quad_max(quad a, quad b) {
+  QUAD_EACH(a.lane[i] = a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i]);
   return a;
 }
 
@@ -163,6 +182,13 @@ HOT_INLINE quad quad_sqrt(quad a) {
 
 HOT_INLINE double quad_sum(quad a) {
   return (a.lane[0] + a.lane[2]) + (a.lane[1] + a.lane[3]);
+}
+
+/* lane i: quad_sum(row[i]) */
+HOT_INLINE quad quad_sums(const quad row[4]) {
+  quad r;
+  QUAD_EACH(r.lane[i] = quad_sum(row[i]));
+  return r;
 }
 
 /* a · 2^k, where the low bits of the double `shifted` hold the integer k (see exponential.h) */

@@ -11,6 +11,7 @@
 #include "kinematics.h"
 #include "position_filter.h"
 #include "sensor_fault.h"
+#include "sliding_places.h"
 #include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
@@ -76,8 +77,8 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step)
 
 /* τ = Rᵀ f0 (eq. 3), with the measured forces */
 HOT_INLINE void measured_torques(tendonfmu_finger* f) {
-  for (size_t j = 0; j < f->joints; ++j) {
-    f->scratch.torque[j] = tendon_sum(f->derived.moment_arm + j * f->tendon_lanes, f->scratch.force, f->tendon_lanes);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(f->scratch.torque + j, tendon_sums(f, f->derived.moment_arm, f->scratch.force, j));
   }
 }
 
@@ -93,21 +94,42 @@ HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   return quad_sum(sum) / (double)f->tendons;
 }
 
+/* 0 in all lanes unless anything that the extensions are about to remember is infinite or NaN */
+HOT_INLINE quad extension_probe(const tendonfmu_finger* f) {
+  const size_t count = f->shape.extension_memory, whole = count / 8 * 8;
+  const quad zero = quad_set(0.0);
+  quad even = zero, odd = zero;
+  double rest = 0.0;
+  for (size_t k = 0; k < whole; k += 8) {
+    even = quad_add(even, quad_mul(zero, quad_load(f->scratch.extension + k)));
+    odd = quad_add(odd, quad_mul(zero, quad_load(f->scratch.extension + k + 4)));
+  }
+  for (size_t k = whole; k < count; ++k) {
+    rest += 0.0 * f->scratch.extension[k];
+  }
+  return quad_add(quad_add(even, odd), quad_set(rest));
+}
+
 /* 0 when anything that is about to be remembered is not finite, or its square would not be */
 HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
-  double probe = 0.0; /* stays 0 unless something is infinite or NaN */
-  for (size_t j = 0; j < f->joints; ++j) {
-    const double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]) +
-                       s->stuck_friction[j] + s->uncertainty[j] + (start_is_open(f) ? s->turned[j] : 0.0);
-    probe += 0.0 * (1e160 * sum); /* infinite above 1.8e148 */
-    probe += 0.0 * s->angle[j] + 0.0 * joint_velocity[j];
+  const quad zero = quad_set(0.0);
+  quad probe = extension_probe(f);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    const quad torques = quad_add(quad_abs(quad_load(s->torque + j)), quad_abs(quad_load(s->friction + j)));
+    const quad biases = quad_add(quad_abs(quad_load(s->bias_step + j)), quad_abs(quad_load(f->remembered.bias + j)));
+    quad sum =
+        quad_add(quad_add(torques, biases), quad_add(quad_load(s->stuck_friction + j), quad_load(s->uncertainty + j)));
+    if (start_is_open(f)) {
+      sum = quad_add(sum, quad_load(s->turned + j));
+    }
+    const quad motion =
+        quad_add(quad_mul(zero, quad_load(s->angle + j)), quad_mul(zero, quad_load(joint_velocity + j)));
+    probe =
+        quad_add(probe, quad_add(quad_mul(zero, quad_mul(quad_set(1e160), sum)), motion)); /* infinite above 1.8e148 */
   }
-  for (size_t k = 0; k < f->shape.extension_memory; ++k) {
-    probe += 0.0 * s->extension[k];
-  }
-  return probe == 0.0 && (!filters_position(f) || filter_is_finite(f)) &&
+  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == 15 && (!filters_position(f) || filter_is_finite(f)) &&
          (!f->derived.settings.watches_sensors || sensors_are_finite(f));
 }
 
@@ -282,13 +304,14 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (f->shape.extension_count) {
     follow_signals(f, step, velocity_gain);
     advance_extensions(f, time, step);
+    advance_sliding_places(f, step, first);
     follow_memories(f);
+  }
+  if (f->extensions.friction) {
+    find_grips(f);
   }
   speed_thresholds(f, first);
   const int transitions = friction_values(f);
-  if (f->extensions.friction) {
-    grip_friction(f);
-  }
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);

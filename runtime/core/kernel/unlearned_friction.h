@@ -14,7 +14,7 @@ HOT_INLINE quad turned_share(const tendonfmu_finger* f, size_t slot) {
   if (!f->extensions.friction) {
     return by_moving;
   }
-  const quad_mask slides = quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
+  const quad_mask slides = slides_at(f, slot);
   return quad_select(slides, quad_sub(one, quad_load(f->scratch.kept + slot)), by_moving);
 }
 
@@ -47,7 +47,7 @@ HOT_INLINE quad whole_friction(const tendonfmu_finger* f, const double* friction
   if (!f->extensions.friction) {
     return of_sample;
   }
-  const quad_mask slides = quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
+  const quad_mask slides = slides_at(f, slot);
   return quad_select(slides, quad_load(whole + slot), of_sample);
 }
 
