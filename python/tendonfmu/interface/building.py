@@ -6,14 +6,16 @@ import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import check_output
-from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_files, related_members
+from tendonfmu.fmu import build_fmu
 from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
-from tendonfmu.recordings import Recording, RecordingSource, belongs, read_recording
-from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
+
+if TYPE_CHECKING:
+    from tendonfmu.recordings import Recording, RecordingSource
 
 
 @with_checked_options
@@ -66,26 +68,33 @@ def build(
     sets = [Path(each) for each in (ssv if isinstance(ssv, Sequence) and not isinstance(ssv, str) else [ssv])]
     others = [*sets, *([Path(reference)] if isinstance(reference, str | os.PathLike) else [])]
     if isinstance(finger, str | os.PathLike):
+        from tendonfmu.simulate import is_rig
+
         file = finger_file(finger)
-        rig = is_rig(file)
-        check_output(target, *(read_rig(file).files if rig else [file]), *others)
-        if rig and fmi != 2:
-            raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
-        if rig:
-            if reference is not None or sets:
-                raise InputError(f"{file}: a rig; expected a finger description with a reference or parameter sets")
-            _check_suffix(target)
-            return build_plant_fmu(file, target, binaries=folder)
-    else:
-        check_output(target, *others)
+        if is_rig(file):
+            return _build_plant(file, target, folder, others, fmi, alone=reference is None and not sets)
+        others.insert(0, file)
+    check_output(target, *others)
     _check_suffix(target)
     model = read_finger(finger)
-    recording = None if reference is None else read_recording(reference)
-    related = [] if recording is None else reference_files(model, recording, arrays=fmi == 3)
-    related += parameter_sets(sets, model)
-    for sentence in [] if recording is None else _doubts(model, recording):
+    extra, doubts = _related(model, reference, sets, fmi) if reference is not None or sets else ({}, [])
+    for sentence in doubts:
         warnings.warn(sentence, InputWarning, stacklevel=3)  # at the call of tendonfmu.build
-    return build_fmu(model, target, binaries=folder, extra=related_members(related), fmi=fmi)
+    return build_fmu(model, target, binaries=folder, extra=extra, fmi=fmi)
+
+
+def _build_plant(
+    rig: Path, target: Path, binaries: Path | None, others: Sequence[Path], fmi: int, *, alone: bool
+) -> Path:
+    from tendonfmu.simulate import build_plant_fmu, read_rig
+
+    check_output(target, *read_rig(rig).files, *others)
+    if fmi != 2:
+        raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
+    if not alone:
+        raise InputError(f"{rig}: a rig; expected a finger description with a reference or parameter sets")
+    _check_suffix(target)
+    return build_plant_fmu(rig, target, binaries=binaries)
 
 
 def _check_suffix(output: Path) -> None:
@@ -93,8 +102,27 @@ def _check_suffix(output: Path) -> None:
         raise InputError(f"{output}: expected a name that ends in .fmu, as importing tools want it")
 
 
+def _related(
+    finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int
+) -> tuple[dict[str, bytes], list[str]]:
+    """Return the files of the archive that belong to a recording and to parameter sets, and doubts about the recording.
+
+    What reads recordings is imported here: most FMUs are packed without one.
+    """
+    from tendonfmu.fmu import parameter_sets, reference_files, related_members
+    from tendonfmu.recordings import read_recording
+
+    recording = None if reference is None else read_recording(reference)
+    related = [] if recording is None else reference_files(finger, recording, arrays=fmi == 3)
+    related += parameter_sets(sets, finger)
+    return related_members(related), [] if recording is None else _doubts(finger, recording)
+
+
 def _doubts(finger: Finger, recording: Recording) -> list[str]:
     """Return what speaks against a recording as a reference, one line each."""
+    from tendonfmu.fmu import bridged_rows
+    from tendonfmu.recordings import belongs
+
     found = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
     rows, invented = bridged_rows(recording)
     if invented:
