@@ -96,7 +96,9 @@ typedef struct fmi_version {
 extern const fmi_version this_fmi;
 
 const char* call_name(fmu_function function);
-int call_is_allowed(fmu_function function, fmu_phase phase);
+static inline int call_is_allowed(fmu_function function, fmu_phase phase) {
+  return (this_fmi.calls[function].allowed >> phase) & 1;
+}
 const char* phase_name(fmu_phase phase);
 
 #endif

@@ -41,16 +41,9 @@ void component_reset(component* c) {
   c->start_time = c->stop_time = c->end_of_step = 0.0;
 }
 
-int component_may_call(component* c, fmu_function function) {
-  if (!c) {
-    return 0;
-  }
-  const fmu_phase now = c->failed ? PHASE_ERROR : c->phase;
-  if (call_is_allowed(function, now)) {
-    return 1;
-  }
+int component_refuse_call(component* c, fmu_function function) {
   log_text text = log_start(call_name(function), "not allowed in state ");
-  log_append(&text, phase_name(now));
+  log_append(&text, phase_name(c->failed ? PHASE_ERROR : c->phase));
   const char* separator = ", expected ";
   for (int phase = 0; phase <= PHASE_ERROR; ++phase) {
     if (call_is_allowed(function, (fmu_phase)phase)) {

@@ -27,8 +27,13 @@ void component_destroy(component* c);
 /* Back to what component_create() gave; logging stays as it is set. */
 void component_reset(component* c);
 
+/* Logs that the function may not be called now, and fails. Returns 0. */
+int component_refuse_call(component* c, fmu_function function);
+
 /* 1 when the function may be called now; otherwise logs and fails. c may be NULL: 0. */
-int component_may_call(component* c, fmu_function function);
+static inline int component_may_call(component* c, fmu_function function) {
+  return c && (call_is_allowed(function, c->failed ? PHASE_ERROR : c->phase) || component_refuse_call(c, function));
+}
 
 /* Logs the text as an error, enters the state "error" and returns FMU_ERROR. */
 fmu_status component_fail(component* c, const log_text* text);

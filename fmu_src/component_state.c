@@ -99,7 +99,7 @@ static int values_are_sound(const component* c, const unsigned char* from) {
   size_t at = LIFE_COUNT;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     const variable_group* group = &variable_groups[g];
-    const size_t count = group->causality == CAUSALITY_INPUT ? variables_group_count(&c->values, group) : 0;
+    const size_t count = group->causality == CAUSALITY_INPUT ? c->values.count[g] : 0;
     for (size_t i = 0; i < count; ++i) {
       const variable input = {group, (variable_group_id)g, i, 0};
       if (!variables_accept(c->model, &input, get_number(from, at++))) {

@@ -1,37 +1,76 @@
 #include "values.h"
 
+#include <string.h>
+
 #include "variable_access.h"
+
+/* A run: variables of a call whose numbers follow one another, found by the first of their value references. What an
+ * importer reads and writes in each step are a few runs of inputs and outputs, which are copied as blocks. */
+typedef struct value_run {
+  variable first;
+  size_t references; /* how many of the call */
+  size_t elements;   /* their numbers */
+} value_run;
+
+/* 0 with the run that begins with references[0] [count]; otherwise says what is wrong with that one and fails */
+static int find_run(component* c, fmu_function function, variable_type type, const unsigned references[], size_t count,
+                    value_run* run) {
+  if (find_of_type(c, function, type, references[0], &run->first)) {
+    return -1;
+  }
+  run->references = variables_run(&c->values, &run->first, references, count);
+  run->elements = run->first.whole ? c->values.count[run->first.id] : run->references;
+  return 0;
+}
 
 /* --- elements of arrays of the importer --------------------------------------------------------------------------- */
 
-static double element(const void* values, value_format format, size_t at) {
-  switch (format) {
-    case VALUES_INT: return ((const int*)values)[at];
-    case VALUES_BOOL: return ((const _Bool*)values)[at];
-    default: return ((const double*)values)[at];
-  }
-}
-
-static void put_element(void* values, value_format format, size_t at, double value) {
-  switch (format) {
-    case VALUES_INT: ((int*)values)[at] = (int)value; break;
-    case VALUES_BOOL: ((_Bool*)values)[at] = value != 0.0; break;
-    default: ((double*)values)[at] = value; break;
-  }
-}
-
-/* the same as a value of a variable: every number but 0 is true */
+/* a value as one of a variable: for a Boolean every number but 0 is true */
 static double given_value(const void* values, value_format format, size_t at, variable_type type) {
-  const double value = element(values, format, at);
+  double value;
+  switch (format) {
+    case VALUES_INT: value = ((const int*)values)[at]; break;
+    case VALUES_BOOL: value = ((const _Bool*)values)[at]; break;
+    default: value = ((const double*)values)[at]; break;
+  }
   return type == VARIABLE_BOOLEAN ? value != 0.0 : value;
+}
+
+static void put_numbers(void* values, value_format format, size_t at, const double* numbers, size_t count) {
+  switch (format) {
+    case VALUES_INT:
+      for (size_t i = 0; i < count; ++i) {
+        ((int*)values)[at + i] = (int)numbers[i];
+      }
+      break;
+    case VALUES_BOOL:
+      for (size_t i = 0; i < count; ++i) {
+        ((_Bool*)values)[at + i] = numbers[i] != 0.0;
+      }
+      break;
+    default: memcpy((double*)values + at, numbers, count * sizeof *numbers); break;
+  }
+}
+
+/* flags are read as Booleans: never into doubles */
+static void put_flags(void* values, value_format format, size_t at, const unsigned char* flags, size_t count) {
+  if (format == VALUES_INT) {
+    for (size_t i = 0; i < count; ++i) {
+      ((int*)values)[at + i] = flags[i];
+    }
+    return;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    ((_Bool*)values)[at + i] = flags[i] != 0;
+  }
 }
 
 /* --- reading ------------------------------------------------------------------------------------------------------ */
 
 /* In initialisation mode outputs follow the inputs; before it there are none. */
 static int update_outputs(component* c, fmu_function function, const variable* found) {
-  if (variable_causality_of(found) != CAUSALITY_OUTPUT) {
-    return 0;
+  if (c->phase > PHASE_INITIALISATION || variable_causality_of(found) != CAUSALITY_OUTPUT) {
+    return 0; /* a step brings the outputs with it */
   }
   if (!c->failed && c->phase == PHASE_INSTANTIATED) {
     fail_at(c, function, found, "an output has no value before the initialisation mode");
@@ -44,31 +83,27 @@ static int update_outputs(component* c, fmu_function function, const variable* f
   return 0;
 }
 
-static double value_of(const component* c, const variable* found) {
-  const int is_flag = variable_type_of(found) == VARIABLE_BOOLEAN && variable_causality_of(found) == CAUSALITY_OUTPUT;
-  return is_flag ? (double)c->values.flag[found->id][found->index] : *variables_number(&c->values, found);
-}
-
 fmu_status values_get(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, void* values, size_t value_count) {
-  variable found = {0};
+  value_run run;
   size_t at = 0;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
   }
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i += run.references, at += run.elements) {
     if (is_time(references[i], type)) {
-      put_element(values, format, at++, c->end_of_step);
+      run.references = run.elements = 1;
+      put_numbers(values, format, at, &c->end_of_step, 1);
       continue;
     }
-    if (find_of_type(c, function, type, references[i], &found) || update_outputs(c, function, &found)) {
+    if (find_run(c, function, type, references + i, count - i, &run) || update_outputs(c, function, &run.first)) {
       return FMU_ERROR;
     }
-    const size_t extent = variables_extent(&c->values, &found);
-    for (size_t k = 0; k < extent; ++k) {
-      const variable one = variables_element(&found, k);
-      put_element(values, format, at++, value_of(c, &one));
+    if (variable_is_flag(&run.first)) {
+      put_flags(values, format, at, c->values.flag[run.first.id] + run.first.index, run.elements);
+    } else {
+      put_numbers(values, format, at, variables_number(&c->values, &run.first), run.elements);
     }
   }
   return FMU_OK;
@@ -97,6 +132,20 @@ static int check_writable(component* c, fmu_function function, const variable* f
   return c->phase == PHASE_STEP_COMPLETE && is_fixed ? refuse_fixed(c, function, found) : 0;
 }
 
+/* Inputs given as doubles, which nothing but their range is asked of: checked and copied as they stand. */
+static int is_block(const value_run* run, value_format format) {
+  return format == VALUES_DOUBLE && variable_causality_of(&run->first) == CAUSALITY_INPUT;
+}
+
+/* variables_accept() of all elements of a run of inputs: what is not a number compares false */
+static int all_accepted(const variable_group* group, const double* values, size_t count) {
+  int accepted = 1;
+  for (size_t i = 0; i < count; ++i) {
+    accepted &= (values[i] >= group->minimum) & (values[i] <= group->maximum);
+  }
+  return accepted;
+}
+
 /* 0 when the variable may have the value */
 static int check_value(component* c, fmu_function function, const variable* one, double value) {
   if (variables_accept(c->model, one, value)) {
@@ -108,48 +157,63 @@ static int check_value(component* c, fmu_function function, const variable* one,
   return -1;
 }
 
-/* A value that check_value() took. */
-static void take_value(component* c, const variable* one, double value) {
-  *variables_number(&c->values, one) = value;
-  if (!one->group) {
-    c->values.parameters_pending = 1;
-  } else if (one->group->causality == CAUSALITY_PARAMETER) {
-    model_set_setting(c->model, one->id, one->index, value);
+/* 0 when every variable of the run may have its value, which stand in `values` from `at` on */
+static int check_run(component* c, fmu_function function, const value_run* run, const void* values, value_format format,
+                     size_t at) {
+  const variable_type type = variable_type_of(&run->first);
+  if (is_block(run, format) && all_accepted(run->first.group, (const double*)values + at, run->elements)) {
+    return 0;
   }
+  for (size_t i = 0; i < run->elements; ++i) { /* one by one: the first that is refused is named */
+    const variable one = variables_element(&run->first, i);
+    const variable* named = run->first.whole ? &run->first : &one;
+    if (check_writable(c, function, named) ||
+        check_value(c, function, &one, given_value(values, format, at + i, type))) {
+      return -1;
+    }
+  }
+  return 0;
+}
+
+/* Values that check_run() took. */
+static void take_run(component* c, const value_run* run, const void* values, value_format format, size_t at) {
+  double* numbers = variables_number(&c->values, &run->first);
+  const variable_group* group = run->first.group;
   c->outputs_pending = 1;
+  if (is_block(run, format)) {
+    memcpy(numbers, (const double*)values + at, run->elements * sizeof *numbers);
+    return;
+  }
+  for (size_t i = 0; i < run->elements; ++i) {
+    numbers[i] = given_value(values, format, at + i, variable_type_of(&run->first));
+    if (group && group->causality == CAUSALITY_PARAMETER) {
+      model_set_setting(c->model, run->first.id, run->first.index + i, numbers[i]);
+    }
+  }
+  c->values.parameters_pending |= !group;
 }
 
 fmu_status values_set(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, const void* values, size_t value_count) {
-  variable found = {0};
+  value_run run;
   size_t at = 0;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
   }
-  for (size_t i = 0; i < count; ++i) { /* all or none */
+  for (size_t i = 0; i < count; i += run.references, at += run.elements) { /* all or none */
     if (is_time(references[i], type)) {
       return component_fail_because(c, call_name(function), "time: the independent variable is not written");
     }
-    if (find_of_type(c, function, type, references[i], &found) || check_writable(c, function, &found)) {
+    if (find_run(c, function, type, references + i, count - i, &run) ||
+        check_run(c, function, &run, values, format, at)) {
       return FMU_ERROR;
-    }
-    const size_t extent = variables_extent(&c->values, &found);
-    for (size_t k = 0; k < extent; ++k) {
-      const variable one = variables_element(&found, k);
-      if (check_value(c, function, &one, given_value(values, format, at++, type))) {
-        return FMU_ERROR;
-      }
     }
   }
   at = 0;
-  for (size_t i = 0; i < count; ++i) {
-    variables_find(&c->values, references[i], &found);
-    const size_t extent = variables_extent(&c->values, &found);
-    for (size_t k = 0; k < extent; ++k) {
-      const variable one = variables_element(&found, k);
-      take_value(c, &one, given_value(values, format, at++, type));
-    }
+  for (size_t i = 0; i < count; i += run.references, at += run.elements) {
+    find_run(c, function, type, references + i, count - i, &run);
+    take_run(c, &run, values, format, at);
   }
   return FMU_OK;
 }

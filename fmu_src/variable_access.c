@@ -27,14 +27,6 @@ fmu_status fail_of_type(component* c, fmu_function function, unsigned reference,
   return component_fail(c, &text);
 }
 
-int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found) {
-  if (variables_find(&c->values, reference, found) == 0 && variable_type_of(found) == type) {
-    return 0;
-  }
-  fail_of_type(c, function, reference, this_fmi.types[type], found);
-  return -1;
-}
-
 int may_access(component* c, fmu_function function, size_t count, const void* references, const void* values) {
   if (!component_may_call(c, function)) {
     return 0;

@@ -8,11 +8,18 @@
 /* 1 when the call is allowed and has its pointers; otherwise logs and fails. */
 int may_access(component* c, fmu_function function, size_t count, const void* references, const void* values);
 
-/* 0 for a variable of the type; otherwise says what it is, or that there is none, and fails. */
-int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference, variable* found);
-
 /* Fails with what the variable is instead of the type, or that there is none. */
 fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found);
+
+/* 0 for a variable of the type; otherwise says what it is, or that there is none, and fails. */
+static inline int find_of_type(component* c, fmu_function function, variable_type type, unsigned reference,
+                               variable* found) {
+  if (variables_find(&c->values, reference, found) == 0 && variable_type_of(found) == type) {
+    return 0;
+  }
+  fail_of_type(c, function, reference, this_fmi.types[type], found);
+  return -1;
+}
 
 /* 1 for the independent variable, which is no other variable's and has one element. */
 static inline int is_time(unsigned reference, variable_type type) {

@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-size_t variables_group_count(const variables* v, const variable_group* group) {
+/* Elements of a group; 0 where the model does not have what it needs. */
+static size_t count_elements(const variables* v, const variable_group* group) {
   if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_REST && !v->watches_rest) ||
       (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
     return 0;
@@ -26,7 +27,7 @@ static size_t number_count(const variables* v, variable_causality causality) {
   size_t count = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      count += variables_group_count(v, &variable_groups[g]);
+      count += v->count[g];
     }
   }
   return count;
@@ -36,9 +37,8 @@ static size_t number_count(const variables* v, variable_causality causality) {
 static double* share_out(variables* v, variable_causality causality, double* block) {
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      const size_t count = variables_group_count(v, &variable_groups[g]);
-      v->number[g] = count ? block : NULL;
-      block += count;
+      v->number[g] = v->count[g] ? block : NULL;
+      block += v->count[g];
     }
   }
   return block;
@@ -48,9 +48,8 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
   size_t used = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (!has_numbers(&variable_groups[g])) {
-      const size_t count = variables_group_count(v, &variable_groups[g]);
-      v->flag[g] = block && count ? block + used : NULL;
-      used += count;
+      v->flag[g] = block && v->count[g] ? block + used : NULL;
+      used += v->count[g];
     }
   }
   return used;
@@ -65,6 +64,9 @@ int variables_create(variables* v, const model* m, int arrays) {
   v->has_links = model_has_links(m);
   v->watches_rest = model_watches_rest(m);
   v->watches_sensors = model_watches_sensors(m);
+  for (int g = 0; g < GROUP_COUNT; ++g) {
+    v->count[g] = count_elements(v, &variable_groups[g]);
+  }
   v->input_count = number_count(v, CAUSALITY_INPUT);
   v->output_count = number_count(v, CAUSALITY_OUTPUT);
   const size_t settings = number_count(v, CAUSALITY_PARAMETER);
@@ -95,38 +97,11 @@ void variables_start(variables* v, const model* m) {
 
 void variables_fetch_settings(variables* v, const model* m) {
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    const variable_group* group = &variable_groups[g];
-    const size_t count = group->causality == CAUSALITY_PARAMETER ? variables_group_count(v, group) : 0;
+    const size_t count = variable_groups[g].causality == CAUSALITY_PARAMETER ? v->count[g] : 0;
     for (size_t i = 0; i < count; ++i) {
       v->number[g][i] = model_get_setting(m, (variable_group_id)g, i);
     }
   }
-}
-
-/* 1 when the reference lies in the group; then index is set */
-static int in_group(const variables* v, unsigned value_reference, variable_group_id id, variable* found) {
-  const variable_group* group = &variable_groups[id];
-  if (value_reference < group->base || value_reference - group->base >= variables_group_count(v, group)) {
-    return 0;
-  }
-  *found = (variable){group, id, value_reference - group->base, v->arrays && group->size != SIZE_SCALAR};
-  return !v->arrays || found->index == 0;
-}
-
-int variables_find(const variables* v, unsigned value_reference, variable* last) {
-  if (value_reference >= VARIABLE_PARAMETER_BASE) {
-    *last = (variable){NULL, GROUP_COUNT, value_reference - VARIABLE_PARAMETER_BASE, 0};
-    return last->index < v->parameter_count ? 0 : -1;
-  }
-  if (last->group && in_group(v, value_reference, last->id, last)) {
-    return 0;
-  }
-  for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (in_group(v, value_reference, (variable_group_id)g, last)) {
-      return 0;
-    }
-  }
-  return -1;
 }
 
 /* unit, minimum, maximum of an input or parameter */

@@ -15,6 +15,7 @@ typedef struct variables {
   int arrays;                       /* a value reference stands for a whole group, not for one element */
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */
+  size_t count[GROUP_COUNT];        /* elements of each group; 0 where the model does not have what it needs */
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */
   double* number[GROUP_COUNT];      /* inputs, Real and Integer outputs, and parameters, by group; NULL for others */
   unsigned char* flag[GROUP_COUNT]; /* Boolean outputs by group, NULL for others */
@@ -40,15 +41,40 @@ void variables_start(variables* v, const model* m);
 /* Settings to those of the model. */
 void variables_fetch_settings(variables* v, const model* m);
 
-/* Elements of a group; 0 where the model does not have what it needs. */
-size_t variables_group_count(const variables* v, const variable_group* group);
+/* 0 when there is such a variable. Inline, as variables_run(): it is called for every variable of every call. */
+static inline int variables_find(const variables* v, unsigned value_reference, variable* found) {
+  if (value_reference >= VARIABLE_PARAMETER_BASE) {
+    *found = (variable){NULL, GROUP_COUNT, value_reference - VARIABLE_PARAMETER_BASE, 0};
+    return found->index < v->parameter_count ? 0 : -1;
+  }
+  const variable_group_id id = value_reference < VARIABLE_GROUP_END
+                                   ? (variable_group_id)variable_group_at[value_reference / VARIABLE_GROUP_SPACING]
+                                   : GROUP_COUNT;
+  const size_t index = value_reference % VARIABLE_GROUP_SPACING;
+  if (id == GROUP_COUNT || index >= v->count[id] || (v->arrays && index)) {
+    return -1;
+  }
+  const variable_group* group = &variable_groups[id];
+  *found = (variable){group, id, index, v->arrays && group->size != SIZE_SCALAR};
+  return 0;
+}
 
-/* 0 when there is such a variable. `last` is the one found before, or zeros: neighbours are found fast. */
-int variables_find(const variables* v, unsigned value_reference, variable* last);
+/* How many of the references, beginning with that of `first`, name variables whose numbers follow one another: at least
+ * 1. A whole group is a run by itself. */
+static inline size_t variables_run(const variables* v, const variable* first, const unsigned references[],
+                                   size_t count) {
+  const size_t left = (first->group ? v->count[first->id] : v->parameter_count) - first->index;
+  const size_t most = first->whole ? 1 : left < count ? left : count;
+  size_t run = 1;
+  while (run < most && references[run] == references[0] + run) {
+    ++run;
+  }
+  return run;
+}
 
 /* Numbers that the variable has: those of its group when it is whole, otherwise 1. */
 static inline size_t variables_extent(const variables* v, const variable* found) {
-  return found->whole ? variables_group_count(v, found->group) : 1;
+  return found->whole ? v->count[found->id] : 1;
 }
 
 /* Element i of a variable, a variable by itself. */
@@ -62,6 +88,11 @@ static inline variable_type variable_type_of(const variable* found) {
 
 static inline variable_causality variable_causality_of(const variable* found) {
   return found->group ? found->group->causality : CAUSALITY_PARAMETER;
+}
+
+/* Boolean outputs live in flags, all others in the block of numbers. */
+static inline int variable_is_flag(const variable* found) {
+  return variable_type_of(found) == VARIABLE_BOOLEAN && variable_causality_of(found) == CAUSALITY_OUTPUT;
 }
 
 /* Where the number lives. Not for Boolean outputs. */

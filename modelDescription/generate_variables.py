@@ -17,7 +17,7 @@ from typing import Any
 FMI_TYPES = ("Real", "Integer", "Boolean", "String")
 SIZES = ("scalar", "joints", "tendons", "vector")
 NEEDS = ("nothing", "links", "rest", "sensor_fault")  # of the description: a group is there only where it has this
-MAX_GROUP = 100  # value references that a group may take up
+MAX_GROUP = 100  # value references that a group may take up; each begins at a multiple
 
 HEADER = """\
 /* Generated from modelDescription/variables.json by generate_variables.py: do not edit. */
@@ -27,6 +27,8 @@ HEADER = """\
 #define VARIABLE_TABLE_SALT {salt}ull /* hash of the table, part of every GUID */
 #define VARIABLE_PARAMETER_BASE {parameter_base}u /* value reference of the first parameter */
 #define VARIABLE_TIME_REFERENCE {time}u /* of the independent variable, which FMI 3.0 wants */
+#define VARIABLE_GROUP_SPACING {spacing}u /* the value references of a group begin at a multiple of it */
+#define VARIABLE_GROUP_END {end}u /* no group's value reference reaches it */
 
 /* In the order of variables.json. */
 typedef enum variable_group_id {{
@@ -54,6 +56,11 @@ typedef struct variable_group {{
 
 static const variable_group variable_groups[GROUP_COUNT] = {{
 {rows}
+}};
+
+/* The group whose value references begin at a multiple of the spacing; GROUP_COUNT where none does. */
+static const unsigned char variable_group_at[VARIABLE_GROUP_END / VARIABLE_GROUP_SPACING] = {{
+{places}
 }};
 
 typedef enum log_category {{
@@ -88,8 +95,8 @@ def check(table: dict[str, Any]) -> None:
             raise ValueError(f"{name}: expected type in {FMI_TYPES} and size in {SIZES}")
         if group.get("needs", "nothing") not in NEEDS:
             raise ValueError(f"{name}: expected needs in {NEEDS}")
-        if base < last + MAX_GROUP:
-            raise ValueError(f"{name}: base {base}, expected at least {last + MAX_GROUP}")
+        if base < last + MAX_GROUP or base % MAX_GROUP:
+            raise ValueError(f"{name}: base {base}, expected a multiple of {MAX_GROUP}, at least {last + MAX_GROUP}")
         if group["type"] == "Real" and group["unit"] not in table["units"]:
             raise ValueError(f"{name}: unit {group['unit']!r} is not among the units")
         last = base
@@ -108,13 +115,31 @@ def row(group: dict[str, Any]) -> str:
     )
 
 
+def group_end(table: dict[str, Any]) -> int:
+    """The value reference behind those that the last group may take up."""
+    return int(table["groups"][-1]["base"]) + MAX_GROUP
+
+
+def places(table: dict[str, Any]) -> str:
+    """A row for each multiple of `MAX_GROUP` at which a group could begin."""
+    names = {group["base"]: constant_of_group(group) for group in table["groups"]}
+    return "\n".join(f"    {names.get(base, 'GROUP_COUNT')}," for base in range(0, group_end(table), MAX_GROUP))
+
+
+def constant_of_group(group: dict[str, Any]) -> str:
+    return f"GROUP_{group['name'].upper().replace('.', '_')}"
+
+
 def header(table: dict[str, Any]) -> str:
     categories = list(table["log_categories"])
     return HEADER.format(
         salt=hex(salt(table)),
         parameter_base=table["parameters"]["base"],
         time=time_reference(table),
-        ids="\n".join(f"  GROUP_{group['name'].upper().replace('.', '_')}," for group in table["groups"]),
+        spacing=MAX_GROUP,
+        end=group_end(table),
+        ids="\n".join(f"  {constant_of_group(group)}," for group in table["groups"]),
+        places=places(table),
         rows="\n".join(row(group) for group in table["groups"]),
         categories="\n".join(f"  {constant(name)}," for name in categories),
         category_names=", ".join(f'"{name}"' for name in categories),

@@ -47,6 +47,7 @@ ONLY = {
     "tendonfmu._plant": "simulate/plant.py",
     "tendonfmu._estimation": "estimate/estimation.py",
     "plotly": "drawing/interactive.py",
+    "PIL": "drawing/raster.py",
     "rich": "cli/console.py",
     "dask": "tasks/jobs.py",
     "distributed": "tasks/jobs.py",
@@ -67,10 +68,8 @@ COMMANDS = {
 }  # what a user may call
 # those that draw, and what they share
 DRAWING = {
-    "drawing/finger_picture.py",
     "drawing/panels.py",
     "drawing/plot_style.py",
-    "drawing/terminal_picture.py",
     "report/plots.py",
     "report/score_plots.py",
     "report/tune_plots.py",

@@ -9,7 +9,6 @@ import tempfile
 import traceback
 from collections.abc import Iterator, Sequence
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from tendonfmu.errors import InputError
@@ -87,6 +86,8 @@ def _report(error: BaseException, arguments: Sequence[str]) -> str:
 
 
 def _version(package: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version  # 10 ms of every command
+
     try:
         return version(package)
     except PackageNotFoundError:

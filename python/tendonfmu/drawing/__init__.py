@@ -4,7 +4,7 @@
 - `interactive`: draws it for pages, with Plotly
 - `panels`: draws it as PNG files, with matplotlib
 - `panel_styles`, `plot_style`: colours and sizes
-- `finger_picture`: draws the routing of a finger
+- `finger_picture`, `terminal_picture`: draw what an FMU shows, with Pillow (`raster`)
 """
 
 import lazy_loader

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from typing import IO
 
-from tendonfmu.drawing.plot_style import BLUE, Target, save
+from tendonfmu.drawing.panel_styles import BLUE
+from tendonfmu.drawing.raster import Raster
 
-SIZE, DPI = 0.4, 80  # inch, pixels per inch
+PIXELS = 32
 
 
-def draw_terminal(target: Target, *, is_input: bool) -> None:
+def draw_terminal(target: IO[bytes], *, is_input: bool) -> None:
     """Draw a triangle that points to the right as PNG: filled for inputs, outlined for outputs.
 
     Parameters
     ----------
     target
-        File name or binary stream.
+        Binary stream.
     is_input
         Whether the signals of the terminal go into the FMU.
     """
-    figure = Figure(figsize=(SIZE, SIZE))
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(0.0, 1.0)
-    corners = [(0.1, 0.1), (0.9, 0.5), (0.1, 0.9)]
-    axes.add_patch(Polygon(corners, facecolor=BLUE if is_input else "white", edgecolor=BLUE, linewidth=2.0))
-    save(figure, target, DPI)
+    picture = Raster(0.0, 1.0, 0.0, 1.0, PIXELS)
+    picture.polygon([(0.1, 0.1), (0.9, 0.5), (0.1, 0.9)], BLUE if is_input else "white", BLUE, 0.07)
+    picture.save(target)

@@ -193,12 +193,16 @@ def _parameters(
         }
 
 
+PLACE = re.compile(r"\\(\d)")  # of a group in a wording; `Match.expand` reads the wording anew for each parameter
+
+
 def parameter_description(path: str, table: VariableTable) -> str:
     """Return the description of the first pattern that matches the whole path."""
     for pattern, wording in table.patterns:
         match = pattern.fullmatch(path)
         if match:
-            return match.expand(wording)
+            parts = PLACE.split(wording)  # every other one is the number of a group
+            return "".join(match[int(part)] if k % 2 else part for k, part in enumerate(parts))
     raise LookupError(f"{path}: no description in variables.json")
 
 

@@ -6,14 +6,16 @@ import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import are, check_output, counted
-from tendonfmu.fmu import bridged_rows, build_fmu, parameter_sets, reference_run, related_members
+from tendonfmu.fmu import build_fmu
 from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
-from tendonfmu.recordings import Recording, RecordingSource, belongs, read_recording
-from tendonfmu.simulate import build_plant_fmu, is_rig, read_rig
+
+if TYPE_CHECKING:
+    from tendonfmu.recordings import Recording, RecordingSource
 
 
 @with_checked_options
@@ -67,28 +69,33 @@ def build(
     sets = [Path(each) for each in (ssv if isinstance(ssv, Sequence) and not isinstance(ssv, str) else [ssv])]
     others = [*sets, *([Path(reference)] if isinstance(reference, str | os.PathLike) else [])]
     if isinstance(finger, str | os.PathLike):
+        from tendonfmu.simulate import is_rig
+
         file = finger_file(finger)
-        rig = is_rig(file)
-        check_output(target, *(read_rig(file).files if rig else [file]), *others)
-        if rig and fmi != 2:
-            raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
-        if rig:
-            if reference is not None or sets:
-                raise InputError(f"{file}: a rig; expected a finger description with a reference or parameter sets")
-            _check_suffix(target)
-            return build_plant_fmu(file, target, binaries=folder)
-    else:
-        check_output(target, *others)
+        if is_rig(file):
+            return _build_plant(file, target, folder, others, fmi, alone=reference is None and not sets)
+        others.insert(0, file)
+    check_output(target, *others)
     _check_suffix(target)
     model = read_finger(finger)
-    recording = None if reference is None else read_recording(reference)
-    run = None if recording is None else reference_run(model, recording, arrays=fmi == 3)
-    related = [*(run.files if run else ()), *parameter_sets(sets, model)]
-    experiment = run.experiment if run else None
-    for sentence in [] if recording is None else _doubts(model, recording):
+    related = _related(model, reference, sets, fmi) if reference is not None or sets else _Related({}, None, [])
+    for sentence in related.doubts:
         warnings.warn(sentence, InputWarning, stacklevel=3)  # at the call of tendonfmu.build
-    extra = related_members(related)
-    return build_fmu(model, target, binaries=folder, extra=extra, fmi=fmi, experiment=experiment)
+    return build_fmu(model, target, binaries=folder, extra=related.files, fmi=fmi, experiment=related.experiment)
+
+
+def _build_plant(
+    rig: Path, target: Path, binaries: Path | None, others: Sequence[Path], fmi: int, *, alone: bool
+) -> Path:
+    from tendonfmu.simulate import build_plant_fmu, read_rig
+
+    check_output(target, *read_rig(rig).files, *others)
+    if fmi != 2:
+        raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
+    if not alone:
+        raise InputError(f"{rig}: a rig; expected a finger description with a reference or parameter sets")
+    _check_suffix(target)
+    return build_plant_fmu(rig, target, binaries=binaries)
 
 
 def _check_suffix(output: Path) -> None:
@@ -96,8 +103,32 @@ def _check_suffix(output: Path) -> None:
         raise InputError(f"{output}: expected a name that ends in .fmu, as importing tools want it")
 
 
+class _Related(NamedTuple):
+    """What belongs to a recording and to parameter sets: files of the archive, default experiment, doubts, a line each."""
+
+    files: dict[str, bytes]
+    experiment: dict[str, float] | None
+    doubts: list[str]
+
+
+def _related(finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int) -> _Related:
+    """What reads recordings is imported here: most FMUs are packed without one."""
+    from tendonfmu.fmu import parameter_sets, reference_run, related_members
+    from tendonfmu.recordings import read_recording
+
+    files = parameter_sets(sets, finger)
+    if reference is None:
+        return _Related(related_members(files), None, [])
+    recording = read_recording(reference)
+    run = reference_run(finger, recording, arrays=fmi == 3)
+    return _Related(related_members([*run.files, *files]), run.experiment, _doubts(finger, recording))
+
+
 def _doubts(finger: Finger, recording: Recording) -> list[str]:
     """Return what speaks against a recording as a reference, one line each."""
+    from tendonfmu.fmu import bridged_rows
+    from tendonfmu.recordings import belongs
+
     found = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
     rows, invented = bridged_rows(recording)
     if invented:

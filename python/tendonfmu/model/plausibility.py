@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from tendonfmu.model.description import Finger, laws, sides
 from tendonfmu.model.findings import Finding
@@ -125,6 +124,8 @@ def _directions(arms: Numbers, data: Mapping[str, Any], names: list[str]) -> Ite
 
 def is_reached(columns: Numbers, joint: int, sign: float) -> bool:
     """Return whether forces ≥ 0 make a torque at one joint alone. columns: [n, c] moment arms, one column per force."""
+    from scipy.optimize import nnls  # takes 0.2 s to import
+
     scale = float(np.abs(columns).max())
     target = np.zeros(len(columns))
     target[joint] = sign

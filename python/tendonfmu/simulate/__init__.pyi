@@ -5,7 +5,7 @@ from .plant import Plant as Plant
 from .plant import require_plant as require_plant
 from .rig import Rig as Rig
 from .rig import description_files as description_files
-from .rig import is_rig as is_rig
 from .rig import read_rig as read_rig
+from .rig_format import is_rig as is_rig
 from .rig_summary import describe_rig as describe_rig
 from .simulation import simulate as simulate

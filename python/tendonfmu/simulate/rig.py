@@ -126,27 +126,6 @@ class Rig:
         return np.asarray(np.arange(samples) / self.rate)
 
 
-def is_rig(path: Path) -> bool:
-    """Return whether a file claims to be a rig, even an invalid one.
-
-    Parameters
-    ----------
-    path
-        Any file.
-
-    Returns
-    -------
-    bool
-        False for a file that is no JSON object or cannot be read.
-    """
-    try:
-        with path.open(encoding="utf-8") as file:
-            data = json.load(file)
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
-
-
 def description_files(path: Path) -> list[Path]:
     """Return the files that describe a rig: itself, its bases and its finger.
 
