@@ -104,7 +104,7 @@ def _check_suffix(output: Path) -> None:
 
 
 class _Related(NamedTuple):
-    """What belongs to a recording and to parameter sets: files of the archive, default experiment, doubts, a line each."""
+    """What belongs to a recording and to parameter sets. Of the doubts each is a line."""
 
     files: dict[str, bytes]
     experiment: dict[str, float] | None
@@ -112,7 +112,7 @@ class _Related(NamedTuple):
 
 
 def _related(finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int) -> _Related:
-    """What reads recordings is imported here: most FMUs are packed without one."""
+    """Return what belongs to them. What reads recordings is imported here: most FMUs are packed without one."""
     from tendonfmu.fmu import parameter_sets, reference_run, related_members
     from tendonfmu.recordings import read_recording
 
