@@ -16,7 +16,9 @@ using Eigen::VectorXd;
 
 constexpr std::size_t coarse_samples = 40000; /* that a coarse pass looks at, about */
 constexpr double coarse_share = 0.3;          /* of √unknowns, in standard errors: then all samples are looked at */
-constexpr double first_share = 0.8, largest_share = 1.5, smallest_share = 1e-4; /* of a rate, in a step */
+constexpr double largest_share = 0.8, smallest_share = 1e-4; /* of a rate, in a step; beyond, its model is not good */
+constexpr double plain_gain = 100.0; /* of what ends the search: after a step that promises less, Gauss and Newton's
+                                      * parabola, without the expansion of the rates, tells whether it was the last */
 
 constexpr double least_prior_weight = 1e-10; /* of a covariance: standard deviations up to 1e5 scales */
 
@@ -34,6 +36,7 @@ struct search_point {
   VectorXd x;
   cost_evaluation data;
   double cost = std::numeric_limits<double>::infinity(), prior_cost = 0.0;
+  bool expanded = false; /* the data know the rates to third order */
 };
 
 class batch_search {
@@ -51,9 +54,10 @@ class batch_search {
     const std::size_t coarse =
         options_.stride > 0 ? options_.stride : std::max<std::size_t>(1, problem_.samples() / coarse_samples);
     if (coarse > 1) {
-      descend(coarse, coarse_share * std::sqrt(static_cast<double>(start.size())));
+      descend(best_.x, coarse, coarse_share * std::sqrt(static_cast<double>(start.size())));
     }
-    result_.converged = !result_.stopped && descend(1, options_.tolerance);
+    const VectorXd near = approach(best_.x, static_cast<std::size_t>(std::sqrt(static_cast<double>(coarse))));
+    result_.converged = !result_.stopped && descend(near, 1, options_.tolerance);
     result_.z = box_.unknowns(best_.x);
     result_.cost = best_.cost;
     result_.prior_cost = best_.prior_cost;
@@ -65,25 +69,40 @@ class batch_search {
   }
 
  private:
-  /* On every stride-th sample, from the best point: a pass over the data, the best step of the local model that it
+  /* From x to where all samples are first looked at: one step of the model of every stride-th sample. What it is worth,
+   * the look at all of them tells. */
+  VectorXd approach(const VectorXd& x, std::size_t stride) {
+    search_point here;
+    if (stride < 2 || result_.stopped || result_.passes >= options_.most_passes ||
+        !look(x, {stride, options_.threads}, &here)) {
+      return x;
+    }
+    const local_model model(problem_, box_, here.data, x, prior_);
+    ++result_.steps;
+    return box_.clip(x + model.best_step(box_.around(x, largest_share), 1.0));
+  }
+
+  /* On every stride-th sample, from a point: a pass over the data, the best step of the local model that it
    * gives, a pass there. True: converged. */
-  bool descend(std::size_t stride, double tolerance) {
-    double share = first_share;
+  bool descend(const VectorXd& from, std::size_t stride, double tolerance) {
+    const double enough = 0.5 * tolerance * tolerance;
+    double share = largest_share;
     search_point here; /* the costs so far are of another number of samples */
-    if (!look(best_.x, stride, &here)) {
+    if (!look(from, {stride, options_.threads}, &here)) {
       return false;
     }
     best_ = std::move(here);
     while (result_.passes < options_.most_passes) {
       const local_model model(problem_, box_, best_.data, best_.x, prior_);
-      const VectorXd step = model.best_step(box_.around(best_.x, share), 0.05 * tolerance * tolerance);
+      const VectorXd step = model.best_step(box_.around(best_.x, share), 0.1 * enough);
       const double expected = best_.cost - model.cost(step);
       ++result_.steps;
-      if (2.0 * expected <= tolerance * tolerance) {
+      if (expected <= enough) {
         return true;
       }
       search_point next;
-      if (!look(box_.clip(best_.x + step), stride, &next)) {
+      const bool expanded = expected > plain_gain * enough || !best_.expanded;
+      if (!look(box_.clip(best_.x + step), {stride, options_.threads, expanded}, &next)) {
         return false;
       }
       const double ratio = (best_.cost - next.cost) / expected;
@@ -102,17 +121,17 @@ class batch_search {
     return false;
   }
 
-  bool look(const VectorXd& x, std::size_t stride, search_point* point) {
+  bool look(const VectorXd& x, const pass_options& options, search_point* point) {
     const std::vector<double> z = box_.unknowns(x);
-    const pass_watch watch = [this, stride](std::size_t done) {
+    const pass_watch watch = [this, &options](std::size_t done) {
       if (!watch_) {
         return true;
       }
       const std::vector<double> best = box_.unknowns(best_.x);
       const double cost = std::isfinite(best_.cost) ? best_.cost : std::numeric_limits<double>::quiet_NaN();
-      return watch_({result_.passes + 1, stride, done, problem_.samples(), cost, &best});
+      return watch_({result_.passes + 1, options.stride, done, problem_.samples(), cost, &best});
     };
-    cost_evaluation found = evaluate(problem_, z, {stride, options_.threads}, watch);
+    cost_evaluation found = evaluate(problem_, z, options, watch);
     if (!found.complete) {
       result_.stopped = true;
       return false;
@@ -122,6 +141,7 @@ class batch_search {
     point->prior_cost = prior_.cost(x - box_.start);
     point->cost = found.cost + point->prior_cost;
     point->data = std::move(found);
+    point->expanded = options.expanded;
     return true;
   }
 

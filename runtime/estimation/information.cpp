@@ -31,11 +31,12 @@ struct segment_sum {
 /* One thread's finger and buffers. */
 class pass_worker {
  public:
-  pass_worker(const fit_problem& problem, const std::vector<double>& numbers)
+  pass_worker(const fit_problem& problem, const std::vector<double>& numbers, bool expanded)
       : finger_(problem.image.data(), problem.image.size()),
         rows_(problem.unknowns, finger_.get()),
         columns_(problem.columns),
-        numbers_(numbers) {
+        numbers_(numbers),
+        expanded_(expanded) {
     for (const std::size_t columns : columns_.end) {
       joints_.emplace_back(columns);
     }
@@ -125,8 +126,8 @@ class pass_worker {
         }
       }
     }
-    if (term.side->index >= 0) {
-      const std::array<double, 2> values = expanded(term);
+    if (expanded_ && term.side->index >= 0) {
+      const std::array<double, 2> values = expansion(term);
       joint->rows.add_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), factor);
     }
   }
@@ -141,15 +142,15 @@ class pass_worker {
         }
       }
     }
-    if (term.side->index >= 0) {
-      const std::array<double, 2> values = expanded(term);
+    if (expanded_ && term.side->index >= 0) {
+      const std::array<double, 2> values = expansion(term);
       joint->rows.jump_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), -factor);
     }
   }
 
   /* v²E and −v³E with sign and weight; that the forces carry changes along to second order, too, is left out: this only
    * guides the steps */
-  static std::array<double, 2> expanded(const sensitivity_term& term) {
+  static std::array<double, 2> expansion(const sensitivity_term& term) {
     const double square = term.speed * term.speed * term.slope[1];
     return {square, -term.speed * square};
   }
@@ -158,6 +159,7 @@ class pass_worker {
   sample_rows rows_;
   const gram_columns& columns_;
   const std::vector<double>& numbers_;
+  const bool expanded_;
   std::vector<joint_sum> joints_;
 };
 
@@ -205,7 +207,7 @@ struct pass_task {
 class data_pass {
  public:
   data_pass(const fit_problem& problem, const std::vector<double>& z, const pass_options& options)
-      : problem_(problem), z_(z), numbers_(problem.unknowns.write(z.data())) {
+      : problem_(problem), z_(z), numbers_(problem.unknowns.write(z.data())), expanded_(options.expanded) {
     for (std::size_t r = 0; r < problem.recordings.size(); ++r) {
       gains_.emplace_back(problem.recordings[r], problem.finger.get()->derived.settings, options.stride);
       for (std::size_t s = 0; s < problem.recordings[r].segments(); ++s) {
@@ -288,7 +290,7 @@ class data_pass {
 
   void work() {
     try {
-      pass_worker worker(problem_, numbers_);
+      pass_worker worker(problem_, numbers_, expanded_);
       for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
         const pass_task& task = tasks_[k];
         auto segment =
@@ -322,6 +324,7 @@ class data_pass {
   const fit_problem& problem_;
   const std::vector<double>& z_;
   const std::vector<double> numbers_;
+  const bool expanded_;
   std::vector<bias_gains> gains_;
   std::vector<segment_states> states_; /* empty: those kept with the recordings */
   std::vector<pass_task> tasks_;

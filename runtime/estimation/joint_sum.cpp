@@ -129,11 +129,11 @@ void joint_sum::sum_block(Eigen::MatrixXd* sum) {
   const std::size_t count = active.size();
   std::fill_n(product_.begin(), count * count, 0.0);
   add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
-  for (std::size_t c = 0; c < count; ++c) {
+  for (std::size_t c = 0; c < count; ++c) { /* on either side of the diagonal: to look which takes as long as to add */
+    double* column = sum->col(static_cast<Eigen::Index>(active[c])).data();
+    const double* product = product_.data() + c * count;
     for (std::size_t r = c; r < count; ++r) {
-      const auto a = static_cast<Eigen::Index>(std::max(active[r], active[c]));
-      const auto b = static_cast<Eigen::Index>(std::min(active[r], active[c]));
-      (*sum)(a, b) += product_[c * count + r];
+      column[active[r]] += product[r];
     }
   }
 }
@@ -168,10 +168,12 @@ void joint_sum::flush() {
 
 joint_segment joint_sum::end_segment(Eigen::MatrixXd* sum) {
   flush();
-  const std::size_t columns = held_.size();
-  for (std::size_t c = 0; c < columns; ++c) {
-    for (std::size_t r = c; r < columns; ++r) {
-      (*sum)(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) += dense_sum_[c * columns + r];
+  const auto columns = static_cast<Eigen::Index>(held_.size());
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    (*sum)(c, c) += dense_sum_[static_cast<std::size_t>(c * columns + c)];
+    for (Eigen::Index r = c + 1; r < columns; ++r) {
+      (*sum)(r, c) += (*sum)(c, r) + dense_sum_[static_cast<std::size_t>(c * columns + r)];
+      (*sum)(c, r) = 0.0;
     }
   }
   const auto copy = [](const std::vector<double>& values) -> Eigen::VectorXd {

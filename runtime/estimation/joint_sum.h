@@ -91,8 +91,9 @@ class joint_sum {
   void filter(double gain, double weight);
   bool full() const { return used_ == block_length; } /* the block must be ended */
   void begin_segment();
-  /* adds the rows of the block to sum [q × q], lower triangle */
+  /* adds the rows of the block to sum [q × q], each product on one side of the diagonal or the other */
   void end_block(Eigen::MatrixXd* sum);
+  /* leaves the sum in the lower triangle */
   joint_segment end_segment(Eigen::MatrixXd* sum);
 
  private:
