@@ -3,6 +3,7 @@
 #ifndef TENDONFMU_FORCE_PROPAGATION_H
 #define TENDONFMU_FORCE_PROPAGATION_H
 
+#include "sliding_places.h"
 #include "slot_view.h"
 
 /* the speeds at which effects begin to move and come to rest: v_min, apart by the hysteresis after the first sample */
@@ -72,11 +73,6 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
     slot_view_fill(f, slot, angle, negative, view);
   }
   return view;
-}
-
-/* lanes that slide at all times */
-HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
-  return quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
 }
 
 /* lanes whose law is that of the sign of v; what slides at all times knows no hysteresis */
