@@ -115,6 +115,9 @@ std::string extension_rows(int joints, int tendons, key_choice keys) {
       rows.push_back(row("force_gain", "tendon", i, R"("correction": 0.02)"));
     }
   }
+  if (keys == key_choice::calibrated_presliding) {
+    rows.push_back(R"({"effect": "presliding", "displacement": 0.05})");
+  }
   if (keys == key_choice::delay) {
     rows.push_back(R"({"effect": "time_delay", "delay": 0.002})");
   }
@@ -124,7 +127,8 @@ std::string extension_rows(int joints, int tendons, key_choice keys) {
 }  // namespace
 
 std::string description(int joints, int tendons, int points, key_choice keys) {
-  const bool everything = keys == key_choice::everything, calibrated = keys == key_choice::calibrated;
+  const bool everything = keys == key_choice::everything;
+  const bool calibrated = keys == key_choice::calibrated || keys == key_choice::calibrated_presliding;
   const bool detects = everything || calibrated || keys == key_choice::innovation;
   const bool filtered = keys == key_choice::filtered || keys == key_choice::presliding_filtered;
   return R"({"format": "tendonfmu-finger-1", "name": "bench", "joints": )" +

@@ -10,12 +10,13 @@
 namespace bench_finger {
 
 // Which optional keys or extensions (docs/reference/semantics.md) a description has: calibrated: all that
-// `tendonfmu calibrate` writes, presliding apart; torques: three a joint
+// `tendonfmu calibrate` writes, presliding apart; calibrated_presliding: with it, as one row; torques: three a joint
 // and one a tendon; presliding: one at every place; presliding_filtered: the same with a position filter.
 enum class key_choice {
   paper,
   innovation,
   calibrated,
+  calibrated_presliding,
   everything,
   torques,
   presliding,

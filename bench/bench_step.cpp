@@ -82,6 +82,7 @@ const auto* const registered = [] {
   add("step/avx2/4x8x5", "avx2", 4, 8, 5, false);
   add("step/avx2/4x8x5/innovation", "avx2", 4, 8, 5, false, key_choice::innovation);
   add("step/avx2/4x8x5/calibrated", "avx2", 4, 8, 5, false, key_choice::calibrated);
+  add("step/avx2/4x8x5/calibrated_presliding", "avx2", 4, 8, 5, false, key_choice::calibrated_presliding);
   add("step/avx2/4x8x5/everything", "avx2", 4, 8, 5, false, key_choice::everything);
   add("step/plain/4x8x5/innovation", "plain", 4, 8, 5, false, key_choice::innovation);
   add("step/avx2/4x8x5/shaking/everything", "avx2", 4, 8, 5, true, key_choice::everything);

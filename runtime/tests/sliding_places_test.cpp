@@ -66,6 +66,11 @@ void expect_own_memory(const std::vector<unsigned char>& image, const char* kern
           << "sample " << k << ", row " << r;
       slid |= after[0] != 0.0;
     }
+    for (std::size_t slot = 0; slot < finger.handle->slots && finger.handle->extensions.only_slides; ++slot) {
+      if (finger.handle->scratch.slides[slot] == 0.0) {
+        ASSERT_EQ(finger.handle->scratch.grip[slot], 1.0) << "sample " << k << ", beside what slides: slot " << slot;
+      }
+    }
   }
   EXPECT_TRUE(slid);
 }

@@ -3,6 +3,7 @@
 #ifndef TENDONFMU_FORCE_PROPAGATION_H
 #define TENDONFMU_FORCE_PROPAGATION_H
 
+#include "sliding_places.h"
 #include "slot_view.h"
 
 /* the speeds at which effects begin to move and come to rest: v_min, apart by the hysteresis after the first sample */
@@ -72,11 +73,6 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
     slot_view_fill(f, slot, angle, negative, view);
   }
   return view;
-}
-
-/* lanes that slide at all times */
-HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
-  return quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
 }
 
 /* lanes whose law is that of the sign of v; what slides at all times knows no hysteresis */
@@ -203,37 +199,43 @@ HOT_INLINE int friction_values(tendonfmu_finger* f) {
   return transitions != 0;
 }
 
+/* Four tendons; any: whether one of them is bidirectional at all. */
+typedef struct tendon_kinds {
+  int any;
+  quad_mask bidirectional;
+} tendon_kinds;
+
 /* a force that friction made negative is slack, replaced by 0; of a bidirectional tendon it is a force like any other
  */
-HOT_INLINE quad without_slack(quad force, quad_mask bidirectional, quad_mask* slack) {
-  const quad_mask negative = quad_only_first(quad_greater(quad_set(0.0), force), bidirectional);
-  *slack = quad_either(*slack, negative);
-  return quad_select(bidirectional, force, quad_max(quad_set(0.0), force));
+HOT_INLINE quad without_slack(quad force, tendon_kinds kinds, quad_mask* slack) {
+  const quad zero = quad_set(0.0), pulling = quad_max(zero, force);
+  const quad_mask negative = quad_greater(zero, force);
+  *slack = quad_either(*slack, kinds.any ? quad_only_first(negative, kinds.bidirectional) : negative);
+  return kinds.any ? quad_select(kinds.bidirectional, force, pulling) : pulling;
 }
 
 /* the force as it multiplies an F or a b */
-HOT_INLINE quad acting_force(quad force, quad_mask bidirectional) {
-  return quad_select(bidirectional, quad_abs(force), force);
+HOT_INLINE quad acting_force(quad force, tendon_kinds kinds) {
+  return kinds.any ? quad_select(kinds.bidirectional, quad_abs(force), force) : force;
 }
 
 /* f_A and f_B along four tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
  * in eqs. (8) and (10), accumulated into tendon_friction [n] and load [n] */
-HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, quad* tendon_friction, quad* load) {
+HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds, quad* tendon_friction, quad* load) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, last = (f->joints - 1) * lanes;
   const quad zero = quad_set(0.0);
-  const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
   quad_mask slack = quad_greater(zero, zero);
-  quad lost = zero, force = without_slack(quad_load(s->force + i), bidirectional, &slack);
+  quad lost = zero, force = without_slack(quad_load(s->force + i), kinds, &slack);
   for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
-    const quad force_at = acting_force(force, bidirectional); /* f_A,j−1 */
+    const quad force_at = acting_force(force, kinds); /* f_A,j−1 */
     const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
-    force = without_slack(quad_sub(force, edge_loss), bidirectional, &slack);
-    const quad force_between = acting_force(force, bidirectional); /* f_Bj */
+    force = without_slack(quad_sub(force, edge_loss), kinds, &slack);
+    const quad force_between = acting_force(force, kinds); /* f_Bj */
     lost = quad_add(lost, edge_loss);
     if (at < last) {
       const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
-      force = without_slack(quad_sub(force, pulley_loss), bidirectional, &slack);
+      force = without_slack(quad_sub(force, pulley_loss), kinds, &slack);
       lost = quad_add(lost, pulley_loss);
     }
     tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
@@ -244,6 +246,18 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, quad* tendon_frict
   quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
 }
 
+/* the same of all tendons; without a bidirectional one among four, which is the rule, less is to be told apart */
+HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
+  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+    const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
+    if (quad_mask_bits(bidirectional)) {
+      propagate_four(f, i, (tendon_kinds){1, bidirectional}, tendon_friction, load);
+    } else {
+      propagate_four(f, i, (tendon_kinds){0, bidirectional}, tendon_friction, load);
+    }
+  }
+}
+
 /* T_j of eq. (10), with the joint's own friction and cover of eq. (8) */
 HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
@@ -252,9 +266,7 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; ++j) {
     tendon_friction[j] = load[j] = quad_set(0.0);
   }
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
-    propagate_four(f, i, tendon_friction, load);
-  }
+  propagate_forces(f, tendon_friction, load);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad bend = quad_sub(quad_load(s->angle + j), quad_load(d->cover_rest + j));
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);

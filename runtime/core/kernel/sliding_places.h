@@ -5,6 +5,11 @@
 #include "finger_memory.h"
 #include "presliding_step.h"
 
+/* lanes that slide at all times */
+HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
+  return quad_greater(quad_load(f->scratch.slides + slot), quad_set(0.5));
+}
+
 /* the places of one layer, four slots at a time; their shares into scratch where the layer acts */
 HOT_INLINE void advance_layer(tendonfmu_finger* f, const sliding_layer* layer, double step, int first, int acts) {
   const finger_scratch* s = &f->scratch;
@@ -28,7 +33,7 @@ HOT_INLINE void advance_layer(tendonfmu_finger* f, const sliding_layer* layer, d
     presliding_step(&places, share, by_displacement, after);
     quad_store_lanes(to, after);
     if (acts) {
-      quad_store(s->grip + slot, after[PRESLIDING_SHARE]);
+      quad_store(s->grip + slot, quad_select(slides_at(f, slot), after[PRESLIDING_SHARE], quad_set(1.0)));
       quad_store(s->kept + slot, after[PRESLIDING_KEPT]);
     }
   }
