@@ -48,10 +48,15 @@ inline bool is_same_state(const byte_list& a, const byte_list& b) {
 class call_sequence {
  public:
   call_sequence(FuzzedDataProvider& data, const unpacked_fmu& fmu, const unpacked_fmu& other)
-      : data_(data), fmu_(fmu), tried_(fmu), other_(other) {}
+      : data_(data), fmu_(fmu), tried_(fmu), other_(other) {
+    begin(data_.ConsumeIntegralInRange(0, 7));
+  }
   virtual ~call_sequence() = default;
 
   void call() {
+    if (tried_.phase() == PHASE_ERROR && data_.ConsumeIntegralInRange(0, 3)) {
+      go_back();
+    }
     const int kind = data_.ConsumeIntegralInRange(0, 63);
     next_ = nothing;
     without_instance_ = kind == 1;
@@ -77,6 +82,7 @@ class call_sequence {
 
   // --- arguments ---
 
+  bool seldom() { return data_.ConsumeIntegralInRange(0, 3) == 0; }
   bool rarely() { return data_.ConsumeIntegralInRange(0, 15) == 0; }
 
   template <class T>
@@ -136,6 +142,22 @@ class call_sequence {
 
   // --- life cycle ---
 
+  /* Some 1 to 20 samples of a motion with sensible numbers, as far as they are carried out. */
+  answer motion() {
+    without_instance_ = false;
+    const double rate = 10.0 * number(), size = 10.0 * number(), shift = number();
+    std::vector<double> values(fmu_.inputs.element_count());
+    for (int k = data_.ConsumeIntegralInRange(1, 20); k > 0 && tried_.phase() == PHASE_STEP_COMPLETE; --k) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = size * std::sin(rate * tried_.last_end + shift * static_cast<double>(i * i));
+      }
+      tried_.answered(CALL_SET_REAL, version::write(c(), fmu_.inputs.references, values), nothing, {});
+      const double from = tried_.last_end, over = 0.01;
+      tried_.answered(CALL_DO_STEP, stepped(from, over, version::step(c(), from, over)), nothing, {});
+    }
+    return {CALL_GET_FMU_STATE, FMU_OK};
+  }
+
   fmu_status stepped(double point, double length, fmu_status status) {
     if (status == FMU_OK) {
       PROMISE(std::isfinite(point) && std::isfinite(length) && length > 0.0);
@@ -145,8 +167,12 @@ class call_sequence {
   }
 
   template <fmu_phase phase>
-  answer move(fmu_function function, fmu_status status) {
-    next_ = [](instance& i) { i.moved_to(phase); };
+  static void move(instance& i) {
+    i.moved_to(phase);
+  }
+  template <fmu_phase phase>
+  answer moved(fmu_function function, fmu_status status) {
+    next_ = move<phase>;
     return {function, status};
   }
 
@@ -170,7 +196,7 @@ class call_sequence {
     return {CALL_GET_FMU_STATE, FMU_OK};
   }
 
-  answer take_back_kept() { return take_back(kept(), true); }
+  answer take_back_kept() { return take_back(kept_, true); }
   answer take_back_damaged() { return take_back(damaged(), false); }
 
   // blocks and bytes of another FMU, no block at all, and sizes that do not fit
@@ -193,6 +219,28 @@ class call_sequence {
   instance tried_;
 
  private:
+  /* mostly in Step Mode, since calls that are refused keep a sequence from getting there */
+  void begin(int how_far) {
+    if (how_far > 0) {
+      const fmu_status entered = version::enter_initialisation(c());
+      PROMISE(entered == FMU_OK);
+      tried_.answered(CALL_ENTER_INITIALIZATION_MODE, entered, move<PHASE_INITIALISATION>, {});
+    }
+    if (how_far > 1) {
+      const fmu_status left = version::exit_initialisation(c());
+      PROMISE(left == FMU_OK);
+      tried_.answered(CALL_EXIT_INITIALIZATION_MODE, left, move<PHASE_STEP_COMPLETE>, {});
+    }
+    keep();
+  }
+
+  /* to the state kept last, whatever was refused */
+  void go_back() {
+    const auto [function, status] = take_back_kept();
+    PROMISE(status == FMU_OK);
+    tried_.answered(function, status, nothing, {});
+  }
+
   fmu_status refused_state(void* state, void* own, const byte_list& bytes, std::size_t size) {
     const std::size_t wrong_size = size + (data_.ConsumeBool() ? 1 : -1) * data_.ConsumeIntegralInRange(1, 40);
     byte_list room(std::max(wrong_size, bytes.size()));
@@ -216,18 +264,10 @@ class call_sequence {
     }
   }
 
-  /* the present state where none was kept before */
-  const byte_list& kept() {
-    if (kept_.empty()) {
-      keep();
-    }
-    return kept_;
-  }
-
   // A saved state, with some bytes changed, half the time under a checksum that fits: that of the FMU alone, or the
   // core's inside it as well.
   byte_list damaged() {
-    byte_list bytes = kept();
+    byte_list bytes = kept_;
     for (int i = data_.ConsumeIntegralInRange(1, 4); i > 0; --i) {
       if (data_.ConsumeBool()) {
         bytes[data_.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1)] = data_.ConsumeIntegral<unsigned char>();

@@ -42,8 +42,17 @@ fmu_status serialize(void* component, void* state, unsigned char* bytes, std::si
 fmu_status deserialize(void* component, const unsigned char* bytes, std::size_t size, void** state) {
   return as_status(fmi2DeSerializeFMUstate(component, reinterpret_cast<const fmi2Byte*>(bytes), size, state));
 }
-fmu_status initialise(void* component) {
+fmu_status enter_initialisation(void* component) {
   return as_status(fmi2EnterInitializationMode(component));
+}
+fmu_status exit_initialisation(void* component) {
+  return as_status(fmi2ExitInitializationMode(component));
+}
+fmu_status step(void* component, double from, double over) {
+  return as_status(fmi2DoStep(component, from, over, fmi2False));
+}
+fmu_status write(void* component, const references& which, const std::vector<double>& numbers) {
+  return as_status(fmi2SetReal(component, which.data(), which.size(), numbers.data()));
 }
 fmu_status read(void* component, variable_type type, const references& which, std::vector<double>& numbers) {
   if (type == VARIABLE_REAL) {
@@ -73,10 +82,10 @@ class fmi2_sequence : public calls::call_sequence {
     switch (data_.ConsumeIntegralInRange(0, 19)) {
       case 0: return set_up();
       case 1:
-        return move<PHASE_INITIALISATION>(CALL_ENTER_INITIALIZATION_MODE, as_status(fmi2EnterInitializationMode(c())));
+        return moved<PHASE_INITIALISATION>(CALL_ENTER_INITIALIZATION_MODE, as_status(fmi2EnterInitializationMode(c())));
       case 2:
-        return move<PHASE_STEP_COMPLETE>(CALL_EXIT_INITIALIZATION_MODE, as_status(fmi2ExitInitializationMode(c())));
-      case 3: return rarely() ? end() : step();
+        return moved<PHASE_STEP_COMPLETE>(CALL_EXIT_INITIALIZATION_MODE, as_status(fmi2ExitInitializationMode(c())));
+      case 3: return seldom() ? end() : step();
       case 4: return read();
       case 5: return read_anything();
       case 6: return write_anything();
@@ -91,6 +100,7 @@ class fmi2_sequence : public calls::call_sequence {
       case 15:
       case 16: return write(fmu_.inputs, 10.0);
       case 17: return write(fmu_.parameters, 0.1);
+      case 18: return motion();
       default: return step();
     }
   }
@@ -102,7 +112,7 @@ class fmi2_sequence : public calls::call_sequence {
 
   answer end() {
     if (data_.ConsumeBool()) {
-      return move<PHASE_TERMINATED>(CALL_TERMINATE, as_status(fmi2Terminate(c())));
+      return moved<PHASE_TERMINATED>(CALL_TERMINATE, as_status(fmi2Terminate(c())));
     }
     return reset(as_status(fmi2Reset(c())));
   }

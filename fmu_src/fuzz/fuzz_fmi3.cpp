@@ -53,8 +53,18 @@ fmu_status serialize(void* component, void* state, unsigned char* bytes, std::si
 fmu_status deserialize(void* component, const unsigned char* bytes, std::size_t size, void** state) {
   return as_status(fmi3DeserializeFMUState(component, bytes, size, state));
 }
-fmu_status initialise(void* component) {
+fmu_status enter_initialisation(void* component) {
   return as_status(fmi3EnterInitializationMode(component, false, 0.0, 0.0, false, 0.0));
+}
+
+fmu_status exit_initialisation(void* component) {
+  return as_status(fmi3ExitInitializationMode(component));
+}
+fmu_status step(void* component, double from, double over) {
+  return as_status(fmi3DoStep(component, from, over, false, nullptr, nullptr, nullptr, nullptr));
+}
+fmu_status write(void* component, const references& which, const std::vector<double>& numbers) {
+  return as_status(fmi3SetFloat64(component, which.data(), which.size(), numbers.data(), numbers.size()));
 }
 
 template <class T, class Function>
@@ -87,12 +97,12 @@ class fmi3_sequence : public calls::call_sequence {
  private:
   answer one_call() override {
     switch (data_.ConsumeIntegralInRange(0, 23)) {
-      case 0:
-      case 1: return enter_initialisation();
+      case 0: return enter_initialisation();
+      case 1:
+        return moved<PHASE_STEP_COMPLETE>(CALL_EXIT_INITIALIZATION_MODE, as_status(fmi3ExitInitializationMode(c())));
       case 2:
-      case 3:
-        return move<PHASE_STEP_COMPLETE>(CALL_EXIT_INITIALIZATION_MODE, as_status(fmi3ExitInitializationMode(c())));
-      case 4: return rarely() ? end() : step();
+      case 3: return motion();
+      case 4: return seldom() ? end() : step();
       case 5: return read();
       case 6: return read_anything();
       case 7: return write_anything();
@@ -121,12 +131,12 @@ class fmi3_sequence : public calls::call_sequence {
     if (status == fmi3OK) {
       tried_.last_end = start;
     }
-    return move<PHASE_INITIALISATION>(CALL_ENTER_INITIALIZATION_MODE, as_status(status));
+    return moved<PHASE_INITIALISATION>(CALL_ENTER_INITIALIZATION_MODE, as_status(status));
   }
 
   answer end() {
     if (data_.ConsumeBool()) {
-      return move<PHASE_TERMINATED>(CALL_TERMINATE, as_status(fmi3Terminate(c())));
+      return moved<PHASE_TERMINATED>(CALL_TERMINATE, as_status(fmi3Terminate(c())));
     }
     return reset(as_status(fmi3Reset(c())));
   }

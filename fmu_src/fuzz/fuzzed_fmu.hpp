@@ -51,10 +51,13 @@ fmu_status free_state(void* component, void** state);
 fmu_status serialized_size(void* component, void* state, std::size_t* size);
 fmu_status serialize(void* component, void* state, unsigned char* bytes, std::size_t size);
 fmu_status deserialize(void* component, const unsigned char* bytes, std::size_t size, void** state);
-/* an instance in which outputs can be read */
-fmu_status initialise(void* component);
+/* from time 0, without an end */
+fmu_status enter_initialisation(void* component);
+fmu_status exit_initialisation(void* component);
 /* numbers of the variables, Booleans as 0 and 1 */
 fmu_status read(void* component, variable_type type, const references& which, std::vector<double>& numbers);
+fmu_status write(void* component, const references& which, const std::vector<double>& numbers);
+fmu_status step(void* component, double from, double over);
 }  // namespace version
 
 /* every message is one printable line */
@@ -92,7 +95,7 @@ class unpacked_fmu {
   void find_variables() {
     void* const c = version::instantiate(*this);
     PROMISE(c != nullptr);
-    PROMISE(version::initialise(c) == FMU_OK);
+    PROMISE(version::enter_initialisation(c) == FMU_OK);
     for (const variable_group& group : variable_groups) {
       for (unsigned vr = group.base; vr < group.base + most_elements && find(c, group, vr) && !group_is_done(group);) {
         ++vr;
