@@ -172,6 +172,14 @@ def test_what_there_is_not_is_refused_by_name(small_fmu3: UnpackedFmu3, name: st
     assert function(*[None] * 7) == ERROR
 
 
+def test_no_instance_is_an_error_and_no_crash(small_fmu3: UnpackedFmu3) -> None:
+    with brought_to(small_fmu3, "Step Mode") as instance:
+        for name in TABLE:
+            function = getattr(small_fmu3.library, f"fmi3{name}")
+            assert function(None, *good_arguments(instance, name)) == ERROR, name
+    small_fmu3.library.fmi3FreeInstance(None)
+
+
 def test_after_an_error_only_reset_or_a_saved_state_lead_on(small_fmu3: UnpackedFmu3) -> None:
     with brought_to(small_fmu3, "Step Mode") as instance:
         good = instance.save()

@@ -158,7 +158,7 @@ static int filter_is_sound(const tendonfmu_finger* f, const unsigned char* state
   const size_t n = f->joint_lanes;
   for (size_t row = 0; f->derived.settings.filters_position && row < FILTER_ROWS; ++row) {
     const int variance = row == FILTER_P00 || row == FILTER_P11 || row == FILTER_P22, flag = row == FILTER_CARRIES;
-    const int estimate = row <= FILTER_HELD_ANGLE || flag;
+    const int estimate = row <= FILTER_HELD_ANGLE; /* the rest is tracked in spare lanes, too */
     const row_rule rule = {f->remembered.filter + row * n, n,    ROW_OF_JOINTS, variance || flag ? 0.0 : -DBL_MAX,
                            flag ? 1.0 : DBL_MAX,           flag, !estimate};
     if (!row_is_sound(f, state, &rule)) {

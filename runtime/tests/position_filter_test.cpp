@@ -216,20 +216,24 @@ TEST(PositionFilter, TakesAnySteps) {
   }
 }
 
-// a sample that is refused is forgotten, and a saved state goes on to the last bit
+// a sample that is refused is forgotten, and a saved state goes on to the last bit, that of the sample after a gap too
 TEST(PositionFilter, IsPartOfTheState) {
-  Filtered one, other;
-  const double wrong = std::numeric_limits<double>::quiet_NaN();
-  for (int k = 0; k < 60; ++k) {
-    one.step(0.004 * k, 0.1 * std::sin(0.1 * k));
-  }
-  EXPECT_EQ(take(one.finger(), 0.24, wrong), TENDONFMU_BAD_SAMPLE);
-  const auto state = one.finger().saved();
-  ASSERT_EQ(tendonfmu_restore_state(other.finger(), state.data(), state.size()), TENDONFMU_OK);
-  for (int k = 60; k < 120; ++k) {
-    const Said a = one.step(0.004 * k, 0.1 * std::sin(0.1 * k)), b = other.step(0.004 * k, 0.1 * std::sin(0.1 * k));
-    EXPECT_EQ(a.speed, b.speed);
-    EXPECT_EQ(a.torque, b.torque);
+  for (const double gap : {0.0, 2.0}) {
+    SCOPED_TRACE(gap);
+    Filtered one, other;
+    const double wrong = std::numeric_limits<double>::quiet_NaN();
+    const auto time = [gap](int k) { return 0.004 * k + (k < 59 ? 0.0 : gap); };
+    for (int k = 0; k < 60; ++k) {
+      one.step(time(k), 0.1 * std::sin(0.1 * k));
+    }
+    EXPECT_EQ(take(one.finger(), time(60), wrong), TENDONFMU_BAD_SAMPLE);
+    const auto state = one.finger().saved();
+    ASSERT_EQ(tendonfmu_restore_state(other.finger(), state.data(), state.size()), TENDONFMU_OK);
+    for (int k = 60; k < 120; ++k) {
+      const Said a = one.step(time(k), 0.1 * std::sin(0.1 * k)), b = other.step(time(k), 0.1 * std::sin(0.1 * k));
+      EXPECT_EQ(a.speed, b.speed);
+      EXPECT_EQ(a.torque, b.torque);
+    }
   }
 }
 
