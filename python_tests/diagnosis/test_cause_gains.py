@@ -69,8 +69,10 @@ def test_a_shape_says_which_law_of_a_place_it_is_of(shape: dict[str, float], law
 
 
 def in_nominal(data: Any, effect: Accepted) -> bool:
+    made = whole._Result.__new__(whole._Result)
     search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
-    return whole._Result._is_in_nominal(cast("Any", SimpleNamespace(_found=search)), effect)
+    made._found = cast("Any", search)
+    return made._is_in_nominal(effect)
 
 
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:

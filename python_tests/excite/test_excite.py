@@ -357,7 +357,7 @@ def test_bad_rigs_are_refused(tmp_path: Path) -> None:
     limit = {"limits": {"lower": 0.4, "upper": -0.5}}
     with pytest.raises(InputError, match=r"links\[1\]\.limits: 0.4 to -0.5 rad"):
         read_subject(write_rig(tmp_path, SMALL, [limit, limit]))
-    with pytest.raises(InputError, match="1 links; expected one per joint, 2"):
+    with pytest.raises(InputError, match="1 link; expected one per joint, 2"):
         read_subject(write_rig(tmp_path, SMALL, [limit]))
     with pytest.raises(InputError, match=r"finger: .*format"):
         read_subject(write_rig(tmp_path, {}, [limit]))
