@@ -112,8 +112,8 @@ typedef struct effect_type {
   place_rule rule;
   int once;   /* 1: at most once a place */
   int yields; /* 1: a row without a place leaves a place to the row that names it, and needs both thresholds above 0 */
-  int slides; /* 1: of friction, where it never sticks: its memory is that of presliding_step.h, which the kernels advance
-                 four places at a time in place of advance() */
+  int slides; /* 1: of friction, where it never sticks: its memory is that of presliding_step.h, which the kernels
+                 advance four places at a time in place of advance() */
   uint32_t parameter_count;
   const effect_parameter* parameters;
 
