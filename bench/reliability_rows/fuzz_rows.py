@@ -61,7 +61,7 @@ def calls(run: Run) -> Outcome:
         findings += [found] if found else []
     number = (
         f"{spoken(tried['2'])} sequences of FMI 2.0 calls and {spoken(tried['3'])} of FMI 3.0 calls, up to 150 bytes "
-        "(some 50 calls) (libFuzzer, ASan, UBSan, leaks)"
+        "(some 25 calls, 6 of them steps) (libFuzzer, ASan, UBSan, leaks)"
     )
     result = "0 crashes, hangs, leaks; each call that is refused, or only asks, left no byte of the state changed"
     return Outcome(number, "; ".join(findings) or result, not findings)
