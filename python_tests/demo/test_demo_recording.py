@@ -235,6 +235,7 @@ def hidden_rig() -> Iterator[Any]:
     sys.path[:] = path
 
 
+@pytest.mark.long
 def test_the_two_joint_finger_is_what_its_rig_gives(hidden_rig: Any) -> None:
     """Description, label and both recordings; one percent less of what is hidden shows in these."""
     hand, label = hidden_rig.true_hand()

@@ -64,6 +64,7 @@ def test_nothing_is_named_where_nothing_has_changed(how: How) -> None:
     assert found.references == ("then.parquet",) and found.recordings == ("now.parquet",)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_is_wrong_in_both_is_not_blamed() -> None:
     """A torque that no effect describes, as large as half of the friction. The model errs by it in both recordings."""
@@ -179,6 +180,7 @@ def test_order_and_seed_do_not_matter() -> None:
 # --- unseen recordings ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("test", "named"), repeated([(DRIER, ["joint_friction"]), (WELL, [])], 1), ids=["drier", "well"]
 )

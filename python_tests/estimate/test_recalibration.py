@@ -100,6 +100,7 @@ def test_standard_errors_cover_the_truth(coloured_fits: dict[Any, list[FrictionF
     assert spread[False] > 2.2
 
 
+@pytest.mark.long
 def test_the_interval_of_the_nis_knows_of_the_colour(coloured_fits: dict[Any, list[FrictionFit]]) -> None:
     wide, narrow = (
         np.diff(coloured_fits["batch", effective][0].report_["innovations"]["nis"]["interval"])[0]

@@ -322,6 +322,7 @@ def control_loop(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return build / "control_loop"
 
 
+@pytest.mark.long
 def test_the_ros2_example_is_built_and_tested_without_ros(prefix: Path, tmp_path: Path) -> None:
     """Where ROS 2 is sourced, the node is built as well."""
     source = ROOT / "examples" / "ros2_contact_node"

@@ -395,6 +395,7 @@ def test_the_tables_hold_the_numbers(page: str) -> None:
     assert "estimated from signals smoothed at 19.6 Hz, without lag" in text
 
 
+@pytest.mark.long
 def test_the_page_needs_no_plotting_library() -> None:
     """It takes longer to load than all that is drawn; of Plotly, the page takes the file for browsers."""
     code = (

@@ -97,6 +97,7 @@ def test_the_loops_tell_what_the_page_says(loops: LoopFigure) -> None:
         assert np.abs(loop.model - loop.rig).max() > 1.5 * size
 
 
+@pytest.mark.long
 @needs_plant
 def test_the_models_jumps_are_drawn_once(loops: LoopFigure, presliding: PreslidingFigure) -> None:
     """Where the joint stands the model's torque jumps with each trembling of the velocity; its line has one jump at

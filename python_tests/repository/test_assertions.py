@@ -62,6 +62,7 @@ def without_assertion(trees: Mapping[Path, ast.Module]) -> list[str]:
     ]
 
 
+@pytest.mark.long
 def test_every_test_asserts() -> None:
     trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(TESTS.rglob("*.py"))}
     assert without_assertion(trees) == []

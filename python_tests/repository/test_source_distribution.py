@@ -15,7 +15,8 @@ import pytest
 
 from repository_paths import ROOT
 
-pytestmark = pytest.mark.xdist_group("source_distribution")  # one worker packs for all of them
+# One worker packs for all of them.
+pytestmark = [pytest.mark.xdist_group("source_distribution"), pytest.mark.long]
 
 # What CMake reads, as shell patterns of git; `:!` leaves out. tools/setup.sh reads the same for its digest.
 NEEDED = (
@@ -51,7 +52,6 @@ def names_in(archive: Path) -> set[str]:
         return {str(PurePosixPath(*PurePosixPath(each.name).parts[1:])) for each in tar.getmembers() if each.isfile()}
 
 
-@pytest.mark.long
 def test_it_holds_what_the_build_needs_and_nothing_else(archive: Path) -> None:
     packed = {name for name in names_in(archive) - {"PKG-INFO"} if not HIDDEN.search(name)}
     # A file that git does not know yet is packed, too: it is no fault of the lists.

@@ -127,6 +127,7 @@ def assert_agreement(folder: Path, rig: dict[str, Any], what: str) -> None:
         assert any(re.search(line, refused) for line in BEYOND_THE_SCHEMA.values()), f"{what}: {refused}"
 
 
+@pytest.mark.long
 @needs_plant
 @pytest.mark.parametrize("every", repeated([5, 1], 0))
 def test_schema_and_readers_agree_on_changed_values(tmp_path: Path, every: int) -> None:
