@@ -124,6 +124,7 @@ def test_standard_errors_are_those_of_the_numbers() -> None:
     np.testing.assert_allclose(learner.standard_errors(), expected, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_several_recordings_each_with_its_own_bias() -> None:
     description = lasting_finger()
     pair = Pair(description, groups(description, few_unknowns), drift=1e-4)

@@ -96,6 +96,7 @@ def index_report() -> dict[str, Any]:
     return report(excite(subject, ranges, Plan(as_array(ranges))), "tendonfmu excite")
 
 
+@pytest.mark.long
 def test_index_finger_counts(index_report: dict[str, Any]) -> None:
     """Antagonists and effects in a row share their velocity, so most numbers show in combinations only."""
     assert index_report["numbers"] == 468
@@ -108,6 +109,7 @@ def test_index_finger_counts(index_report: dict[str, Any]) -> None:
         assert bool(entry["in_combination_with"]) == (entry["cause"] == "combination")
 
 
+@pytest.mark.long
 def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
     entry = next(e for e in index_report["parameters"] if e["path"] == "tendons[5].pulley_friction[2].coulomb")
     assert entry["cause"] == "combination"
@@ -115,6 +117,7 @@ def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
     assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
 
 
+@pytest.mark.long
 @pytest.mark.long
 def test_varied_tensions_tell_more_apart(index_report: dict[str, Any]) -> None:
     """At the same mean force, the same strokes and the same number of them."""

@@ -202,6 +202,7 @@ def arguments_of(fmu: UnpackedFmu, samples: Path) -> list[str | Path]:
     return ["linked", fmu.guid, (fmu.folder / "resources").as_uri(), samples]
 
 
+@pytest.mark.long
 @needs_tools
 @pytest.mark.slow
 def test_a_prefix_is_before_every_name(fingers: list[UnpackedFmu], tmp_path: Path) -> None:

@@ -247,6 +247,7 @@ def recording_of(data: dict[str, Any], pretension: float, seed: int) -> dict[str
     return table
 
 
+@pytest.mark.long
 def test_the_command_writes_it(tmp_path: Path) -> None:
     """A real fit, with the two recordings of figs. 6 and 7: training, and four times the pretension."""
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is built without the estimation")

@@ -113,6 +113,7 @@ def test_the_models_jumps_are_drawn_once(loops: LoopFigure, presliding: Preslidi
     assert [jumps(loop.model_line[:, 1]) for loop in presliding.reversals] == [1, 1]
 
 
+@pytest.mark.long
 @needs_plant
 def test_the_small_moves_are_numbered_where_they_turn(presliding: PreslidingFigure) -> None:
     """Back and forth by 2 to 21 mrad, as the page says."""

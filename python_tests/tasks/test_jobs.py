@@ -141,6 +141,7 @@ def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) ->
     assert rows["1"].startswith("KilledWorker") and rows["0"] == "" and rows["2"] == ""
 
 
+@pytest.mark.long
 def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
