@@ -118,7 +118,6 @@ def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.long
 def test_varied_tensions_tell_more_apart(index_report: dict[str, Any]) -> None:
     """At the same mean force, the same strokes and the same number of them."""
     subject = read_subject(INDEX)
