@@ -459,7 +459,7 @@ def test_what_was_stopped_in_the_first_pass_can_be_read_again(cost: float, tmp_p
 
 
 def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:
-    """Long enough for passes of more than the 50 ms after which progress is told."""
+    """Long enough that a pass takes over 50 ms: `fit` reports progress that often."""
     recording = [made_recording(duration=40.0)] * 4
     whole = shared(moved_start(), threads=1).fit(recording)
 

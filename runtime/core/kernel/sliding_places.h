@@ -39,7 +39,7 @@ HOT_INLINE void advance_layer(tendonfmu_finger* f, const sliding_layer* layer, d
   }
 }
 
-/* before what sticks and what slides is told apart; the kinematics are known */
+/* Needs the kinematics of the sample; the friction values need its result. */
 HOT_INLINE void advance_sliding_places(tendonfmu_finger* f, double step, int first) {
   if (f->extensions.sliding) {
     advance_layer(f, &f->extensions.acting, step, first, 1);
