@@ -19,12 +19,14 @@ from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.search import NamedCause, Search
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
+from tendonfmu.diagnosis.sliding import settled, without_stuck
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, gain_interval
 
 Data = Mapping[str, Any]
 Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Parameters = Mapping[str, tuple[float, str]]
 
 
@@ -48,6 +50,8 @@ class Verified:
         Descriptions as they run online.
     extended
         Extended description with the settings for estimation.
+    fits_sliding
+        Whether its numbers were fitted only where everything slides.
     """
 
     causes: tuple[NamedCause, ...]
@@ -59,6 +63,7 @@ class Verified:
     nominal_data: Data
     extended_data: Data
     extended: Data
+    fits_sliding: bool
 
 
 def verify(
@@ -72,7 +77,8 @@ def verify(
 ) -> Verified:
     """Measure the gain of each cause on unseen data and drop the weak ones.
 
-    `training` and `tests` are as measured. Without tests, the held-out parts of `training` are judged.
+    `training` and `tests` are as measured. Without tests, the held-out parts of `training` are judged. If the search
+    was in samples in which everything slides, so is this judgement; only the gain of all causes is that of all samples.
     """
     bench = _Bench(given, found, training, tests, settings, seed)
     causes, dropped = merged(found.causes), []
@@ -86,7 +92,7 @@ def verify(
             for k, gain in enumerate(gains)
             if not (gain.low > 0.0 and gain.value >= least_gain * names[k] and bench.runs_better(fit, without[k]))
         ]
-        if not weak and causes and not (bench.runs_better(fit, bench.nominal) and bench.holds(fit)):
+        if not weak and causes and not bench.is_sound(causes):
             weak = list(range(len(causes)))  # each corrects what another one spoils
         if not weak:
             break
@@ -95,8 +101,8 @@ def verify(
         causes = [*causes[:worst], *causes[worst + 1 :]]
     order = sorted(range(len(causes)), key=lambda k: -gains[k].value)
     ranked = [causes[k] for k in order]
-    between = [bench.online(bench.fit(ranked[: k + 1])) for k in range(len(ranked) - 1)]
-    nominal = bench.online(bench.nominal)
+    between = [bench.online(bench.result(ranked[: k + 1])) for k in range(len(ranked) - 1)]
+    fit, nominal = bench.result(causes), bench.online(bench.nominal)
     extended = bench.online(fit) if causes else nominal
     return Verified(
         causes=tuple(ranked),
@@ -108,7 +114,13 @@ def verify(
         nominal_data=nominal,
         extended_data=extended,
         extended=fit.data,
+        fits_sliding=bench.fits_sliding,
     )
+
+
+def _square(data: Data, recordings: Sequence[tuple[FitRecording, Flags]]) -> float:
+    """Return Σ r² over the flagged samples [N] of recordings, (N·m)²."""
+    return sum(float(np.nansum(residual_of(data, each)[flags] ** 2)) for each, flags in recordings)
 
 
 def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
@@ -174,32 +186,62 @@ class _Bench:
     ) -> None:
         self._given, self._found, self._settings, self._seed = given, found, settings, seed
         self._training, self._tests = training, tests
-        self._fits: dict[frozenset[int], FittedModel] = {}
+        self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
         self._signals = found.estimation.signals
-        self.nominal, self._fit_to = found.nominal, list(found.fitted_to)
+        self.nominal, self._fit_to, self._everything = found.nominal, list(found.fitted_to), list(found.everything)
         if tests:  # the search has fitted to the same samples
             for count, model in enumerate(found.models):
                 known = [each for cause in found.causes[:count] for each in cause.accepted]
-                self._fits[frozenset(map(id, known))] = model
+                self._fits[frozenset(map(id, known)), found.only_sliding] = model
         else:
             self._hold_out()
+        self.fits_sliding = found.only_sliding
 
     def _hold_out(self) -> None:
         """Exclude the judged samples from the fits."""
         finger = replace(self._given, data=self._signals.description(self._given.data))
         own = estimation_recordings(finger, self._training, self._signals)
-        self._fit_to = [
-            replace(clean, train=clean.train & each.train) for clean, each in zip(self._fit_to, own, strict=True)
-        ]
-        self.nominal = fitted(self.nominal.data, self._fit_to, self._settings, given=self.nominal.given)
+        self._fit_to, self._everything = (
+            [replace(clean, train=clean.train & each.train) for clean, each in zip(seen, own, strict=True)]
+            for seen in (self._fit_to, self._everything)
+        )
+        self.nominal = fitted(self.nominal.data, self._everything, self._settings, given=self.nominal.given)
 
     def fit(self, causes: Sequence[NamedCause]) -> FittedModel:
+        """Return the fit that causes are judged by."""
+        return self._fit(causes, self._found.only_sliding)
+
+    def result(self, causes: Sequence[NamedCause]) -> FittedModel:
+        """Return the fit that becomes the extended model."""
+        found = self._fit(causes, self.fits_sliding)
+        return settled(found, self._trained) if self.fits_sliding else found
+
+    def _trained(self, data: Data) -> float:
+        """Return Σ r² over all samples that are fitted to, (N·m)²."""
+        return _square(self._found.estimation.online(data), [(each, each.train) for each in self._training])
+
+    def is_sound(self, causes: Sequence[NamedCause]) -> bool:
+        """Return whether all causes together run better than the nominal model.
+
+        If that is not so with numbers fitted where everything slides, they are fitted to all samples: a compromise, but
+        it runs better where something is stuck.
+        """
+        fit = self.result(causes)
+        if self.runs_better(fit, self.nominal) and self.holds(fit):
+            return True
+        if not self.fits_sliding:
+            return False
+        self.fits_sliding = False
+        return self.holds(self.result(causes))
+
+    def _fit(self, causes: Sequence[NamedCause], sliding: bool) -> FittedModel:
         accepted = [each for cause in causes for each in cause.accepted]
-        key = frozenset(map(id, accepted))
+        key = frozenset(map(id, accepted)), sliding
         if key not in self._fits:
-            known = self._found.causes
-            fit_to = self._predicted if accepted and known else self._fit_to
+            fit_to = self._fit_to if sliding else self._everything
+            if accepted and self._found.causes:
+                fit_to = [replace(clean, train=each.train) for clean, each in zip(self._predicted, fit_to, strict=True)]
             self._fits[key] = fit_extended(self.nominal, accepted, fit_to, self._settings)
         return self._fits[key]
 
@@ -208,8 +250,7 @@ class _Bench:
         """Return the recordings with the forces that the model of all causes predicts."""
         extended, estimation = self._found.extended.data, self._found.estimation
         series = series_of(extended, estimation.recordings, estimation.grid, self._found.out)
-        predicted = predicted_of(extended, estimation.recordings, estimation.grid, series)
-        return [replace(clean, train=each.train) for clean, each in zip(predicted, self._fit_to, strict=True)]
+        return predicted_of(extended, estimation.recordings, estimation.grid, series)
 
     def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
         after = self._error(model)
@@ -222,15 +263,13 @@ class _Bench:
     def holds(self, model: FittedModel) -> bool:
         """Return whether the model leaves no more of r than the nominal one where neither was fitted.
 
-        Of short recordings that is little, but it is what the report's gain is measured on.
+        Of short recordings that is little, but it is what the report's gain is measured on. Samples in which something
+        is stuck count here, too.
         """
-        if self._tests:
+        if self._tests and not self._found.only_sliding:
             return True  # `runs_better` has judged the same samples
-
-        def square(data: Data) -> float:
-            return sum(float(np.nansum(residual_of(data, each)[each.held_out] ** 2)) for each in self._training)
-
-        return square(self.online(model)) <= square(self.online(self.nominal))
+        judged = [(each, each.train) for each in self._tests] or [(each, each.held_out) for each in self._training]
+        return _square(self.online(model), judged) <= _square(self.online(self.nominal), judged)
 
     def _error(self, model: FittedModel) -> Numbers:
         """Return Σ e² by stretch on unseen data [K].
@@ -252,6 +291,8 @@ class _Bench:
     def _unseen(self) -> OnlineError:
         """Return the errors of models that run online; of the training recordings, all free motion counts."""
         judged = self._tests or [replace(each, train=each.train | each.held_out) for each in self._training]
+        if self._found.only_sliding:
+            judged = without_stuck(self._given, judged, self._signals)
         return OnlineError(self.online(self.nominal), judged)
 
     def online(self, model: FittedModel) -> dict[str, Any]:

@@ -22,7 +22,6 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.cause_selection import CERTAIN
 from tendonfmu.diagnosis.changes.check import check_sides
 from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
 from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
@@ -43,6 +42,7 @@ from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.size import size_of
 from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.unexplained import unexplained_of
 from tendonfmu.diagnosis.unseen_effects import unseen_effects
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate import check_unseen
@@ -59,7 +59,7 @@ from tendonfmu.recordings import (
     read_recordings,
     require_noise,
 )
-from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH, Interval, standard_error
+from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 from tendonfmu.tasks import Phases, PhaseState
 
 Numbers = NDArray[np.float64]
@@ -146,7 +146,7 @@ def diagnose(
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all input has been checked and fitted once
-            found = search(case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
+            found = search(case.finger, case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
             result = _Result(case, found, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
@@ -254,7 +254,7 @@ class _Result:
             left = self._left(verified.extended)
             before = found.first.residual
             remainder = self._remainder(left)
-            unexplained = self._unexplained(remainder, left)
+            unexplained = self._unexplained(remainder, left, verified.extended)
         experiments, invisible = self._experiments(verified)
         gain = verified.gain
         share = np.array(unexplained.by_joint)
@@ -294,15 +294,29 @@ class _Result:
             else None,
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
-            warnings=(*case.warnings, *self._warnings()),
+            warnings=(*case.warnings, *self._warnings(verified)),
             tested=len({each.key for each in found.last.selection.hypotheses}),
             event_gain=event_gain(verified.extended_data, case.whole, found.events),
             smoothing=found.estimation.signals,
         )
 
-    def _warnings(self) -> list[str]:
+    def _warnings(self, verified: Verified) -> list[str]:
         folds = self._found.first.folds
         found = list(self._found.extended.warnings)
+        if self._found.only_sliding:
+            sliding, everything = (
+                sum(int(each.train.sum()) for each in seen) for seen in (self._found.fitted_to, self._found.everything)
+            )
+            fitted = (
+                "numbers are fitted, and causes and their gains judged,"
+                if verified.fits_sliding
+                else "causes and their gains are judged"
+            )
+            found.append(
+                f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples; friction there is "
+                f"whatever balances the load, and misleads a fit: {fitted} where everything slides; the gain of all "
+                "causes together counts all samples"
+            )
         if not folds.enough:
             found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
         elif folds.folds < 8:
@@ -368,21 +382,14 @@ class _Result:
         ]
         return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
-    def _unexplained(self, left: Remainder, residual: Numbers) -> Unexplained:
-        """Return the share of the remaining variance that unseen stretches show to be no noise.
-
-        It is unknown if correcting it would be material.
-        """
-        variance = np.mean(residual[self._series.used] ** 2, axis=0)
-        shares = np.clip(np.array(left.share), 0.0, 1.0)
-        whole = float(variance.sum())
-        share = float(shares @ variance) / whole if whole > 0 else 0.0
-        square = float(left.square.sum())
-        half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0 else 0.0
-        gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(each, 1.0))) for each in (share, share - half, share + half)))
-        unknown = left.unknown and gain.value >= self._least_gain and gain.low > 0.0
-        description = left.description if unknown else ""
-        return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)
+    def _unexplained(self, remainder: Remainder, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
+        found = self._found
+        looked_at = np.sum(left[self._series.used] ** 2, axis=0)
+        if not found.only_sliding:
+            return unexplained_of(remainder, looked_at, looked_at, self._least_gain)
+        series = series_of(extended, found.everything, found.estimation.grid)
+        everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
+        return unexplained_of(remainder, looked_at, everything, self._least_gain)
 
     def _torque(self) -> Numbers:
         """Return the torque to be explained, N·m [B, n]."""

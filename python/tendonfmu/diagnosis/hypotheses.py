@@ -36,6 +36,7 @@ SHARED = (
 # Corrections of the torque itself: a large one shrinks the torque, and with it everything that is left of it.
 SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
 LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
+LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
 LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
 LARGEST_SECANT = 3.0  # times the step that its column was computed with; the column is not valid beyond
 
@@ -108,6 +109,8 @@ def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers, reach: 
         if name == "moment_arm_variation" and place.joint is not None:
             largest /= max(float(reach[place.joint - 1]), 1e-9)
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
+    if name == "friction_drift":
+        high = np.minimum(high, LARGEST_DRIFT)
     level = EVERYWHERE if place == Place() else HERE
     member = Member(proposal, shape, (1.0,) * size)
     least = LEAST_OF_FAST if shape.shape.get("turns", 1.0) != 1.0 else 0.0

@@ -21,7 +21,6 @@ from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place
 from tendonfmu.diagnosis.effects.presliding import is_spring
 from tendonfmu.diagnosis.extension_fit import (
     Accepted,
-    FitSettings,
     FittedModel,
     extended_description,
     fit_extended,
@@ -33,9 +32,10 @@ from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.signal_choice import Estimation
+from tendonfmu.diagnosis.sliding import sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import presliding_everywhere
-from tendonfmu.model import extended_row
+from tendonfmu.model import Finger, extended_row
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
@@ -115,6 +115,10 @@ class Search:
         Blocks that lie in events [B].
     fitted_to
         Recordings with the forces that the model predicts, without events.
+    everything
+        The same with the samples in which something is stuck.
+    only_sliding
+        Whether these are left out, because they would mislead (`sliding.py`).
     """
 
     estimation: Estimation
@@ -128,6 +132,8 @@ class Search:
     events: tuple[Event, ...]
     out: Flags
     fitted_to: Sequence[FitRecording]
+    everything: Sequence[FitRecording]
+    only_sliding: bool
 
 
 def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
@@ -144,6 +150,7 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 
 
 def search(
+    given: Finger,
     recordings: Sequence[FitRecording],
     chosen: Estimation,
     *,
@@ -155,36 +162,85 @@ def search(
 
     `recordings` are as measured; their `train` says where to look. `chosen` holds what is estimated from.
     """
-    settings = chosen.settings
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
-    nominal = chosen.nominal
-    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
-    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
-    nominal = fitted(nominal.data, clean, settings, given=nominal.given)
-    touched = chosen.recordings  # still including the events
-    chosen = replace(chosen, nominal=nominal, recordings=own)
-    online = OnlineError(chosen.online(nominal.data), [without_events(each, events) for each in recordings])
+    measured = [without_events(each, events) for each in recordings]
+    own, clean = _without_blocks(chosen, out)
     with phases.start("causes", MOST_CAUSES) as step:
-        rounds = _Rounds(chosen, out, online, least_gain, settings)
-        rounds.run(step)
+        found = _searched(given, own, clean, measured, out, least_gain, step)
+    rounds, only_sliding = found.rounds, found.clean is not clean
+    models = [own.nominal, *rounds.models[1:]]
     if events:
         # drop events that the causes explain
-        left, _ = events_of(rounds.models[-1].data, touched, chosen.grid, seed)
+        left, _ = events_of(models[-1].data, chosen.recordings, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
-        estimation=chosen,
-        nominal=nominal,
-        extended=rounds.models[-1],
+        estimation=found.chosen,
+        nominal=models[0],
+        extended=models[-1],
         first=rounds.first,
         last=rounds.view,
         causes=tuple(rounds.causes),
-        models=tuple(rounds.models),
+        models=tuple(models),
         small=(*rounds.refused, *rounds.small()),
         events=events,
         out=out,
-        fitted_to=clean,
+        fitted_to=found.clean,
+        everything=clean,
+        only_sliding=only_sliding,
     )
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """A search that has ended, and the recordings that it was in."""
+
+    rounds: _Rounds
+    chosen: Estimation
+    clean: Sequence[FitRecording]
+
+    @property
+    def model(self) -> FittedModel:
+        return self.rounds.models[-1]
+
+
+def _searched(
+    given: Finger,
+    chosen: Estimation,
+    clean: Sequence[FitRecording],
+    measured: Sequence[FitRecording],
+    out: Flags,
+    least_gain: float,
+    step: Step,
+) -> _Searched:
+    """Search in all samples; if those in which something is stuck mislead the start or the search, without them."""
+
+    def run(own: Estimation, predicted: Sequence[FitRecording], judged: Sequence[FitRecording]) -> _Searched:
+        rounds = _Rounds(own, out, OnlineError(own.online(own.nominal.data), judged), least_gain)
+        rounds.run(step)
+        return _Searched(rounds, own, predicted)
+
+    alone = sliding_alone(given, measured, chosen, chosen.model)
+    if alone is not None and alone.is_better(alone.estimation.model, chosen.model):
+        return run(*_without_blocks(alone.estimation, out), alone.measured)
+    whole = run(chosen, clean, measured)
+    alone = sliding_alone(given, measured, chosen, whole.model)
+    if alone is None:
+        return whole
+    found = run(*_without_blocks(alone.estimation, out), alone.measured)
+    return found if alone.is_better(found.model, whole.model) else whole
+
+
+def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:
+    """Return an estimation without some blocks [B], and its recordings with the forces that its nominal model predicts.
+
+    The nominal model is fitted to these.
+    """
+    nominal = chosen.nominal
+    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
+    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
+    nominal = fitted(nominal.data, clean, chosen.settings, given=nominal.given)
+    return replace(chosen, nominal=nominal, recordings=own), clean
 
 
 def _overlap(one: Event, other: Event) -> bool:
@@ -278,13 +334,12 @@ class _Rounds:
         out: Flags,
         online: OnlineError,
         least_gain: float,
-        settings: FitSettings,
     ) -> None:
         self.causes: list[NamedCause] = []
         self.refused: list[NamedCause] = []
         self.models = [chosen.nominal]
         self._chosen, self._out, self._online = chosen, out, online
-        self._least_gain, self._settings = least_gain, settings
+        self._least_gain, self._settings = least_gain, chosen.settings
         # before the start is fitted, only the residual of the nominal model is needed
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
 

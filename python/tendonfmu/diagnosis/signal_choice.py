@@ -84,12 +84,12 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     """
     smoothing = smoothing_of([each.recording for each in recordings], given.data)
     raw = Signals()
-    part = _part_of(given, recordings)
+    part = part_of(given, recordings)
     if smoothing is None:
-        signals, start = raw, _compared(given, part, raw, settings, None).start
+        signals, start = raw, starting_point(given, part, raw, settings).start
     else:
-        smooth = _compared(given, part, smoothing, settings, None)
-        rough = _compared(given, part, raw, settings, smooth)
+        smooth = starting_point(given, part, smoothing, settings)
+        rough = starting_point(given, part, raw, settings, smooth)
         lags = any(each.kinematics != 3 for each in recordings)
         is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
         signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
@@ -102,7 +102,7 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     return _with_filter(chosen, recordings)
 
 
-def _part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
+def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
     """Return the first seconds of each recording, ENOUGH in total.
 
     Signals and starting point vary little along a recording.
@@ -149,7 +149,7 @@ def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Esti
 
 
 @dataclass(frozen=True)
-class _Compared:
+class Compared:
     """A starting point with certain signals; `error` is the rms on unseen stretches, N·m."""
 
     signals: Signals
@@ -157,13 +157,13 @@ class _Compared:
     error: float
 
 
-def _compared(
+def starting_point(
     given: Finger,
     recordings: Sequence[FitRecording],
     signals: Signals,
     settings: FitSettings,
-    known: _Compared | None,
-) -> _Compared:
+    known: Compared | None = None,
+) -> Compared:
     """Find the starting point with these signals, or take it from `known`, which used other signals."""
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
@@ -184,7 +184,7 @@ def _compared(
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
-        found.append(_Compared(signals, start, _error(model.data, own, grid, cutoff)))
+        found.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
     return min(found, key=lambda each: each.error)
 
 

@@ -1,0 +1,133 @@
+"""Samples in which everything slides, for recordings whose stuck samples would mislead a search.
+
+A law does not say what the friction of a stuck place is: it balances the load, anywhere between the two sides of the
+law. A fit to all samples of a finger that sticks and slips is therefore a compromise, and a cause may be named only
+because it changes the compromise. In MuJoCo fingers that stick for a quarter of the time, four fifths of the squared
+error were in these samples; friction came out a third too large, and "friction that rises from standstill" was named,
+which none of them has. Fitted to the samples that slide, friction was right within 1 % (docs/evidence/diagnosis.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.diagnosis.cause_search import residual_alone, series_of
+from tendonfmu.diagnosis.extension_fit import FittedModel, fit_extended
+from tendonfmu.diagnosis.nominal_fit import fitted
+from tendonfmu.diagnosis.series import Grid
+from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings, part_of, starting_point
+from tendonfmu.model import Finger, effects, sliding_velocity, velocity_threshold
+from tendonfmu.recordings import FitRecording, Signals
+from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
+
+Flags = NDArray[np.bool_]
+
+WORSE = 1.4  # times the error of the samples that slide: a smaller error of stuck ones does not mislead
+TIMES = tuple(
+    0.001 * 2.0**k for k in range(9)
+)  # s, of presliding; a place moves for some 10 to 100 ms around a reversal
+BETTER = 0.7  # of the error of samples that slide, which a fit to them alone must stay below
+
+
+def is_stuck(data: Mapping[str, Any], recording: FitRecording) -> Flags:
+    """Return the samples in which a friction effect that slides at other times is stuck, |v| <= v_min [N]."""
+    found = np.zeros(len(recording.time), dtype=bool)
+    for effect in effects(data):
+        stuck = np.abs(sliding_velocity(data, effect, recording.model.joint_speed)) <= velocity_threshold(data, effect)
+        if not stuck.all():
+            found |= stuck
+    return found
+
+
+def without_stuck(given: Finger, recordings: Sequence[FitRecording], signals: Signals) -> list[FitRecording]:
+    """Return recordings as they were measured, without the samples in which the chosen signals show anything stuck."""
+    finger = replace(given, data=signals.description(given.data))
+    found = []
+    for each, own in zip(recordings, estimation_recordings(finger, recordings, signals), strict=True):
+        at = np.minimum(np.searchsorted(own.time, each.time), len(own.time) - 1)
+        slides = ~is_stuck(finger.data, own)[at]
+        found.append(replace(each, train=each.train & slides, held_out=each.held_out & slides))
+    return found
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Recordings without stuck samples, as they were measured, and what is estimated from them."""
+
+    measured: list[FitRecording]
+    estimation: Estimation
+
+    def is_better(self, alone: FittedModel, model: FittedModel) -> bool:
+        """Return whether stuck samples mislead: a model fitted alone leaves much less here than one fitted to all."""
+        own, grid = self.estimation.recordings, self.estimation.grid
+        return _squares(alone.data, own, grid) < BETTER**2 * _squares(model.data, own, grid)
+
+
+def sliding_alone(
+    given: Finger, recordings: Sequence[FitRecording], chosen: Estimation, model: FittedModel
+) -> Sliding | None:
+    """Return recordings and estimation without stuck samples; None if these leave no larger error than the others.
+
+    Parameters
+    ----------
+    given
+        The description.
+    recordings
+        As they were measured; `train` says which samples are looked at.
+    chosen
+        What is estimated from with the stuck samples.
+    model
+        Fitted to all samples.
+    """
+    free = without_stuck(given, recordings, chosen.signals)
+    if not _enough(free):
+        return None
+    finger = replace(given, data=chosen.signals.description(given.data))
+    own = estimation_recordings(finger, free, chosen.signals)
+    stuck, sliding = (_squares(model.data, each, chosen.grid) for each in (_without(chosen.recordings, own), own))
+    if stuck <= WORSE**2 * sliding:
+        return None
+    start = starting_point(given, part_of(given, free), chosen.signals, chosen.settings).start
+    nominal = fitted(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
+    alone = fit_extended(nominal, start.accepted, own, chosen.settings) if start.causes else nominal
+    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start, model=alone))
+
+
+def settled(model: FittedModel, error: Callable[[Mapping[str, Any]], float]) -> FittedModel:
+    """Choose the time of presliding everywhere, which sliding hardly shows; keep the other numbers.
+
+    `error` of a description counts all samples. It has several minima over the time, which is taken from a grid.
+    """
+    rows = list(model.data.get("extensions") or [])
+    at = [k for k, row in enumerate(rows) if row["effect"] == "presliding" and not {"joint", "tendon"} & {*row}]
+    if not at:
+        return model
+
+    def with_time(time: float) -> dict[str, Any]:
+        return {**model.data, "extensions": [*rows[: at[0]], {**rows[at[0]], "displacement": time}, *rows[at[0] + 1 :]]}
+
+    times = [float(rows[at[0]]["displacement"]), *TIMES]
+    best = min(times, key=lambda time: error(with_time(time)))
+    values = {**model.values, f"extensions[{at[0] + 1}].displacement": best}
+    return replace(model, data=with_time(best), values=values)
+
+
+def _enough(recordings: Sequence[FitRecording]) -> bool:
+    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
+    return found >= FEWEST_STRETCHES * STRETCH
+
+
+def _without(recordings: Sequence[FitRecording], others: Sequence[FitRecording]) -> list[FitRecording]:
+    """Return the recordings without the samples that others of the same times train on."""
+    return [replace(each, train=each.train & ~other.train) for each, other in zip(recordings, others, strict=True)]
+
+
+def _squares(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> float:
+    """Return the mean square that a description leaves, bias removed, (N·m)²; 0 without a block."""
+    series = series_of(data, recordings, grid)
+    return float(np.mean(residual_alone(data, series)[series.used] ** 2)) if series.used.any() else 0.0

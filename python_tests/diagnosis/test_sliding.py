@@ -1,0 +1,127 @@
+"""Fingers that stick and slip: what is stuck says little of the friction, and does not decide what is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
+
+import sticking_finger
+from tendonfmu.diagnosis import search as searching
+from tendonfmu.diagnosis.diagnosis import diagnose
+from tendonfmu.diagnosis.extension_fit import FittedModel
+from tendonfmu.diagnosis.remainder import Remainder
+from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
+from tendonfmu.diagnosis.unexplained import unexplained_of
+
+PHYSICS = {"presliding", "inertia"}  # of any finger; the simulated joint has an inertia
+
+
+def diagnosed(folder: Path, seed: int, weight: float = 0.0) -> Diagnosis:
+    finger, recording = sticking_finger.write(folder, 30.0, seed, weight)
+    return diagnose(finger, [recording], kinematics=2)
+
+
+def friction_of(data: Any) -> float:
+    return sticking_finger.described_friction_at(data, 20.0)
+
+
+# --- which samples ----------------------------------------------------------------------------------------------------
+
+
+def made(speed: list[list[float]]) -> Any:
+    return cast("Any", SimpleNamespace(time=np.arange(len(speed)), model=SimpleNamespace(joint_speed=np.array(speed))))
+
+
+def test_a_sample_is_stuck_if_anything_that_ever_slides_stands_still() -> None:
+    """The tendons begin to move at 0.5 mm/s, 62.5 and 58.8 mrad/s here, the joint at 10 mrad/s."""
+    data = sticking_finger.description()
+    speeds = [0.0, 0.005, -0.02, 0.06, -0.0626, 0.1, -1.0]
+    assert is_stuck(data, made([[each] for each in speeds])).tolist() == [True, True, True, True, False, False, False]
+
+
+def test_what_never_slides_makes_no_sample_stuck() -> None:
+    """A tendon that ends before the second joint never slides there; a joint that is blocked never does, either."""
+    data = sticking_finger.description()
+    law = data["joints"][0]["friction"]
+    data["joints"].append({"name": "blocked", "friction": law})
+    for tendon in data["tendons"]:
+        tendon["moment_arms"].append(0.0)
+        tendon["edge_friction"].append(law)
+    assert is_stuck(data, made([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0]])).tolist() == [True, False, False]
+
+
+# --- the time of presliding -------------------------------------------------------------------------------------------
+
+
+def model(*rows: dict[str, Any]) -> FittedModel:
+    values = {f"extensions[{k}].displacement": row["displacement"] for k, row in enumerate(rows, 1)}
+    return FittedModel(data={"extensions": list(rows)}, given={}, values=values, errors={}, cost=0.0)
+
+
+def test_the_time_of_presliding_is_that_of_the_least_error() -> None:
+    place = {"effect": "presliding", "joint": 1, "displacement": 1e-3}
+    everywhere = {"effect": "presliding", "displacement": 3e-7}
+    best = TIMES[3]
+    found = settled(model(place, everywhere), lambda data: abs(data["extensions"][1]["displacement"] - best))
+    assert found.data["extensions"] == [place, {**everywhere, "displacement": best}]
+    assert found.values == {"extensions[1].displacement": 1e-3, "extensions[2].displacement": best}
+
+
+def test_the_fitted_time_stays_if_no_other_is_better() -> None:
+    everywhere = {"effect": "presliding", "displacement": 0.0053}
+    found = settled(model(everywhere), lambda data: abs(data["extensions"][0]["displacement"] - 0.0053))
+    assert found.data["extensions"] == [everywhere]
+
+
+def test_without_presliding_everywhere_there_is_nothing_to_choose() -> None:
+    given = model({"effect": "presliding", "tendon": 1, "displacement": 1e-3})
+    assert settled(given, lambda data: pytest.fail("no error is needed")) is given
+
+
+# --- what is left -----------------------------------------------------------------------------------------------------
+
+
+def test_what_is_left_is_measured_by_the_error_of_all_samples() -> None:
+    """Half of a residual that holds a hundredth of the squared error: 0.25 % of the rms, which is not material."""
+    gain = np.full((10, 1), 0.05)
+    left = Remainder((0.5,), gain, np.array([1.0]), 1e-9, True, "over the angle", np.zeros((4, 1)), ())
+    alone, all_of_it = (unexplained_of(left, np.array([1.0]), np.array([each]), 0.03) for each in (1.0, 100.0))
+    assert (alone.share, alone.unknown, alone.description) == (0.5, True, "over the angle")
+    assert (all_of_it.share, all_of_it.unknown, all_of_it.description) == (0.005, False, "")
+    assert all_of_it.gain.high == pytest.approx(1.0 - np.sqrt(1.0 - 0.005), rel=1e-9)
+
+
+# --- whole diagnoses --------------------------------------------------------------------------------------------------
+
+
+def test_a_finger_that_sticks_gets_its_true_friction_and_no_false_cause(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, 3)
+    assert any(text.startswith("something is stuck in 2") for text in found.warnings)
+    assert {cause.where.effect for cause in found.causes} <= PHYSICS
+    assert found.gain.low > 0.0
+    true = sticking_finger.friction_at(20.0)
+    assert friction_of(found.extended_data) == pytest.approx(true, rel=0.08)
+    assert friction_of(found.nominal_data) > 1.3 * true  # the given structure, fitted to all samples
+
+
+def test_with_stuck_samples_the_same_finger_gets_a_false_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So the test above tests something."""
+    monkeypatch.setattr(searching, "sliding_alone", lambda *given: None)
+    found = diagnosed(tmp_path, 3)
+    assert {cause.where.effect for cause in found.causes} - PHYSICS == {"stribeck"}
+    assert not any("stuck" in text for text in found.warnings)
+
+
+def test_a_weight_hidden_in_a_finger_that_sticks_is_found_with_its_size(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, 4, weight=0.05)
+    (cause,) = (each for each in found.causes if each.where.effect not in PHYSICS)
+    assert cause.where.effect == "gravity"
+    largest = max(abs(value) for value, _ in cause.parameters.values())
+    assert largest == pytest.approx(0.05, rel=0.2)  # the cover takes a part
