@@ -20,12 +20,14 @@ from tendonfmu.diagnosis.extension_fit import Accepted
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 
 
-def bench(nominal: list[Any], tests: Any = ()) -> Any:
+def bench(nominal: list[Any], tests: Any = (), only_sliding: bool = False) -> Any:
     """A bench without a search. A model is here its residuals [N, n] over each of the recordings."""
     made = cause_gains._Bench.__new__(cause_gains._Bench)
     made._training = cast("Any", [SimpleNamespace(at=k, held_out=held) for k, held in enumerate(HELD_OUT)])
     made._tests, made.nominal = tests, cast("Any", SimpleNamespace(data=nominal))
-    made._found = cast("Any", SimpleNamespace(estimation=SimpleNamespace(online=lambda data: data)))
+    made._found = cast(
+        "Any", SimpleNamespace(estimation=SimpleNamespace(online=lambda data: data), only_sliding=only_sliding)
+    )
     return made
 
 
@@ -56,6 +58,16 @@ def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(
     nominal = residuals(1.0, 1.0, 1.0, elsewhere=1.0)
     assert bench(nominal).holds(SimpleNamespace(data=model)) is holds
     assert bench(nominal, tests=("a recording",)).holds(SimpleNamespace(data=model))  # judged on that one
+
+
+@pytest.mark.parametrize(("worse", "holds"), [(0.0, True), (0.1, False)])
+def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(
+    monkeypatch: pytest.MonkeyPatch, worse: float, holds: bool
+) -> None:
+    monkeypatch.setattr(cause_gains, "residual_of", lambda data, recording: data[recording.at])
+    tests = (SimpleNamespace(at=0, train=np.array([True, False])),)
+    made = bench([np.array([[1.0], [1.0]])], tests, only_sliding=True)
+    assert made.holds(SimpleNamespace(data=[np.array([[1.0 + worse], [9.0]])])) is holds
 
 
 # --- experiments are planned for laws of the nominal description ------------------------------------------------------

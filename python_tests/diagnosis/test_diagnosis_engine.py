@@ -263,7 +263,7 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     given, seen = described(finger()), list[str]()
     chosen = choose(given, [hidden], FitSettings(threads=1))
     phases = Phases(PHASES, lambda state: seen.append(state.words))
-    found = search([hidden], chosen, least_gain=0.03, seed=1, phases=phases)
+    found = search(given, [hidden], chosen, least_gain=0.03, seed=1, phases=phases)
     first = found.causes[0]
     assert ("cover_stiffness", 2, None) in [first.key, *(each.key for each in first.alike)]
     assert len(found.causes) == 1 and len(found.models) == 2
