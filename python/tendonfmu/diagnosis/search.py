@@ -32,7 +32,7 @@ from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.signal_choice import Estimation
-from tendonfmu.diagnosis.sliding import sliding_alone
+from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import presliding_everywhere
 from tendonfmu.model import Finger, extended_row
@@ -213,22 +213,28 @@ def _searched(
     least_gain: float,
     step: Step,
 ) -> _Searched:
-    """Search in all samples; if those in which something is stuck mislead the start or the search, without them."""
+    """Search in all samples, and without those in which something is stuck if these may mislead; return what is better.
 
-    def run(own: Estimation, predicted: Sequence[FitRecording], judged: Sequence[FitRecording]) -> _Searched:
-        rounds = _Rounds(own, out, OnlineError(own.online(own.nominal.data), judged), least_gain)
-        rounds.run(step)
-        return _Searched(rounds, own, predicted)
-
-    alone = sliding_alone(given, measured, chosen, chosen.model)
-    if alone is not None and alone.is_better(alone.estimation.model, chosen.model):
-        return run(*_without_blocks(alone.estimation, out), alone.measured)
-    whole = run(chosen, clean, measured)
+    A model that was fitted without them has to run nearly as well on all samples.
+    """
+    online = OnlineError(chosen.online(chosen.nominal.data), measured)
+    rounds = _Rounds(chosen, out, online, least_gain)
+    rounds.run(step)
+    whole = _Searched(rounds, chosen, clean)
     alone = sliding_alone(given, measured, chosen, whole.model)
     if alone is None:
         return whole
-    found = run(*_without_blocks(alone.estimation, out), alone.measured)
-    return found if alone.is_better(found.model, whole.model) else whole
+    own, predicted = _without_blocks(alone.estimation, out)
+    rounds = _Rounds(own, out, OnlineError(own.online(own.nominal.data), alone.measured), least_gain)
+    rounds.run(step)
+    found = _Searched(rounds, own, predicted)
+
+    def error(data: Mapping[str, Any]) -> float:
+        return online.square(chosen.online(data))
+
+    is_better = alone.is_better(found.model, whole.model)
+    runs = is_better and error(settled(found.model, error).data) < RUNS**2 * error(whole.model.data)
+    return found if runs else whole
 
 
 def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.extension_fit import FittedModel, fit_extended
+from tendonfmu.diagnosis.extension_fit import FittedModel
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings, part_of, starting_point
@@ -31,7 +31,8 @@ WORSE = 1.4  # times the error of the samples that slide: a smaller error of stu
 TIMES = tuple(
     0.001 * 2.0**k for k in range(9)
 )  # s, of presliding; a place moves for some 10 to 100 ms around a reversal
-BETTER = 0.7  # of the error of samples that slide, which a fit to them alone must stay below
+RUNS = 1.3  # times the rms of r over all samples, which the model fitted to the others may have
+BETTER = 0.65  # of the error of samples that slide, which a fit to them alone must stay below
 
 
 def is_stuck(data: Mapping[str, Any], recording: FitRecording) -> Flags:
@@ -57,7 +58,10 @@ def without_stuck(given: Finger, recordings: Sequence[FitRecording], signals: Si
 
 @dataclass(frozen=True)
 class Sliding:
-    """Recordings without stuck samples, as they were measured, and what is estimated from them."""
+    """Recordings without stuck samples, as they were measured, and what is estimated from them.
+
+    The estimation's `model` is still that of all samples.
+    """
 
     measured: list[FitRecording]
     estimation: Estimation
@@ -94,8 +98,7 @@ def sliding_alone(
         return None
     start = starting_point(given, part_of(given, free), chosen.signals, chosen.settings).start
     nominal = fitted(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
-    alone = fit_extended(nominal, start.accepted, own, chosen.settings) if start.causes else nominal
-    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start, model=alone))
+    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start))
 
 
 def settled(model: FittedModel, error: Callable[[Mapping[str, Any]], float]) -> FittedModel:
