@@ -17,13 +17,15 @@ from tendonfmu.diagnosis.gain import Gain, measure_gain, residual_of
 from tendonfmu.diagnosis.hypotheses import Hypothesis
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
-from tendonfmu.diagnosis.search import NamedCause, Search
+from tendonfmu.diagnosis.search import NamedCause, Search, is_shown
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, gain_interval
 
+# Times the least gain where everything slides: what is left there is small, and the form of any law is a part of it.
+STRICTER = 5.0
 Data = Mapping[str, Any]
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -81,6 +83,8 @@ def verify(
     was in samples in which everything slides, so is this judgement; only the gain of all causes is that of all samples.
     """
     bench = _Bench(given, found, training, tests, settings, seed)
+    if found.only_sliding:
+        least_gain *= STRICTER
     causes, dropped = merged(found.causes), []
     while True:
         fit = bench.fit(causes)
@@ -90,7 +94,12 @@ def verify(
         weak = [
             k
             for k, gain in enumerate(gains)
-            if not (gain.low > 0.0 and gain.value >= least_gain * names[k] and bench.runs_better(fit, without[k]))
+            if not (
+                gain.low > 0.0
+                and gain.value >= least_gain * names[k]
+                and bench.runs_better(fit, without[k])
+                and is_shown(causes[k], fit.data, found.estimation.least)
+            )
         ]
         if not weak and causes and not bench.is_sound(causes):
             weak = list(range(len(causes)))  # each corrects what another one spoils

@@ -27,6 +27,7 @@ from tendonfmu.diagnosis.extension_fit import (
     possible,
 )
 from tendonfmu.diagnosis.hypotheses import SCALING, Hypothesis, Key
+from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.result import Event
@@ -319,6 +320,12 @@ def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags)
     return replace(recording, train=train)
 
 
+def is_shown(cause: NamedCause, data: Mapping[str, Any], least: LeastSizes) -> bool:
+    """Return whether the sensors can show the size that a cause has in a fitted description."""
+    rows = [extended_row(data, cause.effect, each.place) for each in cause.accepted]
+    return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, rows, strict=True))
+
+
 @dataclass(frozen=True)
 class _Trial:
     """A cause and the model fitted with it; the model is None if there is none.
@@ -469,9 +476,7 @@ class _Rounds:
         """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
         if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
             return False
-        own = [extended_row(model.data, cause.effect, each.place) for each in cause.accepted]
-        least = self._chosen.least
-        return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, own, strict=True))
+        return is_shown(cause, model.data, self._chosen.least)
 
     def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         chosen = self._chosen
