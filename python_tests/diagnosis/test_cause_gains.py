@@ -16,6 +16,8 @@ from tendonfmu.diagnosis import diagnosis as whole
 from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.effects.friction_law_places import law_of
 from tendonfmu.diagnosis.extension_fit import Accepted
+from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.diagnosis.search import NamedCause, is_shown
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 
@@ -68,6 +70,15 @@ def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(
     tests = (SimpleNamespace(at=0, train=np.array([True, False])),)
     made = bench([np.array([[1.0], [1.0]])], tests, only_sliding=True)
     assert made.holds(SimpleNamespace(data=[np.array([[1.0 + worse], [9.0]])])) is holds
+
+
+@pytest.mark.parametrize(("delay", "shown"), [(16e-6, False), (-16e-6, False), (-0.012, True), (0.012, True)])
+def test_a_delay_of_a_hundredth_of_a_sample_is_not_shown(delay: float, shown: bool) -> None:
+    """A fit may end there although the search accepted a larger one."""
+    accepted = Accepted(by_name("time_delay"), Place(), {"delay": 0.012}, (1.0,))
+    cause = NamedCause("time_delay", None, None, (accepted,), 0.1, 0.01, 1e-6, ())
+    data = {**small_finger(), "extensions": [{"effect": "time_delay", "delay": delay}]}
+    assert is_shown(cause, data, LeastSizes(np.zeros(2), np.zeros(4), 0.002, 0.0)) is shown
 
 
 # --- experiments are planned for laws of the nominal description ------------------------------------------------------
