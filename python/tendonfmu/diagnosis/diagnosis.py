@@ -294,29 +294,17 @@ class _Result:
             else None,
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
-            warnings=(*case.warnings, *self._warnings(verified)),
+            warnings=(*case.warnings, *self._warnings(verified, left)),
             tested=len({each.key for each in found.last.selection.hypotheses}),
             event_gain=event_gain(verified.extended_data, case.whole, found.events),
             smoothing=found.estimation.signals,
         )
 
-    def _warnings(self, verified: Verified) -> list[str]:
+    def _warnings(self, verified: Verified, left: Numbers) -> list[str]:
         folds = self._found.first.folds
         found = list(self._found.extended.warnings)
         if self._found.only_sliding:
-            sliding, everything = (
-                sum(int(each.train.sum()) for each in seen) for seen in (self._found.fitted_to, self._found.everything)
-            )
-            fitted = (
-                "numbers are fitted, and causes and their gains judged,"
-                if verified.fits_sliding
-                else "causes and their gains are judged"
-            )
-            found.append(
-                f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples; friction there is "
-                f"whatever balances the load, and misleads a fit: {fitted} where everything slides; the gain of all "
-                "causes together counts all samples"
-            )
+            found.append(self._stuck(verified, left))
         if not folds.enough:
             found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
         elif folds.folds < 8:
@@ -326,6 +314,25 @@ class _Result:
                 "has to be larger to be certain; record a minute"
             )
         return found
+
+    def _stuck(self, verified: Verified, left: Numbers) -> str:
+        """Say what was done about stuck samples, and what the causes gain in the others."""
+        found, used = self._found, self._series.used
+        sliding, everything = (
+            sum(int(each.train.sum()) for each in seen) for seen in (found.fitted_to, found.everything)
+        )
+        fitted = (
+            "numbers are fitted, and causes and their gains judged," if verified.fits_sliding else "causes are judged"
+        )
+        before, after = (
+            1e3 * float(np.sqrt(np.mean(each[used] ** 2))) for each in (self._left(found.nominal.data), left)
+        )
+        return (
+            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples; friction there is "
+            f"whatever balances the load, and misleads a fit: {fitted} where everything slides. There the error falls "
+            f"from {before:.3g} to {after:.3g} mN·m rms (means of 10 ms, without the slow bias); the gain of all "
+            "causes together counts all samples"
+        )
 
     # --- gain ---
 
