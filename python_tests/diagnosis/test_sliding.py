@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,13 +14,18 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 import sticking_finger
+from tendonfmu.calibrate.fit import fit_all
 from tendonfmu.diagnosis import search as searching
 from tendonfmu.diagnosis.diagnosis import diagnose
-from tendonfmu.diagnosis.extension_fit import FittedModel
+from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.remainder import Remainder
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
 from tendonfmu.diagnosis.unexplained import unexplained_of
+from tendonfmu.model.description import read_finger
+from tendonfmu.recordings.prepared import Held, prepare
+from tendonfmu.recordings.recording import read_recording
+from tendonfmu.recordings.smoothing import Signals
 
 PHYSICS = {"presliding", "inertia"}  # of any finger; the simulated joint has an inertia
 
@@ -61,28 +67,23 @@ def test_what_never_slides_makes_no_sample_stuck() -> None:
 # --- the time of presliding -------------------------------------------------------------------------------------------
 
 
-def model(*rows: dict[str, Any]) -> FittedModel:
-    values = {f"extensions[{k}].displacement": row["displacement"] for k, row in enumerate(rows, 1)}
-    return FittedModel(data={"extensions": list(rows)}, given={}, values=values, errors={}, cost=0.0)
-
-
 def test_the_time_of_presliding_is_that_of_the_least_error() -> None:
     place = {"effect": "presliding", "joint": 1, "displacement": 1e-3}
     everywhere = {"effect": "presliding", "displacement": 3e-7}
     best = TIMES[3]
-    found = settled(model(place, everywhere), lambda data: abs(data["extensions"][1]["displacement"] - best))
-    assert found.data["extensions"] == [place, {**everywhere, "displacement": best}]
-    assert found.values == {"extensions[1].displacement": 1e-3, "extensions[2].displacement": best}
+    given = {"name": "finger", "extensions": [place, everywhere]}
+    found = settled(given, lambda data: abs(data["extensions"][1]["displacement"] - best))
+    assert found == {"name": "finger", "extensions": [place, {**everywhere, "displacement": best}]}
+    assert given["extensions"] == [place, everywhere]
 
 
 def test_the_fitted_time_stays_if_no_other_is_better() -> None:
-    everywhere = {"effect": "presliding", "displacement": 0.0053}
-    found = settled(model(everywhere), lambda data: abs(data["extensions"][0]["displacement"] - 0.0053))
-    assert found.data["extensions"] == [everywhere]
+    given = {"extensions": [{"effect": "presliding", "displacement": 0.0053}]}
+    assert settled(given, lambda data: abs(data["extensions"][0]["displacement"] - 0.0053)) is given
 
 
 def test_without_presliding_everywhere_there_is_nothing_to_choose() -> None:
-    given = model({"effect": "presliding", "tendon": 1, "displacement": 1e-3})
+    given = {"extensions": [{"effect": "presliding", "tendon": 1, "displacement": 1e-3}]}
     assert settled(given, lambda data: pytest.fail("no error is needed")) is given
 
 
@@ -97,6 +98,32 @@ def test_what_is_left_is_measured_by_the_error_of_all_samples() -> None:
     assert (alone.share, alone.unknown, alone.description) == (0.5, True, "over the angle")
     assert (all_of_it.share, all_of_it.unknown, all_of_it.description) == (0.005, False, "")
     assert all_of_it.gain.high == pytest.approx(1.0 - np.sqrt(1.0 - 0.005), rel=1e-9)
+
+
+# --- a calibration's fit to all motion ---
+
+
+def test_a_calibration_fits_the_friction_of_a_finger_that_sticks(tmp_path: Path) -> None:
+    extended = sticking_finger.description() | {"extensions": [{"effect": "presliding", "displacement": 0.01}]}
+    path, recording = sticking_finger.write(tmp_path, 30.0, 3)
+    path.write_text(json.dumps(extended), encoding="utf-8")
+    finger = read_finger(path)
+    measured = [prepare(finger, read_recording(recording), 2, Held())]
+    sliding, everything = (
+        fit_all(
+            finger,
+            measured,
+            Signals(12.0, 2),
+            FitSettings(threads=1),
+            given=extended,
+            seed=0,
+            only_sliding=only_sliding,
+        ).data
+        for only_sliding in (True, False)
+    )
+    true = sticking_finger.friction_at(20.0)
+    assert friction_of(sliding) == pytest.approx(true, rel=0.08)
+    assert abs(friction_of(everything) - true) > abs(friction_of(sliding) - true)
 
 
 # --- whole diagnoses --------------------------------------------------------------------------------------------------

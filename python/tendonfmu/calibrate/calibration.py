@@ -412,6 +412,7 @@ class _Run:
             given=case.finger.data,
             seed=options.seed,
             uncertainty=name == "extended",
+            only_sliding=name == "extended" and lacks.get("fits_sliding", False),  # earlier folders do not say
         )
 
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:

@@ -22,8 +22,11 @@ from tendonfmu.diagnosis import (
     learn_numbers,
     make_grid,
     predicted_of,
+    residual_of,
     series_of,
+    settled,
     without_blocks,
+    without_stuck,
 )
 from tendonfmu.estimate import (
     FitWarning,
@@ -66,12 +69,13 @@ def fit_all(
     given: Data,
     seed: int,
     uncertainty: bool = True,
+    only_sliding: bool = False,
 ) -> CalibratedFit:
     """Fit a diagnosed finger to all recordings of free motion. Raises InputError.
 
     `finger` is the description that the diagnosis extended, with its numbers as the start. `recordings` are as
     measured. `given` is the description that gives the expected magnitudes. `uncertainty` asks for
-    `contact.uncertainty`.
+    `contact.uncertainty`, `only_sliding` to leave out the samples in which something is stuck.
     """
     data = signals.description(finger.data)
     if not unknowns(data):
@@ -79,17 +83,27 @@ def fit_all(
     own = estimation_recordings(replace(finger, data=data), recordings, signals)
     grid = make_grid(own)
     events, out = events_of(data, own, grid, seed)
+    if only_sliding:
+        sliding = without_stuck(finger, recordings, signals)
+        own = estimation_recordings(replace(finger, data=data), sliding, signals)
     own = [without_blocks(each, k, grid, out) for k, each in enumerate(own)]
     clean = predicted_of(data, own, grid, series_of(data, own, grid, out))
     structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
     fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     online = replace(fitted, data=signals.restored(fitted.data, finger.data))
+    if only_sliding:
+        online = replace(online, data=settled(online.data, lambda data: _square(data, recordings)))
     if uncertainty and np.isfinite(learned.covariance).all():
         judged = [evaluate(data, fitted.data, each) for each in own]
         known = parameter_uncertainty(structure, learned, fitted.data, judged)
         level = (finger.data["contact"] or {}).get("uncertainty_level")
         online = with_uncertainty(online, known.directions, level)
     return CalibratedFit(online.data, events, tuple(learned.warnings))
+
+
+def _square(data: Data, recordings: Sequence[FitRecording]) -> float:
+    """Return Σ r² over all samples that are trained on, (N·m)²."""
+    return sum(float(np.nansum(residual_of(data, each)[each.train] ** 2)) for each in recordings)
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:

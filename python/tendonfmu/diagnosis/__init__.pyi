@@ -46,3 +46,5 @@ from .signal_choice import estimation_recordings as estimation_recordings
 from .size import NBSP as NBSP
 from .size import quantity as quantity
 from .size import size_at as size_at
+from .sliding import settled as settled
+from .sliding import without_stuck as without_stuck

@@ -20,6 +20,7 @@ from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.search import NamedCause, Search, is_shown
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
+from tendonfmu.estimate import get_number
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, gain_interval
@@ -224,7 +225,10 @@ class _Bench:
     def result(self, causes: Sequence[NamedCause]) -> FittedModel:
         """Return the fit that becomes the extended model."""
         found = self._fit(causes, self.fits_sliding)
-        return settled(found, self._trained) if self.fits_sliding else found
+        if not self.fits_sliding:
+            return found
+        data = settled(found.data, self._trained)
+        return replace(found, data=data, values={path: get_number(data, path) for path in found.values})
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""

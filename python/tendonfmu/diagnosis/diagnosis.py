@@ -298,6 +298,7 @@ class _Result:
             tested=len({each.key for each in found.last.selection.hypotheses}),
             event_gain=event_gain(verified.extended_data, case.whole, found.events),
             smoothing=found.estimation.signals,
+            fits_sliding=verified.fits_sliding,
         )
 
     def _warnings(self, verified: Verified, left: Numbers) -> list[str]:

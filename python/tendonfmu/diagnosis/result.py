@@ -392,6 +392,8 @@ class Diagnosis:
         What was estimated from, in words.
     smoothing
         The same as numbers.
+    fits_sliding
+        Whether the numbers of the extended model were fitted only where everything slides.
     least_gain
         Share of the rms that a cause must remove.
     nominal, extended
@@ -458,6 +460,7 @@ class Diagnosis:
     tested: int = 0  # effects at places
     event_gain: Interval | None = None
     smoothing: Signals = field(default_factory=Signals)
+    fits_sliding: bool = False
     kind: str = "model"
     references: tuple[str, ...] = ()
     repeated: int = 0

@@ -234,7 +234,7 @@ def _searched(
         return online.square(chosen.online(data))
 
     is_better = alone.is_better(found.model, whole.model)
-    runs = is_better and error(settled(found.model, error).data) < RUNS**2 * error(whole.model.data)
+    runs = is_better and error(settled(found.model.data, error)) < RUNS**2 * error(whole.model.data)
     return found if runs else whole
 
 

@@ -101,23 +101,21 @@ def sliding_alone(
     return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start))
 
 
-def settled(model: FittedModel, error: Callable[[Mapping[str, Any]], float]) -> FittedModel:
-    """Choose the time of presliding everywhere, which sliding hardly shows; keep the other numbers.
+def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]) -> Mapping[str, Any]:
+    """Choose the time of presliding everywhere, which sliding hardly shows; keep the other numbers of a description.
 
     `error` of a description counts all samples. It has several minima over the time, which is taken from a grid.
     """
-    rows = list(model.data.get("extensions") or [])
+    rows = list(data.get("extensions") or [])
     at = [k for k, row in enumerate(rows) if row["effect"] == "presliding" and not {"joint", "tendon"} & {*row}]
     if not at:
-        return model
+        return data
 
     def with_time(time: float) -> dict[str, Any]:
-        return {**model.data, "extensions": [*rows[: at[0]], {**rows[at[0]], "displacement": time}, *rows[at[0] + 1 :]]}
+        return {**data, "extensions": [*rows[: at[0]], {**rows[at[0]], "displacement": time}, *rows[at[0] + 1 :]]}
 
-    times = [float(rows[at[0]]["displacement"]), *TIMES]
-    best = min(times, key=lambda time: error(with_time(time)))
-    values = {**model.values, f"extensions[{at[0] + 1}].displacement": best}
-    return replace(model, data=with_time(best), values=values)
+    tried = [data, *(with_time(time) for time in TIMES)]
+    return min(tried, key=error)
 
 
 def _enough(recordings: Sequence[FitRecording]) -> bool:
