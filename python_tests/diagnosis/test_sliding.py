@@ -150,6 +150,7 @@ def test_with_stuck_samples_the_same_finger_gets_a_false_name(tmp_path: Path, mo
     assert not any("stuck" in text for text in found.warnings)
 
 
+@pytest.mark.long
 def test_a_weight_hidden_in_a_finger_that_sticks_is_found_with_its_size(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 4, weight=0.05)
     (cause,) = (each for each in found.causes if each.where.effect not in PHYSICS)
