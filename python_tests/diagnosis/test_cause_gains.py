@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 from fit_cases import small_finger
-from tendonfmu.diagnosis import cause_gains
+from tendonfmu.diagnosis import cause_gains, gain
 from tendonfmu.diagnosis import diagnosis as whole
 from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.effects.friction_law_places import law_of
@@ -56,7 +56,7 @@ def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(
     monkeypatch: pytest.MonkeyPatch, model: list[Any], holds: bool
 ) -> None:
     """So a gain on held-out parts is never negative."""
-    monkeypatch.setattr(cause_gains, "residual_of", lambda data, recording: data[recording.at])
+    monkeypatch.setattr(gain, "residual_of", lambda data, recording: data[recording.at])
     nominal = residuals(1.0, 1.0, 1.0, elsewhere=1.0)
     assert bench(nominal).holds(SimpleNamespace(data=model)) is holds
     assert bench(nominal, tests=("a recording",)).holds(SimpleNamespace(data=model))  # judged on that one
@@ -66,7 +66,7 @@ def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(
 def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(
     monkeypatch: pytest.MonkeyPatch, worse: float, holds: bool
 ) -> None:
-    monkeypatch.setattr(cause_gains, "residual_of", lambda data, recording: data[recording.at])
+    monkeypatch.setattr(gain, "residual_of", lambda data, recording: data[recording.at])
     tests = (SimpleNamespace(at=0, train=np.array([True, False])),)
     made = bench([np.array([[1.0], [1.0]])], tests, only_sliding=True)
     assert made.holds(SimpleNamespace(data=[np.array([[1.0 + worse], [9.0]])])) is holds

@@ -22,9 +22,9 @@ from tendonfmu.diagnosis import (
     learn_numbers,
     make_grid,
     predicted_of,
-    residual_of,
     series_of,
     settled,
+    squared_residual,
     without_blocks,
     without_stuck,
 )
@@ -92,18 +92,13 @@ def fit_all(
     fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     online = replace(fitted, data=signals.restored(fitted.data, finger.data))
     if only_sliding:
-        online = replace(online, data=settled(online.data, lambda data: _square(data, recordings)))
+        online = replace(online, data=settled(online.data, lambda data: squared_residual(data, recordings)))
     if uncertainty and np.isfinite(learned.covariance).all():
         judged = [evaluate(data, fitted.data, each) for each in own]
         known = parameter_uncertainty(structure, learned, fitted.data, judged)
         level = (finger.data["contact"] or {}).get("uncertainty_level")
         online = with_uncertainty(online, known.directions, level)
     return CalibratedFit(online.data, events, tuple(learned.warnings))
-
-
-def _square(data: Data, recordings: Sequence[FitRecording]) -> float:
-    """Return Σ r² over all samples that are trained on, (N·m)²."""
-    return sum(float(np.nansum(residual_of(data, each)[each.train] ** 2)) for each in recordings)
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:

@@ -24,6 +24,7 @@ from .experiments.discrimination import discriminating_motion as discriminating_
 from .extension_fit import FitSettings as FitSettings
 from .extension_fit import learn_numbers as learn_numbers
 from .gain import residual_of as residual_of
+from .gain import squared_residual as squared_residual
 from .reported import CONTACT as CONTACT
 from .reported import TITLES as TITLES
 from .reported import UNKNOWN as UNKNOWN

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tendonfmu.diagnosis.cause_search import look, predicted_of, series_of
 from tendonfmu.diagnosis.cause_selection import names_with
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
-from tendonfmu.diagnosis.gain import Gain, measure_gain, residual_of
+from tendonfmu.diagnosis.gain import Gain, measure_gain, squared_residual
 from tendonfmu.diagnosis.hypotheses import Hypothesis
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
@@ -29,7 +29,6 @@ from tendonfmu.statistics import Interval, gain_interval
 STRICTER = 5.0
 Data = Mapping[str, Any]
 Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Parameters = Mapping[str, tuple[float, str]]
 
 
@@ -126,11 +125,6 @@ def verify(
         extended=fit.data,
         fits_sliding=bench.fits_sliding,
     )
-
-
-def _square(data: Data, recordings: Sequence[tuple[FitRecording, Flags]]) -> float:
-    """Return Σ r² over the flagged samples [N] of recordings, (N·m)²."""
-    return sum(float(np.nansum(residual_of(data, each)[flags] ** 2)) for each, flags in recordings)
 
 
 def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
@@ -232,7 +226,7 @@ class _Bench:
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""
-        return _square(self._found.estimation.online(data), [(each, each.train) for each in self._training])
+        return squared_residual(self._found.estimation.online(data), self._training)
 
     def is_sound(self, causes: Sequence[NamedCause]) -> bool:
         """Return whether all causes together run better than the nominal model.
@@ -281,8 +275,10 @@ class _Bench:
         """
         if self._tests and not self._found.only_sliding:
             return True  # `runs_better` has judged the same samples
-        judged = [(each, each.train) for each in self._tests] or [(each, each.held_out) for each in self._training]
-        return _square(self.online(model), judged) <= _square(self.online(self.nominal), judged)
+        judged = self._tests or self._training
+        flags = [each.train if self._tests else each.held_out for each in judged]
+        found, nominal = (squared_residual(self.online(each), judged, flags) for each in (model, self.nominal))
+        return found <= nominal
 
     def _error(self, model: FittedModel) -> Numbers:
         """Return Σ e² by stretch on unseen data [K].

@@ -152,6 +152,13 @@ def residual_of(data: Data, recording: FitRecording) -> Numbers:
     return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
 
 
+def squared_residual(data: Data, recordings: Sequence[FitRecording], flags: Sequence[Flags] | None = None) -> float:
+    """Return Σ r² over all joints, (N·m)², at the flagged samples [N] of each recording; those trained on if None."""
+    chosen = [each.train for each in recordings] if flags is None else flags
+    left = (residual_of(data, each)[own] for each, own in zip(recordings, chosen, strict=True))
+    return float(sum(np.nansum(each**2) for each in left))
+
+
 # --- an FMU and the core side by side ---------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.cause_search import bias_of, series_of
-from tendonfmu.diagnosis.gain import residual_of
+from tendonfmu.diagnosis.gain import squared_residual
 from tendonfmu.diagnosis.series import block_prediction, make_grid
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Span, make_folds
@@ -44,8 +44,7 @@ class OnlineError:
 
     def square(self, data: Mapping[str, Any]) -> float:
         """Return Σ r² over all joints, (N·m)², of every sample; r is taken before the bias update."""
-        left = (residual_of(data, each)[each.train] for each in self._recordings)
-        return float(sum(np.nansum(each**2) for each in left))
+        return squared_residual(data, self._recordings)
 
     def by_stretch(self, data: Mapping[str, Any]) -> Numbers:
         """Return Σ e² over all joints, (N·m)² [K], by stretches of about 2 s."""
