@@ -17,7 +17,7 @@ from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.effects.friction_law_places import law_of
 from tendonfmu.diagnosis.extension_fit import Accepted
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.search import NamedCause, is_shown
+from tendonfmu.diagnosis.named_cause import NamedCause, is_shown
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 

@@ -25,9 +25,10 @@ from tendonfmu.diagnosis.effects.presliding import is_spring, usual_time
 from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings, FittedModel
 from tendonfmu.diagnosis.gain import residual_of as online_residual
 from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis
+from tendonfmu.diagnosis.named_cause import NamedCause
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
-from tendonfmu.diagnosis.search import NamedCause, _Rounds, _Trial, search
+from tendonfmu.diagnosis.search import _Rounds, _Trial, search
 from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid
 from tendonfmu.diagnosis.signal_choice import choose, least_sizes
 from tendonfmu.diagnosis.span import span_of

@@ -15,9 +15,10 @@ from tendonfmu.diagnosis.cause_selection import names_with
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
 from tendonfmu.diagnosis.gain import Gain, measure_gain, squared_residual
 from tendonfmu.diagnosis.hypotheses import Hypothesis
+from tendonfmu.diagnosis.named_cause import NamedCause, is_shown
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
-from tendonfmu.diagnosis.search import NamedCause, Search, is_shown
+from tendonfmu.diagnosis.search import Search
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
 from tendonfmu.estimate import get_number

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 from typing import Any
@@ -22,9 +22,8 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.changes.check import check_sides
 from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
-from tendonfmu.diagnosis.changes.diagnosis import ChangeCase, find_changes
+from tendonfmu.diagnosis.changes.diagnosis import find_changes
 from tendonfmu.diagnosis.contact_gain import detection_gain
 from tendonfmu.diagnosis.effects import Candidate
 from tendonfmu.diagnosis.effects.friction_law_places import law_of, thresholds
@@ -32,40 +31,30 @@ from tendonfmu.diagnosis.event_gain import event_gain
 from tendonfmu.diagnosis.evidence import evidence
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings
-from tendonfmu.diagnosis.gain import require_unseen
+from tendonfmu.diagnosis.given_case import GivenCase, change_case, given_case, require_motion
 from tendonfmu.diagnosis.hypotheses import Hypothesis
+from tendonfmu.diagnosis.named_cause import NamedCause
 from tendonfmu.diagnosis.remainder import Remainder, measure_remainder
 from tendonfmu.diagnosis.residual_views import residual_views, whiteness
 from tendonfmu.diagnosis.result import Cause, Diagnosis, Event, FoundPlace, Invisible, Unexplained, Where
-from tendonfmu.diagnosis.search import NamedCause, Search, events_of, search, without_events
+from tendonfmu.diagnosis.search import Search, events_of, search, without_events
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.size import size_of
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.unexplained import unexplained_of
 from tendonfmu.diagnosis.unseen_effects import unseen_effects
-from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate import check_unseen
+from tendonfmu.errors import own_fault
 from tendonfmu.files import counted
-from tendonfmu.model import Finger, FingerSource, read_finger
+from tendonfmu.model import FingerSource
 from tendonfmu.recordings import (
-    UNFIT_FOR_SEARCH,
     FitRecording,
-    Held,
     RecordingSource,
-    admit,
-    listed_sources,
-    prepare,
-    read_recordings,
-    require_noise,
 )
-from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 from tendonfmu.tasks import Phases, PhaseState
 
 Numbers = NDArray[np.float64]
 
-HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
-HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
 SIGNALS = "signals, delay and presliding"
@@ -141,8 +130,8 @@ def diagnose(
                 return replace(different, seconds=perf_counter() - begun)
     phases = Phases(PHASES, progress or (lambda state: None))
     with threadpool_limits(limits=max(jobs, 1)):
-        case = _case(finger, recordings, tests, kinematics, least_gain, checked)
-        _require_motion(case.whole)
+        case = given_case(finger, recordings, tests, kinematics, least_gain, checked)
+        require_motion(case.whole)
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all input has been checked and fitted once
@@ -151,96 +140,13 @@ def diagnose(
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
 
-# --- what is given ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Case:
-    """Checked input. `training` has held-out stretches if there are no `tests`; `warnings` are about recordings."""
-
-    finger: Finger
-    training: list[FitRecording]
-    tests: list[FitRecording]
-    warnings: tuple[str, ...]
-
-    @property
-    def whole(self) -> list[FitRecording]:
-        """The training recordings without held-out stretches."""
-        nothing = [np.zeros_like(each.held_out) for each in self.training]
-        return [
-            replace(each, train=each.train | each.held_out, held_out=none)
-            for each, none in zip(self.training, nothing, strict=True)
-        ]
-
-
-def _case(
-    finger: FingerSource,
-    recordings: RecordingSource | Sequence[RecordingSource],
-    tests: RecordingSource | Sequence[RecordingSource],
-    kinematics: int,
-    least_gain: float,
-    checked: bool,
-    apart: Held = HELD,
-    role: str = "recordings",
-) -> _Case:
-    given_sources, test_sources = listed_sources(recordings), listed_sources(tests)
-    if not given_sources:
-        raise InputError("no recording; expected at least one")
-    if kinematics not in (1, 2, 3):
-        raise InputError(f"kinematics = {kinematics!r}: expected 1, 2 or 3")
-    if not 0.0 <= least_gain <= 0.5:
-        raise InputError(f"least_gain = {least_gain!r}: expected 0 to 0.5")
-    given = read_finger(finger)
-    held = Held() if test_sources else apart
-    read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
-    warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
-    training = [prepare(given, each, kinematics, held) for each in read]
-    unseen = [prepare(given, each, kinematics, Held()) for each in others]
-    require_noise(given, training)
-    require_unseen(training, unseen)
-    check_unseen([each.recording for each in training], [each.recording for each in unseen])
-    if not checked:
-        warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
-    return _Case(given, training, unseen, tuple(warnings))
-
-
-def _require_motion(recordings: Sequence[FitRecording]) -> None:
-    """Raise InputError if no part can be held out: no cause could be named, so "adequate" would mean nothing."""
-    least = FEWEST_STRETCHES * STRETCH
-    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
-    if found < least - 0.01:  # the last sample has no duration
-        name = str(recordings[0].path) if len(recordings) == 1 else f"{len(recordings)} recordings"
-        raise InputError(
-            f"{name}: {found:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are judged "
-            "on parts that are held out in turn"
-        )
-
-
-def change_case(
-    finger: FingerSource,
-    now: RecordingSource | Sequence[RecordingSource],
-    reference: RecordingSource | Sequence[RecordingSource],
-    tests: RecordingSource | Sequence[RecordingSource],
-    kinematics: int,
-    least_gain: float,
-    checked: bool,
-) -> ChangeCase:
-    """Read and check the recordings of now and of the reference, each by itself and against each other."""
-    own = _case(finger, now, tests, kinematics, least_gain, checked, HALF)
-    before = _case(own.finger, reference, [], kinematics, least_gain, checked, role="reference")
-    then = before.whole
-    warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
-    warnings += check_sides(own.finger, then, [*own.training, *own.tests])
-    return ChangeCase(own.finger, then, own.training, own.tests, tuple(warnings))
-
-
 # --- what is reported -------------------------------------------------------------------------------------------------
 
 
 class _Result:
     """Everything that is reported of a search."""
 
-    def __init__(self, case: _Case, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
+    def __init__(self, case: GivenCase, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
         self._case, self._found, self._seed, self._phases = case, found, seed, phases
         self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
         self._series = found.last.series

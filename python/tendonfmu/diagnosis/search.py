@@ -26,8 +26,8 @@ from tendonfmu.diagnosis.extension_fit import (
     fit_extended,
     possible,
 )
-from tendonfmu.diagnosis.hypotheses import SCALING, Hypothesis, Key
-from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.diagnosis.hypotheses import SCALING, Hypothesis
+from tendonfmu.diagnosis.named_cause import NamedCause, accepted_of, is_shown
 from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.result import Event
@@ -36,9 +36,8 @@ from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import presliding_everywhere
-from tendonfmu.model import Finger, extended_row
+from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
 
 Numbers = NDArray[np.float64]
@@ -49,47 +48,6 @@ SIGNIFICANCE = 0.01  # family-wise
 MOST_FITTED = 3  # effects that columns cannot distinguish
 WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
 MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
-
-
-@dataclass(frozen=True)
-class NamedCause:
-    """A cause as it was found.
-
-    Attributes
-    ----------
-    effect, joint, tendon
-        Where it is; None everywhere.
-    accepted
-        Its places, in the form that a description takes.
-    gain, error
-        1 − rms with / rms without on held-out folds, and its standard error.
-    alike
-        What the data cannot distinguish from it.
-    hypothesis
-        As it was selected; None if it is part of the start.
-    measured
-        Gain on unseen data as it runs online.
-    """
-
-    effect: str
-    joint: int | None
-    tendon: int | None
-    accepted: tuple[Accepted, ...]
-    gain: float
-    error: float
-    p_value: float
-    alike: tuple[Hypothesis, ...]
-    hypothesis: Hypothesis | None = None
-    measured: Interval | None = None
-
-    @property
-    def key(self) -> Key:
-        return self.effect, self.joint, self.tendon
-
-    @property
-    def interval(self) -> Interval:
-        """The measured gain; without one, the gain on held-out folds with its 95 % interval."""
-        return self.measured or Interval(self.gain, self.gain - 1.96 * self.error, self.gain + 1.96 * self.error)
 
 
 @dataclass(frozen=True)
@@ -135,19 +93,6 @@ class Search:
     fitted_to: Sequence[FitRecording]
     everything: Sequence[FitRecording]
     only_sliding: bool
-
-
-def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, ...]:
-    """Return the places of a hypothesis with its common magnitudes [d], in the form that `extension_fit` takes."""
-    return tuple(
-        Accepted(
-            member.proposal.candidate,
-            member.proposal.place,
-            dict(member.shape.shape),
-            tuple(float(weight * value) for weight, value in zip(member.weights, magnitudes, strict=True)),
-        )
-        for member in hypothesis.members
-    )
 
 
 def search(
@@ -318,12 +263,6 @@ def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags)
             rows = np.flatnonzero(np.repeat(out[segment.blocks], segment.samples))
             train[begin + rows] = False
     return replace(recording, train=train)
-
-
-def is_shown(cause: NamedCause, data: Mapping[str, Any], least: LeastSizes) -> bool:
-    """Return whether the sensors can show the size that a cause has in a fitted description."""
-    rows = [extended_row(data, cause.effect, each.place) for each in cause.accepted]
-    return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, rows, strict=True))
 
 
 @dataclass(frozen=True)

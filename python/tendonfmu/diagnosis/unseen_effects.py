@@ -9,8 +9,8 @@ import numpy as np
 
 from tendonfmu.diagnosis.cause_selection import Selection, names_with
 from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis, Key
+from tendonfmu.diagnosis.named_cause import NamedCause
 from tendonfmu.diagnosis.result import ABSORBED
-from tendonfmu.diagnosis.search import NamedCause
 
 SMALLEST_GAIN = 1e-6  # where every gain counts as material
 

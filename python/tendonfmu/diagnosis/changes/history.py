@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.changes.trend import slope
-from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, change_case, diagnose
+from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
+from tendonfmu.diagnosis.given_case import change_case
 from tendonfmu.diagnosis.result import ChangedSize, Where
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger

@@ -25,7 +25,8 @@ from tendonfmu.diagnosis.changes.repeated_motion import find_repeats, less_refer
 from tendonfmu.diagnosis.extension_fit import Accepted, extended_description
 from tendonfmu.diagnosis.hypotheses import Hypothesis, Key, hypotheses
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.search import SIGNIFICANCE, accepted_of
+from tendonfmu.diagnosis.named_cause import accepted_of
+from tendonfmu.diagnosis.search import SIGNIFICANCE
 from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
