@@ -16,8 +16,8 @@ from pathlib import Path
 from statistics import median
 from unittest import mock
 
-TESTS = Path(__file__).resolve().parent.parent / "python_tests"
-sys.path[:0] = [str(TESTS / "support"), str(TESTS / "foreign")]
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python_tests" / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python_tests" / "foreign"))
 
 import sticking_finger
 from tendonfmu.diagnosis import search
