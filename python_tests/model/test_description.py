@@ -138,9 +138,9 @@ def test_schema_takes_random_fingers() -> None:
         VALIDATOR.validate(description)
 
 
-@pytest.mark.parametrize("every", repeated([3, 1], 0))
+@pytest.mark.parametrize("every", repeated([7, 1], 0))
 def test_schema_agrees_with_the_reader_on_every_changed_value(every: int) -> None:
-    """Every third of them changes each value in five ways."""
+    """Every seventh of them changes each value in two ways or more."""
     description = with_everything()
     all_changes = list(itertools.product(places(description), CHANGES))
     for path, change in all_changes[::every]:
@@ -168,8 +168,9 @@ def test_schema_agrees_with_the_reader_on_every_changed_extension() -> None:
     assert agreed > 1000
 
 
-def test_schema_agrees_with_the_reader_on_random_changes() -> None:
-    for seed in range(50):
+@pytest.mark.parametrize("fingers", repeated([15, 50], 0))
+def test_schema_agrees_with_the_reader_on_random_changes(fingers: int) -> None:
+    for seed in range(fingers):
         rng = np.random.default_rng([seed, 9])
         description = random_finger(seed)
         for _ in range(2):

@@ -19,6 +19,7 @@ FINGERS, FEWER = 50, 15
 SOURCES = (1, 2, 3)
 SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
 DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each
+SOME = DETECTION_FINGERS[::2]  # these take every branch, too
 DETECTION_SAMPLES = 250
 
 # Every branch of section 5 as the oracle counts them; a new one there must be added here.
@@ -195,6 +196,7 @@ def test_detection_fingers_take_every_branch() -> None:
     rare = {name: branches[name] for name in DETECTION_BRANCHES if branches[name] < 10}
     assert not rare
     assert set(branches) - BRANCHES == DETECTION_BRANCHES
+    assert set().union(*(detection_oracle_run(seed).branches for seed in SOME)) >= DETECTION_BRANCHES
 
 
 def test_detection_fingers_have_every_key() -> None:
@@ -236,11 +238,12 @@ def test_detection_fingers_have_every_key() -> None:
     assert not [name for name in expected if not seen[name]]
 
 
+@pytest.mark.parametrize("seeds", repeated([SOME, DETECTION_FINGERS], 0), ids=["some", "all"])
 @pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
-def test_agrees_with_the_oracle_on_detection(runner: Runner) -> None:
+def test_agrees_with_the_oracle_on_detection(runner: Runner, seeds: range) -> None:
     results = []
     wrong = []
-    for seed in DETECTION_FINGERS[:: 6 if runner.name in SLOW else 1]:
+    for seed in seeds[:: 6 if runner.name in SLOW else 1]:
         description, recording = detection_case(seed)
         source = 1 + seed % 3
         outputs = runner(description, recording, source)

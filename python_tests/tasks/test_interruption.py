@@ -152,7 +152,7 @@ def copied(earlier: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("moment", repeated(MOMENTS, 1))
-@pytest.mark.parametrize("number", STATUS, ids=lambda number: number.name)
+@pytest.mark.parametrize("number", repeated(STATUS, 1), ids=lambda number: number.name)
 def test_nothing_is_left_and_nothing_is_lost(
     tmp_path: Path, earlier: Path, moment: str, number: signal.Signals
 ) -> None:

@@ -16,6 +16,7 @@ from .tables import csv_lines as csv_lines
 from .tables import read_table as read_table
 from .tables import write_blocks as write_blocks
 from .tables import write_table as write_table
+from .templates import html_template as html_template
 from .writing import check_output as check_output
 from .writing import check_output_folder as check_output_folder
 from .writing import in_use as in_use

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tendonfmu.files import html_template
 from tendonfmu.model import Finger, count
 
 
@@ -30,17 +31,8 @@ def render_documentation(template: str, model: Mapping[str, Any], **context: Any
     str
         HTML.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tendonfmu"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     by_causality = {
         f"{causality}s": [variable for variable in model["variables"] if variable["causality"] == causality]
         for causality in ("input", "output", "parameter")
     }
-    return environment.get_template(template).render(model=model, **by_causality, **context)
+    return html_template(template).render(model=model, **by_causality, **context)

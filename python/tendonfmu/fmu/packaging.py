@@ -12,6 +12,7 @@ import unicodedata
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +29,8 @@ from tendonfmu.model import Finger, FingerSource, native, read_finger
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable
+
+    import jinja2
 
 BINARY_SUFFIXES = (".so", ".dll", ".dylib")
 BINARIES = "binaries"
@@ -378,11 +381,16 @@ def model_description(context: Mapping[str, Any], fmi: int = 2) -> bytes:
 
 
 def _render_xml(template: str, context: Mapping[str, Any]) -> bytes:
+    return _xml_template(template).render(context).encode()
+
+
+@cache
+def _xml_template(name: str) -> jinja2.Template:
     import jinja2
 
-    text = package_file(f"model_description/{template}").read_text(encoding="utf-8")
+    text = package_file(f"model_description/{name}").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(text).render(context).encode()
+    return environment.from_string(text)
 
 
 # --- archive ---------------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from tendonfmu.files import html_template
 from tendonfmu.model.routing_geometry import FingerDrawing, Points
 
 # px per unit of the drawing, and the colours of the tendons in their order
@@ -28,11 +29,6 @@ def finger_html(lines: Sequence[str], drawing: FingerDrawing) -> str:
     str
         HTML with all texts escaped.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tendonfmu"), undefined=jinja2.StrictUndefined, autoescape=True
-    )
     rows = [(name.rstrip(), value) for name, _, value in (line.partition("  ") for line in lines[1:])]
     tendons = [
         {
@@ -46,7 +42,7 @@ def finger_html(lines: Sequence[str], drawing: FingerDrawing) -> str:
     ]
     joints = [(*_at(drawing, (joint.x, 0.0)), _SCALE * joint.radius, joint.name) for joint in drawing.joints]
     outline = [(x, low) for x, low, _ in drawing.outline] + [(x, high) for x, _, high in drawing.outline[::-1]]
-    return environment.get_template("finger.html.jinja").render(
+    return html_template("finger.html.jinja").render(
         title=lines[0],
         rows=[(name, value.strip()) for name, value in rows],
         width=round(_SCALE * (drawing.right - drawing.left)),

@@ -140,9 +140,9 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
         raise InputError(
             f"recording of {counted(len(left), 'sample')} without a gap: expected at least {FEWEST - 2 * reach}"
         )
-    blocks = [left[begin : begin + BLOCK] for begin in range(0, len(left) - BLOCK + 1, BLOCK)] or [left]
-    variance = np.stack([(block**2).mean(axis=0) for block in blocks])
-    return np.array([_of_blocks(column) for column in variance.T])
+    size = min(BLOCK, len(left))
+    blocks = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
+    return np.array([_of_blocks(column) for column in (blocks**2).mean(axis=1).T])
 
 
 def _lagrange(distance: Numbers, k: int) -> Numbers:

@@ -20,6 +20,7 @@ from tendonfmu.drawing import (
     packed_plotly,
     size_of,
 )
+from tendonfmu.files import html_template
 
 
 class Tile(NamedTuple):
@@ -100,15 +101,6 @@ def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
     str
         A whole HTML file.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tendonfmu"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     figures: dict[str, list[PageSheet]] = {}
     panels: list[Panel | MatrixPanel] = []
     names: list[dict[str, str]] = []
@@ -118,7 +110,7 @@ def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
         names += [dict(sheet.keys)] * len(sheet.panels)
     drawing = {"plotly": packed_plotly(), "dark_colours": dark_colours()} if panels else {}
     drawn = figures_json(panels, names) if panels else ""
-    return environment.get_template(template).render(figures=figures, drawn=drawn, **drawing, **content)
+    return html_template(template).render(figures=figures, drawn=drawn, **drawing, **content)
 
 
 def _placed(sheet: Sheet, first: int) -> PageSheet:
