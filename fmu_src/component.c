@@ -9,13 +9,14 @@ static char* copy_text(const char* text) {
   return copy ? memcpy(copy, text, bytes) : NULL;
 }
 
-component* component_create(const log_target* log, model* m) {
+component* component_create(const log_target* log, model* m, uint64_t identity) {
   component* c = calloc(1, sizeof *c);
   if (!c) {
     model_destroy(m);
     return NULL;
   }
   c->model = m;
+  c->identity = identity;
   c->log = *log;
   c->instance_name = copy_text(log->instance_name);
   c->log.instance_name = c->instance_name;

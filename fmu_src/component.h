@@ -2,6 +2,8 @@
 #ifndef TENDONFMU_COMPONENT_H
 #define TENDONFMU_COMPONENT_H
 
+#include <stdint.h>
+
 #include "call_table.h"
 #include "log.h"
 #include "model.h"
@@ -12,6 +14,7 @@ typedef struct component {
   char* instance_name;
   struct model* model; /* `struct` for C++, where the member hides the type */
   variables values;
+  uint64_t identity; /* of the FMU, in its saved states */
 
   fmu_phase phase;
   int failed;          /* an error was returned: state "error" on top of the phase */
@@ -20,8 +23,9 @@ typedef struct component {
   double start_time, stop_time, end_of_step;
 } component;
 
-/* Takes over the model and a copy of the name. NULL when memory is out; the model is then destroyed. */
-component* component_create(const log_target* log, model* m);
+/* Takes over the model and a copy of the name; identity: component_identity(). NULL when memory is out; the model is
+ * then destroyed. */
+component* component_create(const log_target* log, model* m, uint64_t identity);
 void component_destroy(component* c);
 
 /* Back to what component_create() gave; logging stays as it is set. */

@@ -5,8 +5,8 @@
 #include <string.h>
 
 /* byte offsets of the header; the checksum covers all that follows it */
-enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, SALT = 32, NUMBERS = 40 };
-enum { STATE_VERSION = 1 };
+enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, IDENTITY = 32, NUMBERS = 40 };
+enum { STATE_VERSION = 2 };
 
 /* numbers before the inputs and parameters */
 enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
@@ -40,13 +40,20 @@ static double get_number(const unsigned char* from, size_t index) {
   return value;
 }
 
-/* FNV-1a */
-static uint64_t checksum(const unsigned char* bytes, size_t size) {
+static uint64_t fnv_1a(const unsigned char* bytes, size_t size) {
   uint64_t hash = 0xcbf29ce484222325u;
-  for (size_t i = SALT; i < size; ++i) {
+  for (size_t i = 0; i < size; ++i) {
     hash = (hash ^ bytes[i]) * 0x100000001b3u;
   }
   return hash;
+}
+
+static uint64_t checksum(const unsigned char* bytes, size_t size) {
+  return fnv_1a(bytes + IDENTITY, size - IDENTITY);
+}
+
+uint64_t component_identity(const char* identifier) {
+  return fnv_1a((const unsigned char*)identifier, strlen(identifier));
 }
 
 static size_t model_offset(const component* c) {
@@ -69,7 +76,7 @@ void component_save(const component* c, void* bytes) {
   memcpy(to + MAGIC, magic, sizeof magic);
   put_u64(to + VERSION, STATE_VERSION);
   put_u64(to + SIZE, size);
-  put_u64(to + SALT, VARIABLE_TABLE_SALT);
+  put_u64(to + IDENTITY, c->identity);
   for (size_t i = 0; i < LIFE_COUNT; ++i) {
     put_number(to, i, life[i]);
   }
@@ -122,7 +129,7 @@ const char* component_refuse_block(const component* c, const void* bytes) {
   if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || get_u64(from + VERSION) != STATE_VERSION) {
     return "not a state of an FMU of this kind and version";
   }
-  if (get_u64(from + SIZE) != component_state_size(c) || get_u64(from + SALT) != VARIABLE_TABLE_SALT) {
+  if (get_u64(from + SIZE) != component_state_size(c) || get_u64(from + IDENTITY) != c->identity) {
     return "state of another FMU";
   }
   return NULL;

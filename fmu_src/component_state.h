@@ -4,8 +4,12 @@
 #define TENDONFMU_COMPONENT_STATE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "component.h"
+
+/* What the states of an FMU have in common, and no others: of its identifier (GUID, instantiation token). */
+uint64_t component_identity(const char* identifier);
 
 /* Bytes of a state; the same for every instance of one FMU. */
 size_t component_state_size(const component* c);

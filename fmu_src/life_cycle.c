@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "component_state.h"
 #include "resource.h"
 
 static void log_event(const component* c, fmu_function function, const char* event, const char* more) {
@@ -64,7 +65,7 @@ component* life_create(const log_target* log, const char* identifier, const char
   if (!m) {
     return NULL;
   }
-  component* c = component_create(log, m);
+  component* c = component_create(log, m, component_identity(identifier));
   return c ? c : life_refuse(log, "out of memory", "");
 }
 

@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../tests/test_finger.h"
+#include <deque>
+
 #include "fuzzed_fmu.hpp"
+#include "fuzzed_models.hpp"
 
 extern "C" {
 #include "bytes.h"
@@ -138,7 +140,10 @@ class call_sequence {
 
   /* where the next step begins, and how long it is; mostly so that it can be carried out */
   double point() { return rarely() ? number() : tried_.last_end; }
-  double length() { return rarely() ? number() : 0.001 + 0.01 * std::abs(number()); }
+  double length() {
+    const double wanted = rarely() ? number() : 0.001 + 0.01 * std::abs(number());
+    return wanted <= 1e3 ? std::min(wanted, longest_step) : wanted;
+  }
 
   // --- life cycle ---
 
@@ -152,7 +157,7 @@ class call_sequence {
         values[i] = size * std::sin(rate * tried_.last_end + shift * static_cast<double>(i * i));
       }
       tried_.answered(CALL_SET_REAL, version::write(c(), fmu_.inputs.references, values), nothing, {});
-      const double from = tried_.last_end, over = 0.01;
+      const double from = tried_.last_end, over = std::min(0.01, longest_step / 20.0);
       tried_.answered(CALL_DO_STEP, stepped(from, over, version::step(c(), from, over)), nothing, {});
     }
     return {CALL_SET_FMU_STATE, FMU_OK}; /* allowed in every state; all is checked by now */
@@ -315,9 +320,8 @@ class call_sequence {
 /* The sequence that the bytes of a fuzzer stand for, on one of three FMUs. */
 template <class Sequence>
 void run_sequence(const std::uint8_t* bytes, std::size_t size) {
-  static const unpacked_fmu fmus[] = {unpacked_fmu(test_finger::image()),
-                                      unpacked_fmu(test_finger::image(test_finger::watched_sensors())),
-                                      unpacked_fmu(test_finger::image(test_finger::every_effect()))};
+  static const std::vector<byte_list> made_of = resources();
+  static const std::deque<unpacked_fmu> fmus(made_of.begin(), made_of.end());
   FuzzedDataProvider data(bytes, size);
   const std::size_t which = data.ConsumeIntegralInRange<std::size_t>(0, 7);
   Sequence sequence(data, fmus[which < 6 ? 0 : which - 5], fmus[which < 6 ? 1 : 0]);

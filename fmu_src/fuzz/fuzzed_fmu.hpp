@@ -132,6 +132,9 @@ class unpacked_fmu {
     if (group.causality == CAUSALITY_INPUT) {
       return inputs;
     }
+    if (group.causality == CAUSALITY_PARAMETER && group.type == VARIABLE_REAL) {
+      return parameters;
+    }
     return group.type == VARIABLE_BOOLEAN ? flags : group.type == VARIABLE_INTEGER ? whole : outputs;
   }
 

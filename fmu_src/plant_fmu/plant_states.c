@@ -43,6 +43,16 @@ static int is_flag(double x) {
   return x == 0.0 || x == 1.0;
 }
 
+/* What model_save() leaves out of a finger that has not settled is zeros. */
+static int is_blank(const model* m, const void* bytes) {
+  const unsigned char* byte = bytes;
+  size_t at = AT_INPUTS * sizeof(double);
+  while (at < model_state_size(m) && byte[at] == 0) {
+    ++at;
+  }
+  return at == model_state_size(m);
+}
+
 const char* model_check_state(model* m, const void* bytes, int initialised) {
   double life[AT_SETTINGS], settings[SETTING_COUNT];
   get(bytes, AT_RUNNING, life, AT_SETTINGS);
@@ -51,7 +61,8 @@ const char* model_check_state(model* m, const void* bytes, int initialised) {
     return "damaged state: its phase does not fit its finger";
   }
   if (!isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) || !is_flag(life[AT_TOLERANCE_WRITTEN]) ||
-      !settings_are_sound(settings, m->joints)) {
+      !settings_are_sound(settings, m->joints) ||
+      (!initialised && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
     return "damaged state: a number in it cannot be";
   }
   return NULL; /* the plant looks at its own bytes when it takes them */

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import math
 import pickle
 import re
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from test_fmu_states import STATES, TABLE, checksum
 
 from fmu_binary import DISCARD, ERROR, OK, WARNING, Instance, UnpackedFmu, unpack
-from plant_fmu_rig import TOLERANCE, play
+from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, play
 from plant_rigs import needs_plant
 from repetitions import repeated
 from repository_paths import ROOT, SUPPORT
@@ -326,12 +327,25 @@ def test_saved_state_holds_everything(plant_fmu: UnpackedFmu, state: str) -> Non
         assert instance.get_integers(["integrator", "seed"]) == other.get_integers(["integrator", "seed"])
 
 
+@pytest.mark.parametrize("state", STATES[:3])
+def test_states_of_another_rig_of_the_same_size_are_refused(plant_fmu: UnpackedFmu, state: str, tmp_path: Path) -> None:
+    """Also before the finger has settled, when they hold nothing of it."""
+    (tmp_path / "rig.json").write_text(json.dumps(fmu_rig(seed=SEED + 1)))
+    heavier = unpack(build_plant_fmu(tmp_path / "rig.json", tmp_path / "heavier.fmu"), tmp_path / "heavier")
+    with brought_to(plant_fmu, state) as instance, brought_to(heavier, state) as other:
+        before = other.save()
+        assert len(instance.save()) == len(before)
+        assert other.restore(instance.save()) == ERROR
+        assert "state of another FMU" in other.last_message
+        assert other.save() == before
+
+
 CONTINUE = """
 import pickle, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from fmu_binary import OK, Instance, UnpackedFmu
-from plant_fmu_rig import TOLERANCE, play
+from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, play
 with Instance(UnpackedFmu(Path(sys.argv[2]))) as instance:
     assert instance.restore(Path(sys.argv[3]).read_bytes()) == OK
     sys.stdout.buffer.write(pickle.dumps(play(instance, 150, begin=130)))
