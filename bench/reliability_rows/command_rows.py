@@ -73,14 +73,19 @@ def is_whole(file: Path) -> bool:
     return bool(content)
 
 
+def entries(folder: Path) -> list[Path]:
+    """All in a folder. Others may remove some of it meanwhile, which `rglob` does not bear."""
+    return [Path(inside, name) for inside, folders, files in os.walk(folder) for name in (*folders, *files)]
+
+
 def results(folder: Path) -> dict[str, Path]:
     """Files that a user sees: no part of the name begins with a dot."""
-    found = {path.relative_to(folder): path for path in folder.rglob("*") if path.is_file()}
+    found = {path.relative_to(folder): path for path in entries(folder) if path.is_file()}
     return {str(name): path for name, path in found.items() if not any(part.startswith(".") for part in name.parts)}
 
 
 def hidden(folder: Path) -> list[Path]:
-    return [path for path in folder.rglob("*") if any(part.startswith(".") for part in path.relative_to(folder).parts)]
+    return [path for path in entries(folder) if any(part.startswith(".") for part in path.relative_to(folder).parts)]
 
 
 # --- killed -----------------------------------------------------------------------------------------------------------
@@ -94,10 +99,10 @@ def start(folder: Path, words: list[str]) -> subprocess.Popen[bytes]:
 def killed(folder: Path, words: list[str], chance: random.Random, longest: float, at_a_write: bool) -> bool:
     """True when it was killed before it had ended. at_a_write: when the first new file appears, else anywhere."""
     process = start(folder, words)
-    began, known = time.monotonic(), set((folder / "out").rglob("*"))
+    began, known = time.monotonic(), set(entries(folder / "out"))
     limit = longest * (3.0 if at_a_write else chance.random())
     while process.poll() is None and time.monotonic() - began < limit:
-        if at_a_write and set((folder / "out").rglob("*")) - known:
+        if at_a_write and set(entries(folder / "out")) - known:
             time.sleep(chance.choice([0.0, 0.001, 0.01, 0.1]))
             break
         time.sleep(0.0005 if at_a_write else 0.01)
@@ -154,18 +159,23 @@ SMALL_COMMANDS: dict[str, list[str]] = {
 
 
 def refused(folder: Path, name: str, command: list[str], limit: Callable[[], None] | None = None) -> str:
-    """ "" when the command fails in one line and leaves no half file; "ended" when there was room enough."""
+    """ "" when the command fails in one line and leaves no half file; "ended" when there was room enough; "lost" when a
+    library ended the process, or waits for threads that it could not start (OpenBLAS), or Python could not begin."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, preexec_fn=limit, env=environment, timeout=600
-    )
+    of_memory = limit is not None and "memory" in name
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, preexec_fn=limit, env=environment, timeout=120
+        )
+    except subprocess.TimeoutExpired:
+        return "lost" if of_memory else f"{name}: not ended after 120 s"
     halves = [file for file, path in results(folder / "out").items() if not is_whole(path)]
     if halves:
         return f"{name}: half of {halves[0]}"
     if done.returncode == 0:
         return "ended"
-    if limit is not None and "memory" in name and done.returncode not in (2, 3):
-        return "lost"  # a library ended the process, or Python could not begin
+    if of_memory and done.returncode not in (2, 3):
+        return "lost"
     lines = done.stderr.strip().splitlines()
     if done.returncode != 2 or len(lines) != 1 or not lines[0].startswith("tendonfmu: "):
         return f"{name}: status {done.returncode}: {len(lines)} lines: {' / '.join(lines)[:300]}"
@@ -240,8 +250,8 @@ def no_room(run: Run) -> Outcome:
     )
     result = (
         f"{tried - ended - lost - len(wrong)} refused in one line, {ended} had room enough, {lost} with little memory "
-        f"ended by a library or by Python itself, no half file; FMU: {refusals} of the allocations refuse "
-        f"a call, {words_said} with a word about memory, with the other {allocations - refusals} every call succeeds, "
+        "ended, or waiting for ever, in a library or in Python itself, no half file; FMU: "
+        f"{refusals} of the allocations refuse a call, {words_said} with a word about memory, with the other {allocations - refusals} every call succeeds, "
         f"{leaked} leaks; {len(wrong)} wrong"
     )
     return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong and fmu_sound)

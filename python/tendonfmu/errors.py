@@ -11,6 +11,10 @@ class InputError(ValueError):
     """Input from the user is refused. The message is one line that starts with the file."""
 
 
+class OutputError(InputError):
+    """A file cannot be written or unpacked: for the disk or a right, whatever the input. The message is one line."""
+
+
 class InputWarning(UserWarning):
     """Input from the user is accepted, but not all of it is used. The message is one line that starts with the file."""
 
@@ -23,10 +27,14 @@ class InternalError(Exception):
 def own_fault(what: str) -> Iterator[None]:
     """Turn an InputError inside the block into an InternalError, since all input has been checked before.
 
+    An OutputError stays: a disk may be full at any time.
+
     what: the computation or the result that fails, in a few words.
     """
     try:
         yield
+    except OutputError:
+        raise
     except InputError as refused:
         raise InternalError(f"{what}: {refused}") from refused
 

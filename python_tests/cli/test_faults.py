@@ -20,7 +20,7 @@ import tendonfmu
 from command import Call
 from fmu_binary import FINGER
 from tendonfmu.cli.fault_report import write_fault_report
-from tendonfmu.errors import InputError, InternalError, line_of, own_fault
+from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
 
@@ -118,6 +118,22 @@ def test_what_has_been_checked_is_no_input_any_more() -> None:
         raise InputError("finger: stiffness")
     with pytest.raises(KeyError), own_fault("the extended model"):
         raise KeyError
+    with pytest.raises(OutputError, match=r"^out: cannot be written"), own_fault("the extended model"):
+        raise OutputError("out: cannot be written (No space left on device)")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [MemoryError(), ImportError("libarrow.so: failed to map segment from shared object")],
+    ids=["Python", "loader"],
+)
+def test_too_little_memory_is_said_and_no_fault(
+    call: Call, failing: Callable[[BaseException], None], tmp_path: Path, error: Exception
+) -> None:
+    failing(error)
+    answer = call("check", "finger.json")
+    assert (answer.status, answer.out, answer.err) == (2, "", "tendonfmu: not enough memory\n")
+    assert {file.name for file in tmp_path.iterdir()} == {"finger.json"}
 
 
 @pytest.mark.parametrize("error", [native.NativeError("x"), InternalError("x")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -200,6 +201,21 @@ def test_a_disk_that_fails_in_between_changes_nothing(
     with pytest.raises(InputError, match="cannot be written"):
         write_diagnosis(examples.one_cause(), tmp_path / "new")
     assert {file.name for file in tmp_path.iterdir()} == {"out"}
+
+
+def test_a_disk_that_is_full_as_files_are_made_is_no_fault(
+    tmp_path: Path, earlier: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was said to be one of tendonfmu, and of a file in a hidden folder."""
+    copied(earlier, tmp_path)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(InputError, match=rf"^{re.escape(str(tmp_path / 'out'))}/[\w.]+: cannot be written \(No space"):
+        write_diagnosis(examples.one_cause(), tmp_path / "out")
+    assert content(tmp_path / "out") == content(earlier)
 
 
 # --- for real ---------------------------------------------------------------------------------------------------------

@@ -37,6 +37,14 @@ def is_own_file(path: object) -> bool:
     return isinstance(path, str) and Path(path).is_absolute() and Path(__file__).parent.parent in Path(path).parents
 
 
+def is_without_memory(error: BaseException) -> bool:
+    """Tell whether memory ran out, in Python or as a library was loaded, which the loader says in words alone."""
+    return isinstance(error, MemoryError) or (
+        isinstance(error, ImportError)
+        and any(words in str(error) for words in ("failed to map segment", "Cannot allocate"))
+    )
+
+
 def _folders() -> Iterator[Path]:
     yield Path()
     try:

@@ -43,7 +43,7 @@ from tendonfmu.cli.console import (
     say_files,
     warn,
 )
-from tendonfmu.cli.fault_report import is_own_file, write_fault_report
+from tendonfmu.cli.fault_report import is_own_file, is_without_memory, write_fault_report
 from tendonfmu.cli.options import (
     AsJson,
     FingerFile,
@@ -104,6 +104,8 @@ def main() -> None:
                 leave(ending.status)
             raise
         except Exception as refused:
+            if is_without_memory(refused):
+                _refuse("not enough memory")
             # Bad usage is recognised by this method: its class has moved between versions of typer.
             if not hasattr(refused, "format_message"):
                 _fault(refused)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, OutputError
 
 try:
     import fcntl
@@ -86,7 +86,7 @@ def _check_writable(output: Path, folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(f"{output}: cannot be written ({error.strerror})") from None
+        raise OutputError(f"{output}: cannot be written ({error.strerror})") from None
 
 
 @contextmanager
@@ -113,7 +113,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
     except OSError as error:
-        raise InputError(f"{file}: cannot be written ({error.strerror})") from None
+        raise OutputError(f"{file}: cannot be written ({error.strerror})") from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -127,7 +127,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     except OSError as error:
         if not is_about(error, file.parent):
             raise
-        raise InputError(f"{file}: cannot be written ({error.strerror or error})") from None
+        raise OutputError(f"{file}: cannot be written ({error.strerror or error})") from None
     finally:
         temporary.unlink(missing_ok=True)
 

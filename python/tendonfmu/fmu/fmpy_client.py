@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, OutputError
 from tendonfmu.fmu.archive_check import check_members, is_whole, one_line
 from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
 from tendonfmu.recordings import Recording
@@ -114,7 +114,7 @@ def _unpack(path: Path, folder: Path) -> None:
         raise
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
-            raise InputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
+            raise OutputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
         raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
     except Exception as error:
         raise InputError(f"{path}: not an FMU ({one_line(error)})") from None

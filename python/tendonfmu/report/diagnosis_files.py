@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tendonfmu.diagnosis import Diagnosis
-from tendonfmu.errors import InputError, own_fault
+from tendonfmu.errors import OutputError, own_fault
 from tendonfmu.files import check_output, check_output_folder, in_use, is_about, remove_left_behind, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
@@ -73,14 +73,22 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
         with _folder_beside(folder) as made_in:
             (made_in / "new").mkdir()
             with own_fault("the files of the diagnosis"):
-                made = _make(found, made_in / "new")
+                made = _make_for(found, made_in / "new", folder)
             with uninterrupted():
                 _move(made, folder, made_in / "old")
     except OSError as error:
         if not is_about(error, beside):
             raise
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from None
     return {folder / file.name: what for file, what in made.items()}
+
+
+def _make_for(found: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
+    """Make the files in a folder. A refusal tells the folder that the user has named."""
+    try:
+        return _make(found, folder)
+    except OutputError as refused:
+        raise OutputError(str(refused).replace(str(folder), str(named))) from None
 
 
 @contextmanager
