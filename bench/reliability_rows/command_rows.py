@@ -250,9 +250,9 @@ def no_room(run: Run) -> Outcome:
     )
     result = (
         f"{tried - ended - lost - len(wrong)} refused in one line, {ended} had room enough, {lost} with little memory "
-        "ended, or waiting for ever, in a library or in Python itself, no half file; FMU: "
-        f"{refusals} of the allocations refuse a call, {words_said} with a word about memory, with the other {allocations - refusals} every call succeeds, "
-        f"{leaked} leaks; {len(wrong)} wrong"
+        f"ended, or waiting for ever, in a library or in Python itself, no half file; FMU: {refusals} of the "
+        f"allocations refuse a call, {words_said} with a word about memory, with the other {allocations - refusals} "
+        f"every call succeeds, {leaked} leaks; {len(wrong)} wrong"
     )
     return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong and fmu_sound)
 
