@@ -23,6 +23,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 COMPILED = (".c", ".h", ".cpp")
+# It fails with every fault: its text is not in the file any more.
+WITHOUT = ("--deselect", "python_tests/repository/test_planted_faults.py::test_every_fault_fits_its_file")
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def noticed_by(fault: Fault, folder: Path, logs: Path, number: int) -> str:
             if not run(folder, log, "ctest", "--test-dir", "build/tests", "--stop-on-failure", "--parallel", "2"):
                 return first_failure(log)
         for where in (f"python_tests/{fault.near}", "python_tests"):
-            if not run(folder, log, "./test", "-x", "-q", where):
+            if not run(folder, log, "./test", "-x", "-q", *WITHOUT, where):
                 return first_failure(log) or "./test"
         return ""
 
