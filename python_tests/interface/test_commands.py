@@ -18,16 +18,16 @@ from repository_paths import ROOT
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 import tendonfmu as tf
-from tendonfmu.cli import detect, diagnose, program, run
+from tendonfmu.cli import build, detect, diagnose, fit, run
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, INDEX = DEMO / "two_joints.json", DEMO / "index_finger_calibrated.json"
 # what a command writes, and how it shows progress
 OF_COMMANDS = {"output", "report", "figures", "progress", "as_json", "quiet"}
 COMMANDS: dict[str, tuple[Callable[..., Any], Callable[..., Any], set[str]]] = {
-    "build": (program.build, tf.build, set()),
+    "build": (build.build, tf.build, set()),
     "run": (run.run, tf.run, set()),
-    "fit": (program.fit, tf.fit, {"ssv"}),  # FitResult.write writes it
+    "fit": (fit.fit, tf.fit, {"ssv"}),  # FitResult.write writes it
     "tune": (detect.tune, tf.tune, set()),
     "score": (detect.score, tf.score, set()),
     "diagnose": (diagnose.diagnose, tf.diagnose, {"history", "scheduler"}),

@@ -18,15 +18,15 @@ from repository_paths import ROOT
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 import tendonfmu as tf
-from tendonfmu.cli import detect, diagnose, program, run
+from tendonfmu.cli import build, detect, diagnose, fit, run
 from tendonfmu.interface.options import OPTIONS, Kind, Number, Paths, Texts, read_option
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, RECORDING = DEMO / "two_joints.json", DEMO / "two_joints_training.parquet"
 COMMANDS: list[tuple[Callable[..., Any], Callable[..., Any]]] = [
-    (program.build, tf.build),
+    (build.build, tf.build),
     (run.run, tf.run),
-    (program.fit, tf.fit),
+    (fit.fit, tf.fit),
     (detect.tune, tf.tune),
     (detect.score, tf.score),
     (diagnose.diagnose, tf.diagnose),

@@ -1,4 +1,4 @@
-"""The results of the demo in words: the rows and lines that `cli/program.py` prints, and the sentences of its page."""
+"""The results of the demo in words: the rows and lines that `cli/demo.py` prints, and the sentences of its page."""
 
 from __future__ import annotations
 

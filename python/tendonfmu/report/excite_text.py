@@ -1,4 +1,4 @@
-"""What a motion excites, as tables and lines that `cli/program.py` prints."""
+"""What a motion excites, as tables and lines that `cli/excite.py` prints."""
 
 from __future__ import annotations
 

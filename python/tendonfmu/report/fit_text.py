@@ -1,4 +1,4 @@
-"""How a finished fit reads in the terminal: tables and lines that `cli/program.py` prints."""
+"""How a finished fit reads in the terminal: tables and lines that `cli/fit.py` prints."""
 
 from __future__ import annotations
 

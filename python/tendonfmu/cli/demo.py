@@ -1,0 +1,43 @@
+"""The command `demo`: all steps on built-in data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tendonfmu.cli.console import phase_bar, print_json, print_tables, progress_bar, say, warn
+from tendonfmu.cli.options import AsJson, Progress, Quiet
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command()(demo)
+
+
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
+        "tendonfmu-demo"
+    ),
+    progress: Progress = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Show every step on built-in data in a minute: calibrate, detect, diagnose, fit, run.
+
+    DIR gets the page story.html and all the files that it is made from.
+    """
+    from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, story_report, write_story
+
+    story = Story(output)
+    if story.missing:
+        warn(f"{story.missing}")
+    for number, chapter in enumerate(story.chapters, start=1):
+        say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
+        with progress_bar(progress) as bar:
+            chapter.run(phase_bar(bar))
+        print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
+    write_story(story)
+    print_tables((), file_lines(story), left="")
+    print_json(lambda: story_report(story))
