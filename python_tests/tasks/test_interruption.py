@@ -1,15 +1,19 @@
-"""Ctrl-C and SIGTERM at any moment of a command: one line, its status, and results as they were or whole."""
+"""Signals at any moment of a command: one line, its status, and results as they were or whole."""
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
+import pty
 import re
 import signal
 import subprocess
 import sys
+import termios
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -32,7 +36,7 @@ from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted, worker
 HERE = SUPPORT
 PROMPT = 10.0  # s; on a busy machine
 SAID = "tendonfmu: interrupted; no file was left half written"
-STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 # `tendonfmu diagnose` with another computation; "ready" says that its moment has come
 PROGRAM = """
@@ -104,7 +108,9 @@ def foreground() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def started(folder: Path, body: str) -> subprocess.Popen[str]:
+def started(
+    folder: Path, body: str, first: Callable[[], None] = foreground, stderr: int = subprocess.PIPE
+) -> subprocess.Popen[str]:
     """A process that stands where it has to be interrupted; `out` holds an earlier diagnosis."""
     (folder / "finger.json").write_text("{}")
     (folder / "a.csv").write_text("")
@@ -113,9 +119,9 @@ def started(folder: Path, body: str) -> subprocess.Popen[str]:
         [sys.executable, "-c", code],
         cwd=folder,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=stderr,
         text=True,
-        preexec_fn=foreground,
+        preexec_fn=first,
     )
     assert process.stdout is not None
     if process.stdout.readline() != "ready\n":
@@ -165,6 +171,34 @@ def test_nothing_is_left_and_nothing_is_lost(
     assert seconds < PROMPT
     assert content(tmp_path / "out") == before
     assert {file.name for file in tmp_path.iterdir()} == {"finger.json", "a.csv", "out"}
+
+
+def test_a_terminal_that_closes_ends_a_command(tmp_path: Path, earlier: Path) -> None:
+    """Its one line can be read by nobody."""
+    copied(earlier, tmp_path)
+    terminal, own = pty.openpty()
+
+    def inside() -> None:
+        os.setsid()
+        fcntl.ioctl(own, termios.TIOCSCTTY, 0)
+
+    process = started(tmp_path, MOMENTS["python"], inside, own)
+    os.close(own)
+    os.close(terminal)
+    try:
+        assert process.wait(60) == 129
+    finally:
+        process.kill()
+    assert content(tmp_path / "out") == content(earlier)
+
+
+def test_nohup_is_respected() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ended_by_signals():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_the_folder_changes_at_once(tmp_path: Path, earlier: Path) -> None:

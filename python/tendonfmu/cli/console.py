@@ -12,6 +12,7 @@ Only this module and `program.py` print. What is printed depends on the options 
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import threading
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from tendonfmu.tasks import PhaseState
 
 
-# exit status of every command; 0 is done, 143 is ended by SIGTERM
+# exit status of every command; 0 is done, 129 and 143 are ended by SIGHUP and SIGTERM
 NO, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
 
 
@@ -52,7 +53,8 @@ PRINTED = Printed()  # a process has one standard output; `options.py` sets this
 
 def fail(message: str) -> None:
     """Print the line of an error on standard error, also with `--quiet`."""
-    print(f"tendonfmu: {message}", file=sys.stderr)
+    with reader_may_leave(sys.stderr):
+        print(f"tendonfmu: {message}", file=sys.stderr)
 
 
 def warn(sentence: str) -> None:
@@ -105,10 +107,12 @@ def print_csv(lines: Iterable[str]) -> None:
 
 @contextmanager
 def reader_may_leave(stream: IO[str]) -> Iterator[None]:
-    """Go on silently when the reader of a stream closes it, as `head` does: it has what it wants."""
+    """Go on silently when the reader of a stream closes it, as `head` does, or a terminal (EIO)."""
     try:
         yield
-    except BrokenPipeError:
+    except OSError as gone:
+        if gone.errno not in (errno.EPIPE, errno.EIO):
+            raise
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())  # what is still buffered goes there
         os.close(nowhere)

@@ -1,4 +1,4 @@
-"""How Ctrl-C and SIGTERM end a command: as KeyboardInterrupt, and never while results are being written."""
+"""How signals end a command: as KeyboardInterrupt, and never while results are being written."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# What each does in a program that nobody has told otherwise. SIGHUP: the terminal has closed; Windows has none.
+_USUAL: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+if hasattr(signal, "SIGHUP"):
+    _USUAL[signal.SIGHUP] = signal.SIG_DFL
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM asked the process to end."""
+    """SIGTERM or SIGHUP asked the process to end."""
 
 
 class Ending:
@@ -59,9 +63,10 @@ def raise_lost_interruption() -> None:
 
 @contextmanager
 def ended_by_signals() -> Iterator[Ending]:
-    """Let SIGTERM raise KeyboardInterrupt inside the block, as Ctrl-C does, and remember that one of them came.
+    """Let SIGTERM and SIGHUP raise KeyboardInterrupt inside the block, as Ctrl-C does, and remember which one came.
 
-    Outside the main thread it does nothing.
+    A signal that is ignored, as behind nohup, or that somebody else handles, stays so. Outside the main thread it does
+    nothing.
 
     Yields
     ------
@@ -72,22 +77,21 @@ def ended_by_signals() -> Iterator[Ending]:
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
         yield ending
         return
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGTERM, ending.end)
-    if before == signal.default_int_handler:  # else Ctrl-C is ignored, as behind nohup, or somebody else's
-        signal.signal(signal.SIGINT, ending.end)
+    taken = [number for number, usual in _USUAL.items() if signal.getsignal(number) == usual]
+    for number in taken:
+        signal.signal(number, ending.end)
     _endings.append(ending)
     try:
         yield ending
     finally:
         _endings.remove(ending)
-        signal.signal(signal.SIGINT, before)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in taken:
+            signal.signal(number, _USUAL[number])
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delay Ctrl-C and SIGTERM to the end of the block, where the first of them takes effect.
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, where the first of them takes effect.
 
     The block should take milliseconds: it is for replacing several files together. Outside the main thread it does
     nothing, since only the main thread is interrupted.
@@ -96,7 +100,7 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     waiting: list[int] = []
-    before = {number: signal.signal(number, lambda which, frame: waiting.append(which)) for number in _SIGNALS}
+    before = {number: signal.signal(number, lambda which, frame: waiting.append(which)) for number in _USUAL}
     try:
         yield
     finally:
