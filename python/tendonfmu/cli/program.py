@@ -84,9 +84,7 @@ def main() -> None:
         try:
             status = _commands()(prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
-            if (
-                isinstance(refused, OSError) and ending.asked is not None
-            ):  # a bar on a closed terminal
+            if isinstance(refused, OSError) and ending.asked is not None:  # a bar on a closed terminal
                 _interrupted(ending.status)
             if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
                 sys.stderr.close()

@@ -1,8 +1,8 @@
 """How certain results are: statistics without any knowledge of fingers.
 
 Series are averaged over blocks (`block_averages`, `blocks`), splines remove a slow bias (`splines`), and parts are held
-out (`folds`). Columns are judged by their Gram matrices (`block_grams`), noise is whitened (`whitening`), and counts
-and measurements get an interval (`intervals`, `paired_gain`, `effective_number`).
+out (`folds`). Columns are judged by their Gram matrices (`column_products`, `block_grams`), noise is whitened
+(`whitening`), and counts and measurements get an interval (`intervals`, `paired_gain`, `effective_number`).
 """
 
 import lazy_loader

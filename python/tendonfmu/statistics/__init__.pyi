@@ -6,9 +6,9 @@ from .block_averages import BlockSums as BlockSums
 from .block_averages import SampleBlocks as SampleBlocks
 from .block_averages import regular_blocks as regular_blocks
 from .block_grams import Grams as Grams
-from .block_grams import Products as Products
 from .block_grams import standard_error as standard_error
 from .blocks import BlockSeries as BlockSeries
+from .column_products import Products as Products
 from .effective_number import effective_samples as effective_samples
 from .effective_number import sample_weights as sample_weights
 from .folds import FEWEST_STRETCHES as FEWEST_STRETCHES
