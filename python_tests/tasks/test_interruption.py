@@ -104,8 +104,9 @@ os.replace = slow
 
 
 def foreground() -> None:
-    """A job in the background of a shell inherits that SIGINT is ignored."""
+    """A job in the background of a shell inherits that SIGINT is ignored, and behind nohup SIGHUP."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def started(
@@ -179,6 +180,7 @@ def test_a_terminal_that_closes_ends_a_command(tmp_path: Path, earlier: Path) ->
     terminal, own = pty.openpty()
 
     def inside() -> None:
+        foreground()
         os.setsid()
         fcntl.ioctl(own, termios.TIOCSCTTY, 0)
 
