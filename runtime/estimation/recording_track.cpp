@@ -104,7 +104,7 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
       source_(a.kinematics_source) {
   const finger_settings& settings = finger->get()->derived.settings;
   if (a.samples < 2) {
-    throw refused(std::to_string(a.samples) + " samples: expected at least 2");
+    throw refused("samples = " + std::to_string(a.samples) + ": expected at least 2");
   }
   time_ = copied(a.time, a.samples);
   force_ = copied(a.inputs.tendon_force, a.samples * tendons_);

@@ -184,7 +184,7 @@ tendonfmu_status tendonfmu_learner_run(tendonfmu_learner* learner, size_t sample
     }
     status = guarded(learner, TENDONFMU_BAD_SAMPLE, TENDONFMU_BAD_ARGUMENT, [&] {
       if (samples < 2) {
-        throw refused(std::to_string(samples) + " samples: expected at least 2");
+        throw refused("samples = " + std::to_string(samples) + ": expected at least 2");
       }
       for (bool wanted = true; row < samples && wanted; ++row) {
         run.take(row);

@@ -384,7 +384,7 @@ TEST(Estimator, RefusesRecordingsItCannotWeigh) {
   };
   made::Recording r = c.recording;
   r.samples = 1;
-  EXPECT_EQ(why(r), "1 samples: expected at least 2");
+  EXPECT_EQ(why(r), "samples = 1: expected at least 2");
   r = c.recording;
   std::fill(r.use.begin() + 1, r.use.end(), 0);
   EXPECT_EQ(why(r), "1 samples to learn from: expected at least 2");

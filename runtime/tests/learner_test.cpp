@@ -370,7 +370,7 @@ TEST(Learner, SaysWhyItRefuses) {
   EXPECT_EQ(tendonfmu_learner_run(learner.get(), 1, c.recording.time.data(), &inputs, 3, nullptr, nullptr, nullptr,
                                   nullptr, nullptr, nullptr, &done),
             TENDONFMU_BAD_SAMPLE);
-  EXPECT_STREQ(tendonfmu_learner_last_error(learner.get()), "1 samples: expected at least 2");
+  EXPECT_STREQ(tendonfmu_learner_last_error(learner.get()), "samples = 1: expected at least 2");
   EXPECT_EQ(tendonfmu_learner_initialise(learner.get(), 0.0, &inputs, 4, nullptr, 1), TENDONFMU_BAD_ARGUMENT);
 }
 
