@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import pty
 import re
 import signal
 import subprocess
 import sys
-import termios
 import threading
 import time
 from collections.abc import Callable
@@ -176,6 +173,10 @@ def test_nothing_is_left_and_nothing_is_lost(
 
 def test_a_terminal_that_closes_ends_a_command(tmp_path: Path, earlier: Path) -> None:
     """Its one line can be read by nobody."""
+    import fcntl  # POSIX alone, as these two
+    import pty
+    import termios
+
     copied(earlier, tmp_path)
     terminal, own = pty.openpty()
 
