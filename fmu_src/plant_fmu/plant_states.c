@@ -81,7 +81,7 @@ static int restore_plant(model* m, const double* settings, const void* state) {
   return status == TENDONFMU_PLANT_OK ? 0 : plant_failed(m);
 }
 
-/* Takes over the plant of a state; when that is refused, the one of before. */
+/* Restores the plant from a state. If the plant refuses it, the plant goes back to how it was. */
 static int take_plant(model* m, const double* settings, const void* state) {
   char reason[PLANT_ERROR_BYTES];
   double former[SETTING_COUNT];

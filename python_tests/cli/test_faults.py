@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 import tendonfmu
 from command import Call
 from fmu_binary import FINGER
+from tendonfmu.cli.console import reader_may_leave
 from tendonfmu.cli.fault_report import write_fault_report
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
 from tendonfmu.files.writing import whole_file
@@ -134,6 +136,12 @@ def test_too_little_memory_is_said_and_no_fault(
     answer = call("check", "finger.json")
     assert (answer.status, answer.out, answer.err) == (2, "", "tendonfmu: not enough memory\n")
     assert {file.name for file in tmp_path.iterdir()} == {"finger.json"}
+
+
+def test_a_disk_that_fails_under_results_is_not_taken_for_a_closed_terminal() -> None:
+    gone = OSError(errno.EIO, os.strerror(errno.EIO))
+    with pytest.raises(OSError, match="Input/output"), reader_may_leave(sys.stdout):
+        raise gone
 
 
 @pytest.mark.parametrize("error", [native.NativeError("x"), InternalError("x")])

@@ -340,6 +340,18 @@ def test_states_of_another_rig_of_the_same_size_are_refused(plant_fmu: UnpackedF
         assert other.save() == before
 
 
+def test_a_damaged_state_of_a_finger_that_has_not_settled_is_refused(plant_fmu: UnpackedFmu) -> None:
+    """Its plant is zeros; with a checksum that fits, anything else was ignored."""
+    with Instance(plant_fmu) as instance:
+        bad = bytearray(instance.save())
+        bad[-3] = 1
+        bad[24:32] = struct.pack("<Q", checksum(bytes(bad)))
+        before = instance.save()
+        assert instance.restore(bytes(bad)) == ERROR
+        assert "a number in it cannot be" in instance.last_message
+        assert instance.save() == before
+
+
 CONTINUE = """
 import pickle, sys
 from pathlib import Path

@@ -107,11 +107,12 @@ def print_csv(lines: Iterable[str]) -> None:
 
 @contextmanager
 def reader_may_leave(stream: IO[str]) -> Iterator[None]:
-    """Go on silently when the reader of a stream closes it, as `head` does, or a terminal (EIO)."""
+    """Go on silently when the reader of a stream closes it, as `head` does, or a terminal of messages."""
     try:
         yield
     except OSError as gone:
-        if gone.errno not in (errno.EPIPE, errno.EIO):
+        closed_terminal = gone.errno == errno.EIO and stream is sys.stderr  # of results, EIO is a disk that fails
+        if gone.errno != errno.EPIPE and not closed_terminal:
             raise
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())  # what is still buffered goes there

@@ -2,7 +2,7 @@
 
 Results go to files or standard output, messages to standard error.
 
-Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault of tendonfmu, 130 and 143 interrupted.
+Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault of tendonfmu, 129, 130 and 143 a signal.
 """
 
 from __future__ import annotations
