@@ -25,12 +25,7 @@ class InternalError(Exception):
 
 @contextmanager
 def own_fault(what: str) -> Iterator[None]:
-    """Turn an InputError inside the block into an InternalError, since all input has been checked before.
-
-    An OutputError stays: a disk may be full at any time.
-
-    what: the computation or the result that fails, in a few words.
-    """
+    """Turn an InputError inside the block into an InternalError, since all input has been checked before."""
     try:
         yield
     except OutputError:

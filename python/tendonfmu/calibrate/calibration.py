@@ -72,44 +72,24 @@ PHASES = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """A finished calibration.
+    """A finished calibration."""
 
-    Attributes
-    ----------
-    data
-        The calibrated description.
-    report
-        `calibration.json`, without the list of files.
-    diagnosis
-        The diagnosis; None if this call did not make it, because it was resumed or not asked for.
-    """
-
-    data: Data
-    report: dict[str, Any]
+    data: Data  # the calibrated description
+    report: dict[str, Any]  # `calibration.json`, without the list of files
+    # the diagnosis; None if this call did not make it, because it was resumed or not asked for
     diagnosis: Diagnosis | None
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options of `calibrate`.
+    """Options of `calibrate`."""
 
-    Attributes
-    ----------
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    false_alarms_per_hour, confidence
-        Highest rate of false alarms (1/h), and the probability that it is not exceeded.
-    seed
-        Seed of the random numbers.
-    jobs
-        Processor cores to use; no effect on the result.
-    """
-
-    kinematics: int = 1
+    kinematics: int = 1  # 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities
+    # highest rate of false alarms (1/h), and the probability that it is not exceeded
     false_alarms_per_hour: float = 6.0
     confidence: float = 0.9
-    seed: int = 0
-    jobs: int = 1
+    seed: int = 0  # seed of the random numbers
+    jobs: int = 1  # processor cores to use; no effect on the result
 
     @property
     def of_alarms(self) -> dict[str, float]:
@@ -208,10 +188,7 @@ def _start(finger: Path, previous: Path | None) -> _Start:
 
 @dataclass(frozen=True)
 class _Case:
-    """The recordings of a calibration.
-
-    `free` has held-out stretches if there are no tests. `sentences` are remarks on the recordings.
-    """
+    """The recordings of a calibration."""
 
     start: _Start
     free: list[FitRecording]

@@ -41,20 +41,7 @@ def files_of(report: Mapping[str, Any]) -> dict[str, str]:
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
-    """Check that the results can be written, before a long computation.
-
-    Parameters
-    ----------
-    folder
-        Folder for the results.
-    inputs
-        Files that no result may replace.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be written, or a result would replace an input.
-    """
+    """Check that the results can be written, before a long computation."""
     check_output_folder(folder)
     if folder.is_dir():
         for name in (FINGER, FMU, PAGE, REPORT):
@@ -62,20 +49,7 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 
 def write_calibration(found: Calibration, folder: Path) -> dict[Path, str]:
-    """Write the files of a calibration; each appears whole or not at all, the report last.
-
-    Parameters
-    ----------
-    found
-        Finished calibration.
-    folder
-        Folder for the results; made if missing.
-
-    Returns
-    -------
-    dict
-        Each file with its content in words, in order of use.
-    """
+    """Write the files of a calibration; each appears whole or not at all, the report last."""
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / FINGER, description_text(dict(found.data)))
     build_fmu(folder / FINGER, folder / FMU)

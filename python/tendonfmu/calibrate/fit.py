@@ -49,11 +49,7 @@ Data = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class CalibratedFit:
-    """A fit of all recordings.
-
-    `data` is the description as it runs online, with `contact.uncertainty`. `events` are stretches that no friction
-    explains, which the fit leaves out. `warnings` are sentences.
-    """
+    """A fit of all recordings."""
 
     data: Data
     events: tuple[Event, ...]
@@ -71,12 +67,7 @@ def fit_all(
     uncertainty: bool = True,
     only_sliding: bool = False,
 ) -> CalibratedFit:
-    """Fit a diagnosed finger to all recordings of free motion. Raises InputError.
-
-    `finger` is the description that the diagnosis extended, with its numbers as the start. `recordings` are as
-    measured. `given` is the description that gives the expected magnitudes. `uncertainty` asks for
-    `contact.uncertainty`, `only_sliding` to leave out the samples in which something is stuck.
-    """
+    """Fit a diagnosed finger to all recordings of free motion. Raises InputError."""
     data = signals.description(finger.data)
     if not unknowns(data):
         return CalibratedFit(finger.data, (), ())
@@ -102,10 +93,7 @@ def fit_all(
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:
-    """Return the description of an earlier calibration; for a fit's report, the given one with its values.
-
-    Raises InputError.
-    """
+    """Return the description of an earlier calibration; for a fit's report, the given one with its values."""
     if read_json(previous, "an earlier calibration").get("format") == fit_report.FORMAT:
         return with_previous_values(given, read_previous_fit(previous))
     return read_finger(previous)
@@ -120,10 +108,7 @@ def fit_again(
     kinematics: int,
     threads: int,
 ) -> CalibratedFit:
-    """Fit an earlier calibration to new motion; its values and their uncertainty are the prior. Raises InputError.
-
-    `share` is the share of the recordings' time that is held out.
-    """
+    """Fit an earlier calibration to new motion; its values and their uncertainty are the prior. Raises InputError."""
     fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # the report lists them

@@ -18,11 +18,7 @@ SHORTEST = 15.0  # s, least length of a stretch
 def stretches_for_diagnosis(
     free: Sequence[Recording], tests: Sequence[Recording]
 ) -> tuple[list[Recording], list[Recording]]:
-    """Choose stretches of the recordings to find the structure in, and stretches to judge it on.
-
-    The latter come from the tests, or from the rest of the recordings. Short recordings are used whole, with nothing to
-    judge on; a diagnosis then holds out parts of them.
-    """
+    """Choose stretches of the recordings to find the structure in, and stretches to judge it on."""
     whole = sum(_seconds(each) for each in free)
     if tests:
         total = sum(_seconds(each) for each in tests)
@@ -37,10 +33,7 @@ def _seconds(recording: Recording) -> float:
 
 
 def _cut(recordings: Sequence[Recording], begin: float, share: float) -> list[Recording]:
-    """Cut a share of the time of each recording, from a share on; the whole recording if the share is 1 or more.
-
-    Stretches that are too short are left out if there are others.
-    """
+    """Cut a share of the time of each recording, from a share on; the whole recording if the share is 1 or more."""
     if share >= 1.0:
         return list(recordings)
     found = [_stretch(each, begin, share) for each in recordings if share * _seconds(each) >= SHORTEST]

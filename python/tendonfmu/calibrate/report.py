@@ -54,10 +54,8 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
 def errors_of(
     data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
 ) -> list[float]:
-    """Compute [n] the rms of r on the samples that nothing was fitted to (N·m).
-
-    With `data` None it is that without friction, with the bias of `settings`.
-    """
+    """Compute [n] the rms of r on the samples that nothing was fitted to (N·m)."""
+    # With `data` None it is that without friction, with the bias of `settings`.
     found, masks = [], []
     for each in recordings:
         left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
@@ -67,18 +65,8 @@ def errors_of(
 
 
 def rms_of(values: Sequence[float]) -> float:
-    """Combine the rms of all joints: the root of their mean square.
-
-    Parameters
-    ----------
-    values
-        [n] rms by joint.
-
-    Returns
-    -------
-    float
-        rms over all joints, in the same unit.
-    """
+    """Combine the rms of all joints: the root of their mean square."""
+    # values: [n]
     return math.sqrt(sum(value**2 for value in values) / len(values))
 
 
@@ -94,11 +82,7 @@ def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
 
 
 def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
-    """Compute the smallest change of each joint torque that is reported, [n] each (N·m).
-
-    "median" and "nine_tenths" are the sudden changes that exceed the bounds in half and in nine tenths of the time;
-    "slow" is the slow change that exceeds those of contact.drift in half of the time.
-    """
+    """Compute the smallest change of each joint torque that is reported, [n] each (N·m)."""
     name = "innovation" if "innovation" in tuning.bounds_ else "residual"
     bound, search = tuning.bounds_[name], tuning.searches_[name]
     whole = bound.own(tuning.cells_.force)

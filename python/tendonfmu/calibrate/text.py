@@ -22,20 +22,7 @@ MODELS = {
 
 
 def verdict(report: Report) -> tuple[str, str]:
-    """Judge a calibration.
-
-    Parameters
-    ----------
-    report
-        Report "tendonfmu-calibration-1".
-
-    Returns
-    -------
-    tone : str
-        "good", "" or "bad".
-    sentence : str
-        The result in one sentence.
-    """
+    """Judge a calibration."""
     before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
     error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
@@ -167,13 +154,7 @@ def push_sentence(report: Report) -> str:
 
 
 def lines(report: Report) -> Iterator[str]:
-    """Yield the lines for the terminal.
-
-    Parameters
-    ----------
-    report
-        Report "tendonfmu-calibration-1".
-    """
+    """Yield the lines for the terminal."""
     yield verdict(report)[1]
     if report["pushes"] is not None:
         yield push_sentence(report)
@@ -182,18 +163,7 @@ def lines(report: Report) -> Iterator[str]:
 
 
 def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
-    """Yield the tables.
-
-    Parameters
-    ----------
-    report
-        Report "tendonfmu-calibration-1".
-
-    Yields
-    ------
-    tuple
-        (title, headings, rows).
-    """
+    """Yield the tables."""
     yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
     if report["structure"]["causes"]:
         yield (

@@ -33,19 +33,11 @@ NO, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
 
 @dataclass
 class Printed:
-    """What this call of the command prints.
+    """What this call of the command prints."""
 
-    Attributes
-    ----------
-    quiet, json
-        Whether `--quiet` and `--json` are given.
-    table
-        Whether standard output carries a table (`--output -`).
-    """
-
-    quiet: bool = False
+    quiet: bool = False  # whether `--quiet` and `--json` are given
     json: bool = False
-    table: bool = False
+    table: bool = False  # whether standard output carries a table (`--output -`)
 
 
 PRINTED = Printed()  # a process has one standard output; `options.py` sets this anew when it parses a command
@@ -136,10 +128,7 @@ def leave(status: int) -> NoReturn:
 
 
 def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
-    """Print tables of (title, headings, rows), then lines.
-
-    The first column and the column headed `left` are text, aligned left; the others are numbers, aligned right.
-    """
+    """Print tables of (title, headings, rows), then lines."""
     from rich.console import Console
     from rich.table import Table
 
@@ -196,11 +185,7 @@ def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
 
 
 class PhaseDisplay:
-    """Progress of a computation of several phases, on standard error; call it with a `tendonfmu.tasks.PhaseState`.
-
-    On a terminal it draws a bar for the phase. Elsewhere it prints a line per phase and at most one every `EVERY`
-    seconds. With `wanted` None it shows on a terminal only.
-    """
+    """Progress of a computation of several phases, on standard error; call it with a `tendonfmu.tasks.PhaseState`."""
 
     EVERY = 10.0
 

@@ -18,11 +18,8 @@ _PACKAGES = ("numpy", "scipy", "scikit-learn", "pyarrow", "fmpy", "typer", "rich
 
 
 def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path | None:
-    """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable.
-
-    The file goes into the current folder, or else into the folder for temporary files. It is written whole or not at
-    all, and never replaces another file. `arguments` are those of the command.
-    """
+    """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable."""
+    # It is written whole or not at all, and never replaces another file.
     text = _report(error, arguments)
     for folder in _folders():
         try:

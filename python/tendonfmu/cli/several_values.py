@@ -19,11 +19,7 @@ class SeveralValues(TyperCommand):
 
 
 def several_values(args: Sequence[str], valued: set[str]) -> list[str]:
-    """Repeat an option before each of its values.
-
-    Once a finger and a recording are given, all words after one of `OPTIONS`, up to the next option, are its values.
-    `valued` holds the options that take a value.
-    """
+    """Repeat an option before each of its values."""
     found: list[str] = []
     free, option = 0, ""  # count of arguments without an option so far; the option of the next word
     rest = list(args)

@@ -50,13 +50,7 @@ class StandardInput(OwnPath):
 
 
 def reads(*names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorate a command: `-` stands for standard input in the arguments with these names, one file or several.
-
-    Raises
-    ------
-    InputError
-        Standard input is given twice, or is empty.
-    """
+    """Decorate a command: `-` stands for standard input in the arguments with these names, one file or several."""
 
     def decorate(command: Callable[P, R]) -> Callable[P, R]:
         @wraps(command)
@@ -97,13 +91,7 @@ def _kept(content: bytes, folder: Path) -> Path:
 
 
 def check_table(output: Path, *inputs: Path) -> None:
-    """Check that a table can be written: a .csv, .parquet or .mcap file that is no input, or `-` for standard output.
-
-    Raises
-    ------
-    InputError
-        It cannot; or standard output is wanted for the table and for `--json`.
-    """
+    """Check that a table can be written: a .csv, .parquet or .mcap file that is no input, or `-`."""
     from tendonfmu.files import check_output, check_output_format
 
     PRINTED.table = output == DASH

@@ -42,11 +42,7 @@ Phase = Callable[[str, int, int | None], None]
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter of the demo.
-
-    `name` is one word and `title` its subject. `run` runs it, and is called with a function that receives the present
-    phase, the steps done, and the total (None: unknown).
-    """
+    """A chapter of the demo."""
 
     name: str
     title: str
@@ -54,36 +50,10 @@ class Chapter:
 
 
 class Story:
-    """The demo in a folder: its chapters run in order, and `write_story` (page.py) then writes the page.
+    """The demo in a folder: its chapters run in order, and `write_story` (page.py) then writes the page."""
 
-    Parameters
-    ----------
-    folder
-        Folder for the results; made if missing.
-
-    Attributes
-    ----------
-    chapters
-        Chapters to run, in order.
-    finger
-        Results of detect and run.
-    calibration, fit
-        Results of these chapters.
-    diagnosis
-        Diagnosis of the calibration.
-    files
-        Each file with its content in words, the page first.
-    missing
-        Why chapters are left out; empty if none is.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made.
-    """
-
-    calibration: Calibration
-    diagnosis: Diagnosis
+    calibration: Calibration  # results of these chapters
+    diagnosis: Diagnosis  # diagnosis of the calibration
     fit: FrictionFit
 
     def __init__(self, folder: Path) -> None:
@@ -111,13 +81,7 @@ class Story:
         return {**self._files, **self.finger.files}
 
     def add_page(self, page: Path) -> None:
-        """Put the page of the whole story before all other files.
-
-        Parameters
-        ----------
-        page
-            File of the page.
-        """
+        """Put the page of the whole story before all other files."""
         self._files = {page: "the whole demo, for a browser", **self._files}
 
     def _calibrate(self, phase: Phase) -> None:

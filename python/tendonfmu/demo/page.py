@@ -39,13 +39,7 @@ PAGE = "story.html"
 
 
 def write_story(story: Story) -> None:
-    """Write the page with all chapters of a finished story; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    story
-        A story whose chapters have all run.
-    """
+    """Write the page with all chapters of a finished story; the file appears whole or not at all."""
     file = story.folder / PAGE
     text = story_page(story)
     with whole_file(file) as partial:

@@ -12,18 +12,7 @@ FORMAT = "tendonfmu-demo-1"
 
 
 def story_report(story: Story) -> dict[str, Any]:
-    """Return the results of a demo that has run.
-
-    Parameters
-    ----------
-    story
-        The demo.
-
-    Returns
-    -------
-    dict
-        Ready for JSON.
-    """
+    """Return the results of a demo that has run."""
     return {
         "format": FORMAT,
         "folder": str(story.folder),

@@ -36,12 +36,7 @@ Outputs = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class JointResult:
-    """rms of one joint (N·m).
-
-    `measured` and `left` are the joint torque and what compensation leaves of it, while nobody pushes. `load` and
-    `error` are the external torque, and compensated minus external torque, while somebody pushes; NaN if nobody ever
-    does.
-    """
+    """rms of one joint (N·m)."""
 
     name: str
     measured: float
@@ -52,11 +47,7 @@ class JointResult:
 
 @dataclass(frozen=True)
 class RecordingResult:
-    """Results of one recording.
-
-    `mean_force` is that of all tendons over all samples (N). `score` compares with the labels; without labels all
-    alarms are false.
-    """
+    """Results of one recording."""
 
     name: str
     seconds: float
@@ -66,11 +57,7 @@ class RecordingResult:
 
 
 class IndexFinger:
-    """The calibrated index finger in an existing folder: `pushes` runs first, then `free_motion`.
-
-    `files` has each file with its content in words, `results` the results by recording. `as_given` is the score of the
-    pushes with the description as it was before the calibration.
-    """
+    """The calibrated index finger in an existing folder: `pushes` runs first, then `free_motion`."""
 
     as_given: DetectionScore
 

@@ -25,20 +25,7 @@ Table = tuple[str, Row, list[Row]]
 
 
 def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
-    """Yield the tables of a chapter that has run.
-
-    Parameters
-    ----------
-    story
-        The demo.
-    chapter
-        Name of the chapter.
-
-    Yields
-    ------
-    tuple
-        (title, headings, rows).
-    """
+    """Yield the tables of a chapter that has run."""
     results = story.finger.results
     if chapter == "calibrate":
         yield from calibration_text.tables(story.calibration.report)
@@ -51,15 +38,7 @@ def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
 
 
 def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
-    """Yield the lines of a chapter that has run, which follow its tables.
-
-    Parameters
-    ----------
-    story
-        The demo.
-    chapter
-        Name of the chapter.
-    """
+    """Yield the lines of a chapter that has run, which follow its tables."""
     results = story.finger.results
     if chapter == "calibrate":
         report = story.calibration.report
@@ -78,13 +57,7 @@ def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
 
 
 def file_lines(story: Story) -> Iterator[str]:
-    """Yield a line for each file that the demo wrote, with its content.
-
-    Parameters
-    ----------
-    story
-        The demo.
-    """
+    """Yield a line for each file that the demo wrote, with its content."""
     for path, what in story.files.items():
         yield f"  {path}  {what}"
 

@@ -38,34 +38,13 @@ OF_BOTH = 0.25  # least share of each pretension's time in either half if whole 
 
 
 def rate_limit(alarms: float, hours: float, confidence: float) -> float:
-    """Compute the exact one-sided upper limit of a Poisson rate (1/h): Γ⁻¹(alarms + 1, confidence)/hours.
-
-    Parameters
-    ----------
-    alarms
-        Number of alarms.
-    hours
-        Time that they were counted in (h).
-    confidence
-        Probability that the rate is below the limit.
-
-    Notes
-    -----
-    Garwood 1936.
-    """
+    """Compute the exact one-sided upper limit of a Poisson rate (1/h): Γ⁻¹(alarms + 1, confidence)/hours."""
+    # hours: (h)
     return float(gammaincinv(alarms + 1.0, confidence)) / hours if hours > 0 else math.inf
 
 
 def least_hours(rate: float, confidence: float) -> float:
-    """Compute the time without any alarm that supports a rate (h): −ln(1 − confidence)/rate.
-
-    Parameters
-    ----------
-    rate
-        Rate of alarms (1/h).
-    confidence
-        Probability that the rate is not exceeded.
-    """
+    """Compute the time without any alarm that supports a rate (h): −ln(1 − confidence)/rate."""
     return -math.log1p(-confidence) / rate
 
 
@@ -82,13 +61,7 @@ def allowed_alarms(hours: float, rate: float, confidence: float) -> int:
 
 @dataclass(frozen=True)
 class Cells:
-    """The counted time of all parts, in [c] cells.
-
-    `rows` has for each part its counted samples, and `first` the index of each cell's first sample among all of them,
-    one part after the other. `order` numbers the cells in time, with large gaps between parts. `part` and `time` are
-    the index of the part and the time on its own clock (s). `force` is the mean over all tendons (N), `group` the index
-    of the pretension, `fold` 0 or 1 for the half of the time, and `hours` the length of each cell (h).
-    """
+    """The counted time of all parts, in [c] cells."""
 
     rows: Sequence[Index]
     first: Index
@@ -142,11 +115,8 @@ def cells_of(parts: Sequence[FreePart]) -> Cells:
 def _recordings_by_turns(
     parts: Sequence[FreePart], owner: Index, force: Numbers, group: Index, hours: Numbers
 ) -> Index | None:
-    """Assign whole recordings to halves in turn, in the order of their mean force, so that other motion is held out.
-
-    Returns [c] 0 or 1, or None if a pretension has too little time in one of the halves. `owner` is [c] the part of
-    each cell. The blocks of a repeated motion have similar peaks, which tell little about another motion.
-    """
+    """Assign whole recordings to halves in turn, in the order of their mean force, so that other motion is held out."""
+    # Returns [c] 0 or 1, or None if a pretension has too little time in one of the halves.
     _, recording = np.unique([part.source for part in parts], return_inverse=True)
     of_cell = recording[owner]
     mean = np.bincount(of_cell, force) / np.maximum(np.bincount(of_cell), 1)
@@ -195,10 +165,7 @@ def alarms_above(order: Index, above: NDArray[np.bool_]) -> int:
 
 
 def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | None = None) -> float:
-    """Find the smallest level that at most `allowed` alarms exceed, here and at every higher level, none for long.
-
-    `statistic` and `order` are [c] by cell. `others` are cells that are in alarm anyway.
-    """
+    """Find the smallest level that at most `allowed` alarms exceed, here and at every higher level, none for long."""
     present: list[int] = [] if others is None else sorted(int(each) for each in others)
     alarms = count_alarms(np.array(present, dtype=np.int64))
     if alarms > allowed:
@@ -217,10 +184,7 @@ def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | No
 
 
 def _descending(statistic: Numbers, few: int = 4000) -> Iterator[int]:
-    """Yield the cells by falling statistic.
-
-    Most levels are found among the first few, so the others are sorted only when needed.
-    """
+    """Yield the cells by falling statistic."""
     if len(statistic) <= few:
         yield from np.argsort(-statistic, kind="stable").tolist()
         return

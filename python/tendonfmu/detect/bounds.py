@@ -75,11 +75,9 @@ class Choice:
 
 
 def least_load(whole: Numbers) -> Numbers:
-    """Compute [c] the lightest push that exceeds bounds [c, n] (N·m): the mean logarithm over the pushed link.
-
-    A force F across the middle of link k of a finger with equal links turns joint j ≤ k by (k − j + 1/2)·ℓ·F. A push
-    loads all joints before it, those near the base most, so a low bound at the base detects more than one at the tip.
-    """
+    """Compute [c] the lightest push that exceeds bounds [c, n] (N·m): the mean logarithm over the pushed link."""
+    # A force F across the middle of link k of a finger with equal links turns joint j ≤ k by (k − j + 1/2)·ℓ·F. A push
+    # loads all joints before it, those near the base most, so a low bound at the base detects more than one at the tip.
     joints = whole.shape[1]
     total = np.zeros(len(whole))
     for k in range(1, joints + 1):
@@ -93,12 +91,7 @@ def least_load(whole: Numbers) -> Numbers:
 
 @dataclass(frozen=True)
 class Search:
-    """All counted samples, as a search of bounds needs them.
-
-    `signal`, `stuck`, `jump` and `uncertain` are [n, N] signal, H, J and L·u (N·m); the `mean_` values are [c, n] means
-    of each cell, `mean_square` that of the squared signal. `rate` is that of alarms (1/h). `least` [n] is the smallest
-    base + per_force·f (N·m) at any recorded force f, the lowest of which is `lowest_force` (N).
-    """
+    """All counted samples, as a search of bounds needs them."""
 
     cells: Cells
     signal: Signal
@@ -132,30 +125,22 @@ class Search:
         return bound.at_least(self.least, self.lowest_force)
 
     def least_factor(self, bound: Bound) -> float:
-        """Return the smallest factor that keeps a sound bound sound, at most 1 apart from rounding.
-
-        Where friction alone explains the signal, the excess is negative, and so is the level for a number of alarms.
-        """
+        """Return the smallest factor that keeps a sound bound sound, at most 1 apart from rounding."""
         return float(np.max(self.least / bound.own(np.array([self.lowest_force]))[0]))
 
     def in_the_way(self, bound: Bound, rows: Any) -> Numbers:
-        """Compute [k, n] the torque that a push has to exceed in each of the cells in `rows` (N·m).
-
-        A push that matters moves the finger, and H = 0 in motion, so a quarter of H counts. It also makes the model
-        jump more than on average, so J counts five times. With these weights the shapes are in nearly the order in
-        which they find pushes on the virtual hand (rank correlation 0.7 to 0.8; 0.2 to 0.3 if H and J count as in free
-        motion).
-        """
+        """Compute [k, n] the torque that a push has to exceed in each of the cells in `rows` (N·m)."""
+        # A push that matters moves the finger, and H = 0 in motion, so a quarter of H counts. It also makes the model
+        # jump more than on average, so J counts five times. With these weights the shapes are in nearly the order in
+        # which they find pushes on the virtual hand (rank correlation 0.7 to 0.8; 0.2 to 0.3 if H and J count as in
+        # free motion).
         added = WORTH_STUCK * bound.stuck_share * self.mean_stuck[rows]
         added = added + WORTH_JUMP * bound.jump_share * self.mean_jump[rows]
         return np.asarray(bound.own(self.cells.force[rows]) + added + self.mean_uncertain[rows])
 
 
 def search_for(runs: Sequence[FreeRun], cells: Cells, signal: str, rate: float, level: float = 0.0) -> Search:
-    """Prepare a search for the signal "innovation" or "residual".
-
-    `level` is L of the uncertainty, which counts for the residual only.
-    """
+    """Prepare a search for the signal "innovation" or "residual"."""
 
     def laid_out(name: str) -> Signal:
         return rows_of([getattr(run, name) for run in runs], cells)
@@ -192,10 +177,7 @@ def statistic(over: Signal, bound: Bound, force: Numbers) -> Numbers:
 def choose(
     search: Search, subsets: Sequence[Flags], allowed: Sequence[int], tick: Callable[[], None] | None = None
 ) -> list[Choice]:
-    """Choose the best bound of every subset of cells [c], with at most `allowed` alarms in each.
-
-    The bases of single joints are fitted for each pair of shares.
-    """
+    """Choose the best bound of every subset of cells [c], with at most `allowed` alarms in each."""
     best: list[Choice | None] = [None] * len(subsets)
 
     def consider(pair: tuple[float, float]) -> None:
@@ -273,26 +255,8 @@ def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowe
 
 
 def tail_levels(cells: Cells, over: Signal, subset: Flags, rate: float) -> tuple[Numbers, Numbers]:
-    """Find the levels that each joint exceeds at a rate of alarms of its own, by pretension.
-
-    Parameters
-    ----------
-    cells
-        Counted time.
-    over
-        [k, n] excess in the cells of the subset (N·m).
-    subset
-        [c] mask of the k cells.
-    rate
-        Rate of alarms (1/h).
-
-    Returns
-    -------
-    force : ndarray
-        [g] mean force of each pretension (N).
-    level : ndarray
-        [g, n] (N·m).
-    """
+    """Find the levels that each joint exceeds at a rate of alarms of its own, by pretension."""
+    # over: [k, n] (N·m); subset: [c]; returns [g] mean force of each pretension (N), [g, n] (N·m)
     group, order = cells.group[subset], cells.order[subset]
     forces, levels = [], []
     for g in np.unique(group):
@@ -304,10 +268,7 @@ def tail_levels(cells: Cells, over: Signal, subset: Flags, rate: float) -> tuple
 
 
 def lines_through(force: Numbers, level: Numbers) -> tuple[Numbers, Numbers]:
-    """Fit base and per_force [n], both ≥ 0, with a + b·f ≈ level [g, n] at forces [g], by least relative squares.
-
-    With a single force b is unknown and set to 0.
-    """
+    """Fit base and per_force [n], both ≥ 0, with a + b·f ≈ level [g, n] at forces [g], by least relative squares."""
     if len(force) < 2:
         return level[0].astype(float), np.zeros(level.shape[1])
     columns = np.column_stack([np.ones_like(force), force])

@@ -15,12 +15,7 @@ from tendonfmu.detect.free_motion import SETTLING, FreePart, closed_loop
 
 @dataclass(frozen=True)
 class LoopAlarms:
-    """Alarms of one part.
-
-    `part` is its index. `begins` and `ends` are the times of the alarms after it has settled, in s of its own clock.
-    `at_start` counts the alarms before. `hours` is the counted time, `seconds` all its time and `alarm_seconds` the
-    time in alarm.
-    """
+    """Alarms of one part."""
 
     part: int
     source: str

@@ -38,12 +38,7 @@ _ROUNDS, _RAISE = 12, 1.1  # most steps, and the factor of each, until the runni
 
 @dataclass(frozen=True)
 class RestRule:
-    """The rule for contact at rest, and its evidence.
-
-    `keys` is `contact.rest`. `rests` and `hours` are the data that it was learned from. `held_out` counts the alarms in
-    rests that the bounds were not fitted to, `alarms` those of the finger as it runs. `limit` is the upper limit of
-    their rate (1/h of rest).
-    """
+    """The rule for contact at rest, and its evidence."""
 
     keys: Mapping[str, Any]
     rests: int
@@ -55,10 +50,7 @@ class RestRule:
 
 @dataclass(frozen=True)
 class Rest:
-    """One rest.
-
-    `time` is [K] since it began (s); `change` and `sudden` are [K, n] |c| and |y| (N·m); `noise` is [n] σ of c (N·m).
-    """
+    """One rest."""
 
     time: Numbers
     change: Numbers
@@ -92,26 +84,7 @@ class Bounds:
 def learn_rest(
     data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
 ) -> tuple[RestRule | None, list[str]]:
-    """Learn the rule for a rate of false alarms per hour of rest.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    parts
-        Free motion.
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    rate, confidence
-        Highest rate of false alarms (1/h of rest), and the probability that it is not exceeded.
-
-    Returns
-    -------
-    rule : RestRule or None
-        The rule; None if the motion does not allow one.
-    sentences : list of str
-        Why there is no rule, or which rate it supports.
-    """
+    """Learn the rule for a rate of false alarms per hour of rest."""
     if not all("tendon_position" in part.arrays for part in parts):
         return None, [_left_out("there are no tendon positions")]
     travel = standing_travel(data, parts)
@@ -155,10 +128,7 @@ def _left_out(why: str) -> str:
 
 
 def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float | None:
-    """Return the travel (m) that a standing motor stays within; None if no motor ever stands.
-
-    It is the span of the noisiest motor over windows of SETTLE_TIME, at the quantile STANDING_SHARE, or the resolution.
-    """
+    """Return the travel (m) that a standing motor stays within; None if no motor ever stands."""
     spans, resolution = [], np.inf
     for part in parts:
         position = part.arrays["tendon_position"]
@@ -198,10 +168,7 @@ def find_rests(
 
 
 def _innovation(time: Numbers, change: Numbers) -> Numbers:
-    """Compute [K, n] y of a rest without contact: c less m, which follows it.
-
-    It uses the median step, while the runtime uses each step.
-    """
+    """Compute [K, n] y of a rest without contact: c less m, which follows it."""
     share = -np.expm1(-float(np.median(np.diff(time))) / INNOVATION_TIME)
     followed = lfilter([share], [1.0, share - 1.0], change, axis=0)
     return np.asarray(change - np.vstack([np.zeros((1, change.shape[1])), followed[:-1]]))
@@ -218,11 +185,7 @@ def _noise(time: Numbers, change: Numbers) -> Numbers:
 
 
 def fit_bounds(rests: Sequence[Rest]) -> Bounds:
-    """Fit the smallest bounds that no change of these rests exceeds, apart from noise.
-
-    Both thresholds cover the noise of a change, which is a difference of two averages. `threshold` also covers the
-    change within SETTLE_TIME. `creep` covers the later change, which grows with the root of time as in the runtime.
-    """
+    """Fit the smallest bounds that no change of these rests exceeds, apart from noise."""
     noise = NOISE_LEVEL * np.sqrt(2.0) * np.median([each.noise for each in rests], axis=0)
     early = np.max([each.change[each.time <= SETTLE_TIME].max(axis=0) for each in rests], axis=0)
     threshold = _above_zero(np.maximum(noise, early))

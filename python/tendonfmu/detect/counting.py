@@ -28,12 +28,7 @@ _EQUAL = 1e-9  # s; the times of a CSV are rounded to decimals
 
 @dataclass(frozen=True)
 class Signals:
-    """Further signals of each sample; None if unknown.
-
-    `residual` is [N, n] before the bias update (N·m), NaN where there is none. `compensated` is [N, n] the estimate of
-    the external torque and `deviation` [N, n] its stated standard deviation (N·m). `external` is [N, n] the torque of a
-    reference sensor (N·m), `force` [N] a sensed force (N).
-    """
+    """Further signals of each sample; None if unknown."""
 
     residual: Numbers | None = None
     compensated: Numbers | None = None
@@ -44,38 +39,18 @@ class Signals:
 
 @dataclass(frozen=True)
 class Event:
-    """One labelled contact; times in s, NaN where there is none.
+    """One labelled contact; times in s, NaN where there is none."""
 
-    Attributes
-    ----------
-    onset, end
-        First and last labelled sample.
-    silent
-        Whether no sample in the `SILENT` time before has contact.
-    alarm
-        First sample of the first alarm that begins in [onset, end].
-    held
-        Whether that alarm lasts until less than `MERGED` before the end.
-    held_share
-        Share of the time from alarm to end that is contact.
-    overhang
-        Free time in alarms that began in the event or its grace (s).
-    compensated, external
-        [n] torques at the alarm (N·m).
-    force
-        Force at the alarm (N).
-    """
-
-    onset: float
+    onset: float  # first and last labelled sample
     end: float
-    silent: bool
-    alarm: float = math.nan
-    held: bool = False
-    held_share: float = math.nan
-    overhang: float = 0.0
-    compensated: Numbers | None = None
+    silent: bool  # whether no sample in the `SILENT` time before has contact
+    alarm: float = math.nan  # first sample of the first alarm that begins in [onset, end]
+    held: bool = False  # whether that alarm lasts until less than `MERGED` before the end
+    held_share: float = math.nan  # share of the time from alarm to end that is contact
+    overhang: float = 0.0  # free time in alarms that began in the event or its grace (s)
+    compensated: Numbers | None = None  # [n] torques at the alarm (N·m)
     external: Numbers | None = None
-    force: float = math.nan
+    force: float = math.nan  # force at the alarm (N)
 
     @property
     def found(self) -> bool:
@@ -90,11 +65,7 @@ class Event:
 
 @dataclass(frozen=True)
 class FreeBlocks:
-    """Sums over [b] blocks of about `BLOCK` seconds of free time.
-
-    `seconds` and `alarm_seconds` are the time in all and in alarm, `samples` the number of samples with a residual, and
-    `squares` [b, n] the sum of its squares.
-    """
+    """Sums over [b] blocks of about `BLOCK` seconds of free time."""
 
     seconds: Numbers
     alarm_seconds: Numbers
@@ -104,11 +75,7 @@ class FreeBlocks:
 
 @dataclass(frozen=True)
 class ContactSums:
-    """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque (N·m).
-
-    `samples` is [e]. The others are [e, n]: sums of (y − x)², x, y, x², y² and x·y, and the number of samples `within`
-    two of the stated standard deviations of y, NaN if none are stated.
-    """
+    """Sums over the samples of [e] events with a reference sensor; x: reference, y: compensated torque (N·m)."""
 
     samples: Numbers
     errors: Numbers
@@ -122,24 +89,12 @@ class ContactSums:
 
 @dataclass(frozen=True)
 class DetectionScore:
-    """Score of one recording, or of several pooled.
+    """Score of one recording, or of several pooled."""
 
-    Attributes
-    ----------
-    events
-        Labelled contacts.
-    false_alarms
-        (begin, end) of each, its first and last sample (s).
-    free
-        Sums over the free time.
-    contact
-        Sums over the events; None without a reference sensor.
-    """
-
-    events: list[Event]
-    false_alarms: list[tuple[float, float]]
-    free: FreeBlocks
-    contact: ContactSums | None
+    events: list[Event]  # labelled contacts
+    false_alarms: list[tuple[float, float]]  # (begin, end) of each, its first and last sample (s)
+    free: FreeBlocks  # sums over the free time
+    contact: ContactSums | None  # sums over the events; None without a reference sensor
 
     @property
     def found(self) -> int:
@@ -168,25 +123,8 @@ class DetectionScore:
 
 
 def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals | None = None) -> DetectionScore:
-    """Score one recording.
-
-    An event is found if an alarm begins in [onset, end] and the 0.2 s before the onset have no alarm. An alarm that
-    begins outside every [onset, end + 0.1 s] is false. Free time is the time outside all of these.
-
-    Parameters
-    ----------
-    time
-        [N] increasing times (s).
-    label, alarm
-        [N] whether there is contact, and whether the detector reports it.
-    signals
-        Further signals of each sample.
-
-    Returns
-    -------
-    DetectionScore
-        Counts and sums.
-    """
+    """Score one recording."""
+    # time: [N] (s); label, alarm: [N]
     time = np.asarray(time, dtype=float)
     label, alarm = (np.asarray(flags).ravel().astype(bool) for flags in (label, alarm))
     given = signals or Signals()
@@ -299,18 +237,7 @@ def _contact_sums(spans: Spans, given: Signals) -> ContactSums | None:
 
 
 def pooled(scores: Sequence[DetectionScore]) -> DetectionScore:
-    """Pool the scores of several recordings.
-
-    Parameters
-    ----------
-    scores
-        One per recording; sums over events come from those with a reference sensor.
-
-    Returns
-    -------
-    DetectionScore
-        Score of all recordings together.
-    """
+    """Pool the scores of several recordings."""
     contacts = [score.contact for score in scores if score.contact is not None]
     return DetectionScore(
         events=[event for score in scores for event in score.events],

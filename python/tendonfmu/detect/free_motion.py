@@ -29,27 +29,13 @@ STILL = 0.01  # least share of the time with motion; less tells nothing about fr
 
 @dataclass(frozen=True)
 class FreePart:
-    """A stretch of a recording without a gap; a finger starts anew at its beginning.
+    """A stretch of a recording without a gap; a finger starts anew at its beginning."""
 
-    Attributes
-    ----------
-    source
-        File of the recording.
-    arrays
-        Inputs of `native.Instance.run`.
-    mean_force
-        [N] mean tendon force (N).
-    counted
-        [N] samples after settling, without a stuck sensor.
-    seconds
-        [N] time that each sample stands for (s).
-    """
-
-    source: str
-    arrays: Mapping[str, Numbers]
-    mean_force: Numbers
-    counted: Flags
-    seconds: Numbers
+    source: str  # file of the recording
+    arrays: Mapping[str, Numbers]  # inputs of `native.Instance.run`
+    mean_force: Numbers  # [N] mean tendon force (N)
+    counted: Flags  # [N] samples after settling, without a stuck sensor
+    seconds: Numbers  # [N] time that each sample stands for (s)
 
     @property
     def time(self) -> Numbers:
@@ -64,30 +50,16 @@ class FreePart:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Residuals of a part for a finger with contact detection switched off, all [N, n] and in N·m.
+    """Residuals of a part for a finger with contact detection switched off, all [N, n] and in N·m."""
 
-    Attributes
-    ----------
-    part
-        The stretch of free motion.
-    residual, innovation, drift
-        r, y and d.
-    stuck, jump
-        H and J.
-    known
-        Standard deviation that is known before any tuning: of the bias and of the model's uncertainty.
-    uncertain
-        u, the standard deviation of the model's uncertainty alone.
-    """
-
-    part: FreePart
-    residual: Signal
+    part: FreePart  # the stretch of free motion
+    residual: Signal  # r, y and d
     innovation: Signal
     drift: Signal
-    stuck: Signal
+    stuck: Signal  # H and J
     jump: Signal
-    known: Signal
-    uncertain: Signal
+    known: Signal  # standard deviation that is known before any tuning: of the bias and of the model's uncertainty
+    uncertain: Signal  # u, the standard deviation of the model's uncertainty alone
 
 
 @dataclass(frozen=True)
@@ -103,29 +75,7 @@ class Clock:
 
 
 def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
-    """Divide a recording of free motion into parts without gaps.
-
-    Parameters
-    ----------
-    finger
-        Finger description.
-    recording
-        Recording of free motion.
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-
-    Returns
-    -------
-    parts : list of FreePart
-        The parts.
-    sentences : list of str
-        Remarks on the recording.
-
-    Raises
-    ------
-    InputError
-        The recording has contact, no motion, or unsound values.
-    """
+    """Divide a recording of free motion into parts without gaps."""
     require_no_contact(recording)
     groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
     prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
@@ -143,18 +93,7 @@ def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[l
 
 
 def require_no_contact(recording: Recording) -> None:
-    """Check that neither a label nor a reference sensor shows contact.
-
-    Parameters
-    ----------
-    recording
-        Recording of free motion.
-
-    Raises
-    ------
-    InputError
-        Something touches the finger.
-    """
+    """Check that neither a label nor a reference sensor shows contact."""
     label = recording.contact
     if label is not None and label.any():
         first = int(np.flatnonzero(label)[0])

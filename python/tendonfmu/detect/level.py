@@ -27,11 +27,7 @@ _FASTEST = 10.0  # growth of g: docs/reference/semantics.md#contact-detector
 
 @dataclass(frozen=True)
 class Line:
-    """One way to an alarm: a signal and its bound, at the number of alarms at which shapes are compared.
-
-    `statistic` is [c] the factor on the base at which a cell has no alarm, `held` the same for the bound chosen on the
-    other half of the blocks. `least` is the smallest factor that leaves a sound bound (`Search.least_factor`).
-    """
+    """One way to an alarm: a signal and its bound, at the number of alarms at which shapes are compared."""
 
     bound: Bound
     halves: tuple[Bound, Bound]
@@ -48,10 +44,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Level:
-    """Factor on the bound of a line.
-
-    `in_sample` lets the allowed alarms through. `held_out` lets as many through in the half that it was not chosen on.
-    """
+    """Factor on the bound of a line."""
 
     in_sample: float
     held_out: float

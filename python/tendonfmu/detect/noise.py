@@ -41,14 +41,9 @@ class BiasNoise:
 
 
 def time_constant(drift: float, noise: float, noise_time: float) -> float:
-    """Compute the time in which the bias follows a step to 1 − 1/e (s).
-
-    `drift` is q ((N·m)²/s), `noise` the standard deviation σ (N·m), and `noise_time` T0 (s), by default the step of the
-    samples.
-
-    A filter of variance P that takes samples of variance σ²·T0/dt a step dt apart obeys dP/dt = q − P²/(σ²·T0). In the
-    steady state P = (q·σ²·T0)^½. The bias follows with the rate K/dt = P/(σ²·T0), so τ = σ·(T0/q)^½.
-    """
+    """Compute the time in which the bias follows a step to 1 − 1/e (s)."""
+    # A filter of variance P that takes samples of variance σ²·T0/dt a step dt apart obeys dP/dt = q − P²/(σ²·T0). In
+    # the steady state P = (q·σ²·T0)^½. The bias follows with the rate K/dt = P/(σ²·T0), so τ = σ·(T0/q)^½.
     return noise * float(np.sqrt(noise_time / drift))
 
 
@@ -58,10 +53,7 @@ def drift_variance(noise: float, noise_time: float, time: float) -> float:
 
 
 def wanted_time(data: Mapping[str, Any], parts: Sequence[FreePart], bias_time: float | None) -> float:
-    """Return the time constant of the bias (s): as asked for, else that of the description at the mean force.
-
-    Raises InputError if the description has none.
-    """
+    """Return the time constant of the bias (s): as asked for, else that of the description at the mean force."""
     if bias_time is not None:
         return bias_time
     given = bias_settings(data)
@@ -122,11 +114,7 @@ def _line(force: Numbers, value: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Deviation:
-    """Standard deviation of compensated_torque beside the parts that are known otherwise.
-
-    `base` is [n] (N·m), `per_force` [n] (N·m/N). `square` is [g, n] the mean square of r/std by pretension, on blocks
-    that were not used. `too_wide` marks the joints [n] whose other parts alone exceed the residuals.
-    """
+    """Standard deviation of compensated_torque beside the parts that are known otherwise."""
 
     base: Numbers
     per_force: Numbers
@@ -156,10 +144,7 @@ def deviation(runs: Sequence[FreeRun], cells: Cells, bound: Bound) -> Deviation:
 
 
 def _calibrated(left: Numbers, other: Numbers, cells: Cells, rows: Flags) -> tuple[Numbers, Numbers, Flags]:
-    """Find base and per_force [n] for which left/(other + (base + per_force·f)²) is 1 on average.
-
-    The third result marks the joints where even 0 is too much.
-    """
+    """Find base and per_force [n] for which left/(other + (base + per_force·f)²) is 1 on average."""
     joints = left.shape[1]
     base, per_force, too_wide = np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=bool)
     group, force = cells.group[rows], cells.force[rows]

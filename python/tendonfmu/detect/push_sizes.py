@@ -18,20 +18,8 @@ SIZES = (1.5, 3.0, 6.0, math.inf)  # times the rms of the joint's residual, at t
 
 
 def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:
-    """Count the pushes, and those found, by class of size.
-
-    Parameters
-    ----------
-    scored
-        Finished score.
-    left
-        [n] rms of the residual in free motion (N·m).
-
-    Returns
-    -------
-    list of dict or None
-        Classes with at least one push; None without a reference sensor.
-    """
+    """Count the pushes, and those found, by class of size."""
+    # left: [n] (N·m)
     sizes, found = [], []
     scale = np.maximum(np.array(left), 1e-12)
     for track, score in zip(scored.tracks, scored.scores, strict=True):

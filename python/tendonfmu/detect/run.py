@@ -45,46 +45,22 @@ LARGEST = {
 
 @dataclass(frozen=True)
 class Subject:
-    """What is scored.
+    """What is scored."""
 
-    Attributes
-    ----------
-    path
-        File as given, or the name of a finger in memory.
-    finger
-        Its description.
-    packed
-        Whether the file is an FMU; then the FMU runs.
-    """
-
-    path: Path
-    finger: Finger
-    packed: bool
+    path: Path  # file as given, or the name of a finger in memory
+    finger: Finger  # its description
+    packed: bool  # whether the file is an FMU; then the FMU runs
 
 
 @dataclass(frozen=True)
 class Track:
-    """A finger over a recording.
+    """A finger over a recording."""
 
-    Attributes
-    ----------
-    recording
-        The recording.
-    label
-        [N] label; False throughout if there is none.
-    outputs
-        Outputs of `native.Instance.run`.
-    residual
-        [N, n] residual before the bias update, NaN where it is unknown (N·m).
-    force
-        [N] sensed force (N), or None.
-    """
-
-    recording: Recording
-    label: Flags
-    outputs: Mapping[str, NDArray[Any]]
-    residual: Numbers
-    force: Numbers | None
+    recording: Recording  # the recording
+    label: Flags  # [N] label; False throughout if there is none
+    outputs: Mapping[str, NDArray[Any]]  # outputs of `native.Instance.run`
+    residual: Numbers  # [N, n] residual before the bias update, NaN where it is unknown (N·m)
+    force: Numbers | None  # [N] sensed force (N), or None
 
     @property
     def alarm(self) -> Flags:
@@ -136,24 +112,8 @@ def read_subject(source: FingerSource) -> Subject:
 
 
 def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
-    """Run the subject over a recording.
-
-    Parameters
-    ----------
-    subject
-        What is scored.
-    recording
-        The recording.
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    force
-        Column of the sensed force (N), or None.
-
-    Raises
-    ------
-    InputError
-        The recording does not fit the finger.
-    """
+    """Run the subject over a recording."""
+    # force: (N)
     data = subject.finger.data
     joints, tendons = len(data["joints"]), len(data["tendons"])
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
@@ -181,12 +141,10 @@ def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArr
 def residual_of(
     data: Mapping[str, Any], recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int
 ) -> Numbers:
-    """Compute [N, n] the residual before the bias update (N·m), NaN for the first sample, from the outputs of an FMU.
-
-    The bias holds what the update took from the residual: r = compensated + (b − b before), wherever the bias did not
-    jump by itself. Where it jumped, at the start and the end of stiction, r = compensated/(1 − K). The gain K is
-    interpolated between the neighbouring samples; in contact it is that of the last sample before.
-    """
+    """Compute the residual [N, n] before the bias update (N·m), NaN for the first sample of an FMU's outputs."""
+    # The bias holds what the update took from the residual: r = compensated + (b − b before), wherever the bias did not
+    # jump by itself. Where it jumped, at the start and the end of stiction, r = compensated/(1 − K). The gain K is
+    # interpolated between the neighbouring samples; in contact it is that of the last sample before.
     whole = slice(0, len(recording))
     jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
     jumped = (jumps != 0).any(axis=1)
@@ -222,12 +180,7 @@ def _between_known(values: Numbers, chosen: Flags) -> Numbers:
 
 
 def scaled_detection(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
-    """Return the description with every bound that decides on contact times a factor, within the range of each key.
-
-    These are the thresholds of the torque and of the innovation, with the parts for friction and its uncertainty, and
-    of the change at rest (docs/reference/semantics.md#contact-detector): the whole right side of |r| > threshold, of
-    |y| > B and of |c| > D.
-    """
+    """Return the description with every bound that decides on contact times a factor, within the range of each key."""
     contact = dict(data["contact"])
     _scale(contact, THRESHOLDS, factor)
     for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES), ("rest", REST_BOUNDS)):

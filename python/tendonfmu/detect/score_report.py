@@ -22,56 +22,23 @@ FORMAT = "tendonfmu-score-1"
 
 @dataclass(frozen=True)
 class Scored:
-    """A finished score.
+    """A finished score."""
 
-    Attributes
-    ----------
-    subject
-        What was scored.
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    labels
-        Column of the label.
-    seed
-        Seed of the resampling.
-    tracks, scores, summaries
-        By recording.
-    summary
-        Summary of all recordings together.
-    roc
-        Points of the ROC, or None.
-    no_roc
-        Why there is no ROC, or None.
-    warnings
-        Sentences.
-    """
-
-    subject: Subject
-    kinematics: int
-    labels: str
-    seed: int
-    tracks: Sequence[Track]
+    subject: Subject  # what was scored
+    kinematics: int  # 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities
+    labels: str  # column of the label
+    seed: int  # seed of the resampling
+    tracks: Sequence[Track]  # by recording
     scores: Sequence[DetectionScore]
     summaries: Sequence[Summary]
-    summary: Summary
-    roc: Sequence[RocPoint] | None
-    no_roc: str | None
-    warnings: Sequence[str]
+    summary: Summary  # summary of all recordings together
+    roc: Sequence[RocPoint] | None  # points of the ROC, or None
+    no_roc: str | None  # why there is no ROC, or None
+    warnings: Sequence[str]  # sentences
 
 
 def build_report(scored: Scored) -> dict[str, Any]:
-    """Build the report of a finished score; numbers that are not finite become None.
-
-    Parameters
-    ----------
-    scored
-        The finished score.
-
-    Returns
-    -------
-    dict
-        Report "tendonfmu-score-1" (schema/score_report.schema.json).
-    """
+    """Build the report of a finished score; numbers that are not finite become None."""
     report = {
         "format": FORMAT,
         "finger": scored.subject.finger.name,

@@ -22,22 +22,7 @@ NO_ROC_OF_FMU = "an FMU was scored: its thresholds are as packed; score FINGER.j
 
 
 def check_outputs(output: Path, figures: Path | None, inputs: Sequence[Path]) -> None:
-    """Check that the results can be written, before a long computation.
-
-    Parameters
-    ----------
-    output
-        File of the report.
-    figures
-        Folder of the figures, or None.
-    inputs
-        Files that no result may replace.
-
-    Raises
-    ------
-    InputError
-        The report does not end in .json, cannot be written, or is an input.
-    """
+    """Check that the results can be written, before a long computation."""
     if output.suffix.lower() != ".json":
         raise InputError(f"{output}: expected a name that ends in .json")
     check_output(output, *inputs)
@@ -55,35 +40,8 @@ def score_recordings(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Scored:
-    """Score a finger, or its FMU, on recordings.
-
-    Parameters
-    ----------
-    model
-        Finger, its description, the file of it, or an FMU.
-    recordings
-        Labelled recordings, or recordings of free motion; DataFrames or files.
-    labels
-        Column of the label; None: `contact`, where there is one.
-    force
-        Column of the sensed force (N), or None.
-    kinematics
-        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    seed
-        Seed of the resampling for the intervals.
-    progress
-        Called with runs done and runs.
-
-    Returns
-    -------
-    Scored
-        The score of each recording, and of all together.
-
-    Raises
-    ------
-    InputError
-        A file, a column or an option does not allow a score.
-    """
+    """Score a finger, or its FMU, on recordings."""
+    # force: (N)
     sources = listed_sources(recordings)
     check_given_once(sources, [])
     subject = read_subject(model)

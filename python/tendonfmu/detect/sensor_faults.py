@@ -37,11 +37,7 @@ RAISE = 1.5  # factor on the margin until no fault is found
 
 @dataclass(frozen=True)
 class SensorRule:
-    """The rule for failing sensors.
-
-    `keys` is `sensor_fault`; None if it is left out, with the reason in `why`. `largest` is the largest difference
-    between a force and its spring (N).
-    """
+    """The rule for failing sensors."""
 
     keys: Mapping[str, float] | None
     largest: float
@@ -93,11 +89,7 @@ def finds_a_fault(
 
 @dataclass(frozen=True)
 class Gap:
-    """Difference between force and spring of one tendon in one part.
-
-    `force` and `gap` are [N] f0 and y − f0 (N), `stretched` [N − 1] k·(|Δx0| + |Δw|) (N). `known` marks the samples [N]
-    at which the others give w. `window` is a number of samples.
-    """
+    """Difference between force and spring of one tendon in one part."""
 
     force: Numbers
     gap: Numbers

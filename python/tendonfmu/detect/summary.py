@@ -20,10 +20,7 @@ FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.2
 
 @dataclass(frozen=True)
 class ContactError:
-    """Errors of the compensated torque against the reference during events, by joint [n]; `rms` in N·m.
-
-    `within` is the share of the samples within two stated standard deviations, None if none are stated.
-    """
+    """Errors of the compensated torque against the reference during events, by joint [n]; `rms` in N·m."""
 
     rms: list[Estimate]
     correlation: list[Estimate]
@@ -33,57 +30,31 @@ class ContactError:
 
 @dataclass(frozen=True)
 class Summary:
-    """Figures of a recording, or of several pooled.
+    """Figures of a recording, or of several pooled."""
 
-    Attributes
-    ----------
-    events, found
-        Number of labelled contacts, and of those found.
-    masked
-        Number of events that had contact before their onset.
-    held
-        Number of found events whose alarm lasts to their end.
-    false_alarms, false_alarm_count, false_alarms_per_minute
-        Number of false alarms, its interval, and their rate (1/min).
-    free_minutes, free_alarm_share
-        Free time (min), and the share of it in alarm.
-    found_share, held_share
-        Shares of the events, and of the found events.
-    delay
-        Quantiles of the delay (s) by name of `QUARTILES`.
-    force_at_alarm
-        Median force at the alarm of the found events (N); None if unknown.
-    compensated_at_alarm, external_at_alarm
-        [n] median magnitudes of the torques at the alarm (N·m); None if unknown.
-    overhang_events, overhang_seconds, longest_overhang, overhang
-        Alarms that outlast their event: number of events, times in all and at most (s), and mean per event (s).
-    free_rms
-        [n] rms of the residual in free time (N·m).
-    contact
-        Errors of the estimated torque; None without a reference sensor or without an event.
-    """
-
-    events: int
+    events: int  # number of labelled contacts, and of those found
     found: int
-    masked: int
-    held: int
-    false_alarms: int
-    free_minutes: float
-    found_share: Estimate
+    masked: int  # number of events that had contact before their onset
+    held: int  # number of found events whose alarm lasts to their end
+    false_alarms: int  # number of false alarms, its interval, and their rate (1/min)
+    free_minutes: float  # free time (min), and the share of it in alarm
+    found_share: Estimate  # shares of the events, and of the found events
     held_share: Estimate
     false_alarm_count: Estimate
     false_alarms_per_minute: Estimate
-    delay: dict[str, Estimate]
-    force_at_alarm: Estimate | None
+    delay: dict[str, Estimate]  # quantiles of the delay (s) by name of `QUARTILES`
+    force_at_alarm: Estimate | None  # median force at the alarm of the found events (N); None if unknown
+    # [n] median magnitudes of the torques at the alarm (N·m); None if unknown
     compensated_at_alarm: list[Estimate] | None
     external_at_alarm: list[Estimate] | None
+    # alarms that outlast their event: number of events, times in all and at most (s), and mean per event (s)
     overhang_events: int
     overhang_seconds: float
     longest_overhang: float
     overhang: Estimate
     free_alarm_share: Estimate
-    free_rms: list[Estimate]
-    contact: ContactError | None
+    free_rms: list[Estimate]  # [n] rms of the residual in free time (N·m)
+    contact: ContactError | None  # errors of the estimated torque; None without a reference sensor or without an event
 
 
 def summarise(score: DetectionScore, seed: int = 0) -> Summary:
@@ -136,10 +107,7 @@ def _mean(values: Numbers, seed: int) -> Estimate:
 
 
 def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
-    """Compute the share of the free time in alarm.
-
-    If no block has an alarm, resampling sees none either; the bound is then the exact one for the share of such blocks.
-    """
+    """Compute the share of the free time in alarm."""
     if not free.seconds.sum():
         return Estimate(math.nan)
     if not free.alarm_seconds.any():
@@ -177,10 +145,7 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
 
 
 def _regression(sums: Numbers) -> tuple[Numbers, Numbers]:
-    """Compute correlation and slope of y on x, [r, n] each; NaN where x (or y) does not vary.
-
-    `sums` is [r, 1 + 5 n]: number of samples, and sums of x, y, x², y², x·y.
-    """
+    """Compute correlation and slope of y on x, [r, n] each; NaN where x (or y) does not vary."""
     count = sums[:, :1]
     with np.errstate(invalid="ignore", divide="ignore"):
         x, y, xx, yy, xy = (part / count for part in np.split(sums[:, 1:], 5, axis=1))
@@ -198,42 +163,23 @@ def _varied(variance: Numbers, power: Numbers) -> Numbers:
 
 @dataclass(frozen=True)
 class RocPoint:
-    """One point of the ROC.
+    """One point of the ROC."""
 
-    Attributes
-    ----------
-    factor
-        Factor on all thresholds.
-    events, found, masked
-        Number of labelled contacts, of those found, and of those that had contact before.
-    false_alarms, false_alarms_per_hour
-        Number of false alarms, and their rate (1/h).
-    found_share
-        Share of the events that is found.
-    free_alarm_share
-        Share of the free time in alarm.
-    median_delay
-        Median delay (s); NaN if none is found.
-    """
-
-    factor: float
-    events: int
+    factor: float  # factor on all thresholds
+    events: int  # number of labelled contacts, of those found, and of those that had contact before
     found: int
     masked: int
-    false_alarms: int
-    found_share: Estimate
+    false_alarms: int  # number of false alarms, and their rate (1/h)
+    found_share: Estimate  # share of the events that is found
     false_alarms_per_hour: Estimate
-    free_alarm_share: float
-    median_delay: float
+    free_alarm_share: float  # share of the free time in alarm
+    median_delay: float  # median delay (s); NaN if none is found
 
 
 def roc(score_at: Callable[[float], DetectionScore], factors: Sequence[float] = FACTORS) -> list[RocPoint]:
-    """Compute the ROC over factors on the thresholds.
-
-    `score_at` returns the pooled score with all thresholds times a factor. The finger runs again for each factor, since
-    contact freezes its bias. Few false alarms are no success if the free time is in alarm: an alarm that never ends
-    counts once.
-    """
+    """Compute the ROC over factors on the thresholds."""
+    # The finger runs again for each factor, since contact freezes its bias.
+    # Few false alarms are no success if the free time is in alarm: an alarm that never ends counts once.
     points = []
     for factor in factors:
         score = score_at(factor)

@@ -9,15 +9,7 @@ from tendonfmu.errors import InputError
 
 
 class NotEnough(InputError):
-    """There is too little free motion: for the wished rate, or any at all.
-
-    Parameters
-    ----------
-    message
-        Text of the error.
-    more
-        Missing time (min).
-    """
+    """There is too little free motion: for the wished rate, or any at all."""
 
     def __init__(self, message: str, more: float) -> None:
         super().__init__(message)
@@ -26,12 +18,7 @@ class NotEnough(InputError):
 
 @dataclass(frozen=True)
 class Support:
-    """The rate that a tuning is for.
-
-    `rate` (1/h) is the wished one or, if that is higher, the lowest that this much free motion without any alarm
-    supports. `allowed` is the number of alarms in the recordings that this rate allows. `more` is the time missing for
-    the wished rate (min), 0 if none. `sentence` reports it, and is empty if nothing is missing.
-    """
+    """The rate that a tuning is for."""
 
     rate: float
     allowed: int
@@ -40,10 +27,7 @@ class Support:
 
 
 def supported(cells: Cells, hours: float, wished: float, confidence: float, strict: bool) -> Support:
-    """Find the rate that the recordings support, for a wished rate (1/h).
-
-    Raises NotEnough if they do not support the wished rate and `strict` is set.
-    """
+    """Find the rate that the recordings support, for a wished rate (1/h)."""
     allowed = allowed_alarms(hours, wished, confidence)
     if allowed >= 0:
         return Support(wished, allowed, 0.0, "")

@@ -20,18 +20,7 @@ FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases, for th
 
 
 def build_report(tuning: ContactTuning) -> dict[str, Any]:
-    """Build the report of a tuning, in SI units with None for what is not known.
-
-    Parameters
-    ----------
-    tuning
-        The finished tuning.
-
-    Returns
-    -------
-    dict
-        Report "tendonfmu-tune-1" (schema/tune_report.schema.json).
-    """
+    """Build the report of a tuning, in SI units with None for what is not known."""
     found = {
         "format": FORMAT,
         "finger": tuning.description_.name,

@@ -60,11 +60,7 @@ class TuneWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Pretension:
-    """Free motion at one pretension.
-
-    `force` is its mean (N), `hours` the time (h), `rms` [n] that of the residual (N·m). `alarms` counts the false
-    alarms of the tuned finger, and `limit` is the upper limit of their rate (1/h).
-    """
+    """Free motion at one pretension."""
 
     force: float
     hours: float

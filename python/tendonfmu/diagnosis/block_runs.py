@@ -21,10 +21,7 @@ _STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the p
 
 
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
-    """Return block means of G of a description, less the torque of forces used beyond the measured ones, N·m [B, n].
-
-    The latter is 0 unless the description delays the forces (`time_delay` below 0).
-    """
+    """Return block means of G of a description, less the torque of forces used beyond the measured ones, N·m [B, n]."""
     sums = np.zeros((blocks.count, len(data["joints"])))
     finger, arms = native.Instance(native.image_from_json(json.dumps(_learning_nothing(data)))), moment_arms(data)
     for recording, block in zip(recordings, blocks.of, strict=True):
@@ -64,10 +61,7 @@ def block_late_forces(
     delay: float,
     prediction: Numbers,
 ) -> Numbers:
-    """Return how y − G changes [B, n], N·m, if forces are measured `delay` s later than they act (earlier if below 0).
-
-    `prediction` is G of the description at the recordings, whose forces must be those that it explains.
-    """
+    """Return the change of y − G [B, n] (N·m) if forces are measured `delay` s later than they act."""
     late = [_with_late_forces(recording, delay) for recording in recordings]
     moved = _block_torque(data, late, blocks) - _block_torque(data, recordings, blocks)
     return np.asarray(moved - (block_prediction(data, late, blocks) - prediction))

@@ -33,29 +33,14 @@ _MOST_MEMORY = 8.0  # GB, for all columns
 
 @dataclass(frozen=True)
 class Shape:
-    """A candidate at one point of its grid.
+    """A candidate at one point of its grid."""
 
-    Attributes
-    ----------
-    shape
-        Its non-linear numbers.
-    columns
-        Where its columns are in `CandidateColumns.values`.
-    paths
-        For each column, the first number that it moves.
-    signs
-        Expected sign of each magnitude, 0 for either.
-    expected
-        Magnitudes of an ordinary effect.
-    secant
-        Whether the column is the difference that the term makes at full strength; the expected magnitude is then 1.
-    """
-
-    shape: Mapping[str, float]
-    columns: slice
-    paths: tuple[str, ...]
-    signs: tuple[int, ...]
-    expected: tuple[float, ...]
+    shape: Mapping[str, float]  # its non-linear numbers
+    columns: slice  # where its columns are in `CandidateColumns.values`
+    paths: tuple[str, ...]  # for each column, the first number that it moves
+    signs: tuple[int, ...]  # expected sign of each magnitude, 0 for either
+    expected: tuple[float, ...]  # magnitudes of an ordinary effect
+    # whether the column is the difference that the term makes at full strength; the expected magnitude is then 1
     secant: bool
 
 
@@ -75,30 +60,14 @@ class Proposal:
 
 @dataclass(frozen=True)
 class CandidateColumns:
-    """Block means of the prediction and of all columns.
+    """Block means of the prediction and of all columns."""
 
-    Attributes
-    ----------
-    prediction
-        G of the description, N·m [B, n].
-    nominal
-        Derivatives of G by the numbers that a fit of the description estimates [B, n, u].
-    nominal_names
-        Names [u]; a law's numbers are coulomb, drop, rate (1/Stribeck velocity) and viscous.
-    values
-        Columns of the candidates [B, n, c].
-    names
-        Names [c].
-    proposals
-        Which columns belong to which candidate and place.
-    """
-
-    prediction: Numbers
-    nominal: Single
-    nominal_names: list[str]
-    values: Single
-    names: list[str]
-    proposals: tuple[Proposal, ...]
+    prediction: Numbers  # G of the description, N·m [B, n]
+    nominal: Single  # derivatives of G by the numbers that a fit of the description estimates [B, n, u]
+    nominal_names: list[str]  # names [u]; a law's numbers are coulomb, drop, rate (1/Stribeck velocity) and viscous
+    values: Single  # columns of the candidates [B, n, c]
+    names: list[str]  # names [c]
+    proposals: tuple[Proposal, ...]  # which columns belong to which candidate and place
 
 
 def candidate_columns(
@@ -111,26 +80,7 @@ def candidate_columns(
     worth: Worth | None = None,
     progress: Progress | None = None,
 ) -> CandidateColumns:
-    """Compute the columns of the description and of all candidates that it lacks.
-
-    Parameters
-    ----------
-    data
-        The fitted nominal description.
-    recordings
-        Prepared for it, all with the same kinematics source.
-    span
-        Span of the recordings; computed if None.
-    worth
-        Says which shapes of a candidate at a place are computed.
-    progress
-        Called with the number of samples done and of all samples, over all passes.
-
-    Raises
-    ------
-    InputError
-        If the columns do not fit in memory.
-    """
+    """Compute the columns of the description and of all candidates that it lacks."""
     plain = without_uncertainty(data)
     found_span = span_of(plain, recordings) if span is None else span
     proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates, worth))
@@ -163,10 +113,7 @@ class _Work:
         self._done = 0
 
     def plan(self, nominal: Sequence[Direction], variants: Sequence[tuple[Variant, int]]) -> None:
-        """Plan the runs for the nominal directions, which are the first columns, and for the variants.
-
-        Each variant comes with the index of its first column.
-        """
+        """Plan the runs for the nominal directions, which are the first columns, and for the variants."""
         exact = []
         for variant, at in variants:
             if not variant.secant_rows:
@@ -219,10 +166,7 @@ def _refuse_too_many(size: float, columns: int) -> None:
 
 
 def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description without directions of uncertainty and without sensor monitoring.
-
-    The former depend on the description's own numbers and grow with their count. The latter is no part of the model.
-    """
+    """Return the description without directions of uncertainty and without sensor monitoring."""
     contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
     return {**data, "contact": contact, "sensor_fault": None}
 

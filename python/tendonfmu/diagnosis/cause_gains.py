@@ -35,38 +35,18 @@ Parameters = Mapping[str, tuple[float, str]]
 
 @dataclass(frozen=True)
 class Verified:
-    """The causes that unseen data confirm.
+    """The causes that unseen data confirm."""
 
-    Attributes
-    ----------
-    causes
-        In order of gain, the largest first; places of one effect are one cause.
-    gains
-        Of each cause.
-    parameters
-        Numbers of each place of each cause.
-    without
-        For each cause, the fit that lacks it.
-    dropped
-        Causes that unseen data do not confirm.
-    nominal_data, extended_data
-        Descriptions as they run online.
-    extended
-        Extended description with the settings for estimation.
-    fits_sliding
-        Whether its numbers were fitted only where everything slides.
-    """
-
-    causes: tuple[NamedCause, ...]
-    gains: tuple[Interval, ...]
-    parameters: tuple[tuple[Parameters, ...], ...]
-    without: tuple[FittedModel, ...]
-    dropped: tuple[NamedCause, ...]
+    causes: tuple[NamedCause, ...]  # in order of gain, the largest first; places of one effect are one cause
+    gains: tuple[Interval, ...]  # of each cause
+    parameters: tuple[tuple[Parameters, ...], ...]  # numbers of each place of each cause
+    without: tuple[FittedModel, ...]  # for each cause, the fit that lacks it
+    dropped: tuple[NamedCause, ...]  # causes that unseen data do not confirm
     gain: Gain
-    nominal_data: Data
+    nominal_data: Data  # descriptions as they run online
     extended_data: Data
-    extended: Data
-    fits_sliding: bool
+    extended: Data  # extended description with the settings for estimation
+    fits_sliding: bool  # whether its numbers were fitted only where everything slides
 
 
 def verify(
@@ -78,11 +58,7 @@ def verify(
     settings: FitSettings,
     seed: int,
 ) -> Verified:
-    """Measure the gain of each cause on unseen data and drop the weak ones.
-
-    `training` and `tests` are as measured. Without tests, the held-out parts of `training` are judged. If the search
-    was in samples in which everything slides, so is this judgement; only the gain of all causes is that of all samples.
-    """
+    """Measure the gain of each cause on unseen data and drop the weak ones."""
     bench = _Bench(given, found, training, tests, settings, seed)
     if found.only_sliding:
         least_gain *= STRICTER
@@ -138,10 +114,7 @@ def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]
 
 
 def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
-    """Merge the places of one effect into one cause.
-
-    The merged cause can be confused with whatever one of its places can be confused with, except other named causes.
-    """
+    """Merge the places of one effect into one cause."""
     by_effect: dict[str, NamedCause] = {}
     for cause in causes:
         known = by_effect.get(cause.effect)
@@ -230,11 +203,7 @@ class _Bench:
         return squared_residual(self._found.estimation.online(data), self._training)
 
     def is_sound(self, causes: Sequence[NamedCause]) -> bool:
-        """Return whether all causes together run better than the nominal model.
-
-        If that is not so with numbers fitted where everything slides, they are fitted to all samples: a compromise, but
-        it runs better where something is stuck.
-        """
+        """Return whether all causes together run better than the nominal model."""
         fit = self.result(causes)
         if self.runs_better(fit, self.nominal) and self.holds(fit):
             return True
@@ -269,11 +238,7 @@ class _Bench:
         return self._unseen.square(self.online(model)) < self._unseen.square(self.online(without))
 
     def holds(self, model: FittedModel) -> bool:
-        """Return whether the model leaves no more of r than the nominal one where neither was fitted.
-
-        Of short recordings that is little, but it is what the report's gain is measured on. Samples in which something
-        is stuck count here, too.
-        """
+        """Return whether the model leaves no more of r than the nominal one where neither was fitted."""
         if self._tests and not self._found.only_sliding:
             return True  # `runs_better` has judged the same samples
         judged = self._tests or self._training
@@ -282,11 +247,7 @@ class _Bench:
         return found <= nominal
 
     def _error(self, model: FittedModel) -> Numbers:
-        """Return Σ e² by stretch on unseen data [K].
-
-        A fifth of the training recordings would show little. Without tests, each fold is therefore unseen in turn and
-        the linear numbers are refitted, as in the search.
-        """
+        """Return Σ e² by stretch on unseen data [K]."""
         if id(model) not in self._errors:
             if self._tests:
                 error = self._unseen.by_stretch(self.online(model))

@@ -42,29 +42,17 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class View:
-    """A description and what it may lack, on all recordings.
-
-    Attributes
-    ----------
-    predicted
-        The recordings with the forces that the model predicts.
-    splines
-        Splines of the slow bias [B, s].
-    grams
-        Products of all columns.
-    least
-        Sizes that the sensors can show.
-    """
+    """A description and what it may lack, on all recordings."""
 
     data: Mapping[str, Any]
     recordings: Sequence[FitRecording]
-    predicted: Sequence[FitRecording]
+    predicted: Sequence[FitRecording]  # the recordings with the forces that the model predicts
     series: Series
-    splines: Splines
+    splines: Splines  # splines of the slow bias [B, s]
     columns: CandidateColumns
     folds: Folds
-    grams: Grams
-    least: LeastSizes
+    grams: Grams  # products of all columns
+    least: LeastSizes  # sizes that the sensors can show
 
     @cached_property
     def selection(self) -> Selection:
@@ -129,24 +117,8 @@ def nominal_scale(data: Mapping[str, Any]) -> Numbers:
 def series_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left_out: Flags | None = None
 ) -> Series:
-    """Return the block means of a description's signals and residual.
-
-    Parameters
-    ----------
-    data
-        Description whose prediction is subtracted.
-    recordings
-        Prepared for the description.
-    grid
-        Blocks of the recordings.
-    left_out
-        Blocks that are not used [B].
-
-    Returns
-    -------
-    Series
-        Block means [B, ...] with `target` = y − G, N·m.
-    """
+    """Return the block means of a description's signals and residual."""
+    # left_out: [B]; returns block means [B, ...] with `target` = y − G, N·m
     series = make_series(data, recordings, grid, block_prediction(data, recordings, grid))
     return series if left_out is None else replace(series, used=series.used & ~left_out)
 
@@ -154,24 +126,7 @@ def series_of(
 def predicted_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series
 ) -> list[FitRecording]:
-    """Return the recordings with the forces that the description predicts.
-
-    Parameters
-    ----------
-    data
-        Fitted description.
-    recordings
-        As estimated from.
-    grid
-        Blocks of the recordings.
-    series
-        Series of this description.
-
-    Returns
-    -------
-    list of FitRecording
-        With forces that lack the noise they share with the torque (`regressors`).
-    """
+    """Return the recordings with the forces that the description predicts."""
     return predicted_forces(data, recordings, grid, series, residual_alone(data, series))
 
 
@@ -181,10 +136,7 @@ def residual_alone(data: Mapping[str, Any], series: Series) -> Numbers:
 
 
 def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Splines:
-    """Return the columns of the bias [B, s]: splines, or constants if the description's bias does not drift.
-
-    `knots` is the distance of the splines' knots, s.
-    """
+    """Return the columns of the bias [B, s]: splines, or constants if the description's bias does not drift."""
     return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 
 

@@ -31,39 +31,22 @@ NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish plac
 
 @dataclass(frozen=True)
 class Judged:
-    """A hypothesis on unseen data.
-
-    Attributes
-    ----------
-    error
-        Σ e², (N·m)².
-    by_stretch
-        The same by stretch [stretches].
-    magnitudes
-        Learned from all data [d].
-    """
+    """A hypothesis on unseen data."""
 
     hypothesis: Hypothesis
-    error: float
-    by_stretch: Numbers
-    magnitudes: Numbers
+    error: float  # Σ e², (N·m)²
+    by_stretch: Numbers  # the same by stretch [stretches]
+    magnitudes: Numbers  # learned from all data [d]
 
 
 @dataclass(frozen=True)
 class Pick:
-    """A selected cause.
-
-    Attributes
-    ----------
-    gain, error
-        1 − rms with / rms without, on unseen data, and its standard error.
-    alike
-        The best hypothesis of every other effect that the data cannot distinguish from it, best first.
-    """
+    """A selected cause."""
 
     judged: Judged
-    gain: float
+    gain: float  # 1 − rms with / rms without, on unseen data, and its standard error
     error: float
+    # the best hypothesis of every other effect that the data cannot distinguish from it, best first
     alike: tuple[Hypothesis, ...]
 
     @property
@@ -77,10 +60,9 @@ class Selection:
     def __init__(
         self, grams: Grams, hypotheses: Sequence[Hypothesis], least: LeastSizes, beside: Sequence[Hypothesis] = ()
     ) -> None:
-        """Judge all hypotheses.
-
-        `beside` holds hypotheses that are taken as present, so that no other effect is credited with what they explain.
-        """
+        """Judge all hypotheses."""
+        # `beside` holds hypotheses that are taken as present, so that no other effect is credited with what they
+        # explain.
         self.grams = grams
         self._beside = _Beside(beside)
         self.shares = [grams.surviving(each.mix) for each in hypotheses]
@@ -116,18 +98,14 @@ class Selection:
         return self._known[number]
 
     def gain(self, judged: Judged, before: Numbers | None = None) -> tuple[float, float]:
-        """Return 1 − rms with / rms without, and its standard error.
-
-        `before` is Σ e² without the hypothesis by stretch [stretches]; None for that of the model.
-        """
+        """Return 1 − rms with / rms without, and its standard error."""
+        # `before` is Σ e² without the hypothesis by stretch [stretches]; None for that of the model.
         whole = self.base if before is None else before
         return rms_gain(whole, judged.by_stretch)
 
     def best(self, least_gain: float, tried: Collection[str] = ()) -> Pick | None:
-        """Return the effect that lowers the error most, at the coarsest place that is as good.
-
-        None if no effect is material and certain. Effects in `tried` are left out.
-        """
+        """Return the effect that lowers the error most, at the coarsest place that is as good."""
+        # None if no effect is material and certain.
         ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
@@ -165,11 +143,7 @@ class Selection:
 
 
 def names_with(effect: str, named: Collection[str]) -> int:
-    """Return how many names count if this one is added.
-
-    A model that is a little wrong everywhere can always be given one more name. So each name must gain more than the
-    one before. COMMON effects, and further places of a named effect, do not count.
-    """
+    """Return how many names count if this one is added."""
     others = set(named) - COMMON
     return 1 if effect in COMMON or effect in others else 1 + len(others)
 
@@ -203,10 +177,7 @@ class _Beside:
 
 
 def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
-    """Return 1 − rms after / rms before from Σ e² by stretch [K], and its standard error.
-
-    The standard error comes from the delta method over stretches.
-    """
+    """Return 1 − rms after / rms before from Σ e² by stretch [K], and its standard error."""
     whole, left = float(before.sum()), float(after.sum())
     if whole <= 0.0:
         return 0.0, np.inf

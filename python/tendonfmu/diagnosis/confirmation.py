@@ -33,17 +33,8 @@ class Confirmation:
     """The residual of a description, and what refitting it can explain."""
 
     def __init__(self, series: Series, folds: Folds, splines: Splines, trends: Splines, nominal: Columns) -> None:
-        """Prepare both tests.
-
-        Parameters
-        ----------
-        splines
-            Splines of the slow bias [B, s].
-        trends
-            Slower splines [B, t] for the white residual, whose filter handles what the bias does faster.
-        nominal
-            Derivatives by the description's own numbers [B, n, u].
-        """
+        """Prepare both tests."""
+        # splines: [B, s]; trends: [B, t]; nominal: [B, n, u]
         joints = series.target.shape[1]
         white = whitener(series, residual_of(series, trends, nominal))
         plain = Whitener(np.zeros((0, joints)), np.ones(joints), series.used)
@@ -93,10 +84,7 @@ class _ClusterTest:
 
     @cached_property
     def _given_back(self) -> list[tuple[Indices, int, Numbers, Numbers]]:
-        """Directions that the splines weaken, for each stretch and joint.
-
-        Each entry holds rows, joint, directions [rows, q], and by how much each direction is strengthened.
-        """
+        """Directions that the splines weaken, for each stretch and joint."""
         found = []
         for rows in self._rows_of_stretches:
             for j, span in enumerate(self._spans):

@@ -45,12 +45,7 @@ _SPARE = 1.3  # times the least time that supports a rate: recordings are cut in
 
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
-    """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned.
-
-    Thresholds cannot be tuned without free motion or with a bias that does not drift. `nominal` and `extended` are
-    fitted descriptions. `recordings` are all of the diagnosis, for training and tests. Recordings without any contact
-    are the free motion; if there are none, the stretches without contact of the others are used.
-    """
+    """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned."""
     labelled = [each.recording for each in recordings if each.recording.contact is not None]
     labelled = [each for each in labelled if each.contact is not None and each.contact.any()]
     if not labelled:

@@ -53,11 +53,7 @@ MAD = 1.4826  # standard deviation of a normal distribution over its median abso
 def scan_events(
     series: Series, residual: Numbers, splines: Splines, recordings: Sequence[str], *, seed: int = 0
 ) -> tuple[Event, ...]:
-    """Find events in a residual [B, n], N·m, of the nominal model, in order of recording and time.
-
-    `splines` [B, s] are those of the bias; their span has been removed from the residual. `recordings` are names, by
-    number.
-    """
+    """Find events in a residual [B, n], N·m, of the nominal model, in order of recording and time."""
     residual = np.where(series.used[:, None], residual, 0.0)
     plan = make_folds(series)
     if not plan.enough:
@@ -88,10 +84,7 @@ def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str])
 
 
 def _flat(left: Numbers, plan: Folds, known: Flags, length: int) -> Numbers:
-    """Return the residual without its running median [U, n].
-
-    In known blocks the median is interpolated from their neighbours.
-    """
+    """Return the residual without its running median [U, n]."""
     result = left[plan.rows]
     for joint in range(left.shape[1]):
         values, own = left[plan.rows, joint], known[plan.rows, joint]
@@ -116,10 +109,7 @@ def _ends(run: NDArray[np.int64]) -> list[int]:
 
 
 def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags:
-    """Return the blocks of windows that exceed what chance reaches [B, n].
-
-    They are extended while the shortest window still stands out. `known` marks blocks that the bias ignores [B, n].
-    """
+    """Return the blocks of windows that exceed what chance reaches [B, n]."""
     inside = np.zeros(left.shape, dtype=bool)
     tests = len(WIDTHS) * left.shape[1]
     flat = {slow: _flat(left, plan, known, max(3, round(slow / series.step))) for slow in set(WIDTHS.values())}
@@ -188,10 +178,7 @@ def _widened(high: Flags, run: NDArray[np.int64], length: int) -> Flags:
 
 
 def _stretches(series: Series, inside: Flags) -> list[NDArray[np.int64]]:
-    """Return the rows of each event.
-
-    Marked blocks of all joints are joined over short breaks and padded, within a segment.
-    """
+    """Return the rows of each event."""
     marked = np.flatnonzero(inside.any(axis=1))
     if not len(marked):
         return []

@@ -38,10 +38,7 @@ _TINY = 1e-9  # expected size of a magnitude of a law that is 0: the estimator s
 
 @dataclass
 class Pass:
-    """Terms that are in the same description at a strength of zero.
-
-    For each column, `columns` holds its index among all columns and its direction, in paths of the merged description.
-    """
+    """Terms that are in the same description at a strength of zero."""
 
     base: Mapping[str, Any]
     edits: dict[tuple[str, str], Edit] = field(default_factory=dict)
@@ -116,11 +113,7 @@ def run_pass(
     sums: Single,
     watch: Watch,
 ) -> None:
-    """Add to `sums` [B, n, c] the block sums of the derivatives of G, the torque with all jumps so far, N·m.
-
-    `columns` holds indices in `sums`, ascending, and directions, in paths of `data` or of a coarser description of the
-    finger.
-    """
+    """Add to `sums` [B, n, c] the block sums of the derivatives of G, the torque with all jumps so far, N·m."""
     finer = [(place, _finer(data, direction)) for place, direction in columns]
     estimator, numbers = _estimator_of(data, {path for _, direction in finer for path in direction})
     entries = [(numbers[path], k, share) for k, (_, direction) in enumerate(finer) for path, share in direction.items()]
@@ -178,10 +171,7 @@ def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator,
 
 
 def _statics_beside(data: Mapping[str, Any], wanted: set[str]) -> set[str]:
-    """Return the statics of laws with a Stribeck effect whose coulomb is wanted.
-
-    If coulomb moves, static − coulomb is held constant, not static.
-    """
+    """Return the statics of laws with a Stribeck effect whose coulomb is wanted."""
     found = set()
     for path in wanted:
         if is_law_number(path) and path.endswith(".coulomb"):

@@ -81,45 +81,7 @@ def diagnose(
     reference: RecordingSource | Sequence[RecordingSource] | None = None,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Diagnosis:
-    """Find what a description lacks; with reference recordings, find what has changed since them.
-
-    Without `tests`, every fifth stretch of 10 s of `recordings` is held out from the fit and used to measure the gain.
-    Causes are then judged on up to eight parts of all recordings, held out in turn.
-
-    Parameters
-    ----------
-    finger
-        Description, parsed JSON, or its file.
-    recordings
-        Of contact-free motion: recordings, DataFrames or files; samples labelled contact are left out.
-    tests
-        Recordings on which the gain is measured.
-    kinematics
-        Kinematics source, 1 to 3.
-    least_gain
-        Share of the remaining rms that a cause must remove, 0 to 0.5.
-    seed
-        Seed of all random numbers.
-    jobs
-        Threads of the fits.
-    checked
-        Whether the recordings were already checked against the finger and the warnings given.
-    reference
-        Recordings of the same finger when it was well, of another motion or the same. `recordings` and `tests` are then
-        those of now, several in order of time.
-    progress
-        Called with what is being done.
-
-    Returns
-    -------
-    Diagnosis
-        Verdict, causes, gains and everything else that a report shows.
-
-    Raises
-    ------
-    InputError
-        If a file or an option is at fault.
-    """
+    """Find what a description lacks; with reference recordings, find what has changed since them."""
     begun = perf_counter()
     if reference is not None:
         phases = Phases(CHANGE_PHASES, progress or (lambda state: None))
@@ -316,10 +278,7 @@ class _Result:
         )
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
-        """Plan experiments for causes that cannot be distinguished and for effects that are not visible.
-
-        Each invisible effect is one question, at the place that comes nearest to being visible.
-        """
+        """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""
         nominal = self._found.nominal.data
         rivals = [
             Question(cause.accepted[0], rival)
@@ -366,10 +325,7 @@ class _Result:
         return span_of(self._found.nominal.data, self._found.fitted_to)
 
     def _is_in_nominal(self, effect: Accepted) -> bool:
-        """Return whether the nominal description has the place, and the law there that the effect belongs to.
-
-        The extended description may have a second law at the place, such as friction by the load, as a cause.
-        """
+        """Return whether the nominal description has the place, and the law there that the effect belongs to."""
         nominal = self._found.nominal.data
         if effect.place not in effect.candidate.places(nominal, self._found.fitted_to[0].kinematics):
             return False
@@ -396,10 +352,7 @@ def _ordinary(hypothesis: Hypothesis) -> Accepted:
 
 
 def _too_small(named: NamedCause) -> Cause:
-    """Return a cause that is certain but not material or not confirmed on unseen data.
-
-    It is in no description, so it has no numbers.
-    """
+    """Return a cause that is certain but not material or not confirmed on unseen data."""
     candidate = named.accepted[0].candidate
     return Cause(
         where=Where(named.effect, named.joint, named.tendon),

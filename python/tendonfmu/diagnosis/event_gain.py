@@ -20,12 +20,7 @@ _TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
 
 def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], events: Sequence[Event]) -> Interval | None:
-    """Return the share of the rms that leaving the events out removes, with a 95 % interval; None without events.
-
-    The events are taken as given. The error without them is as certain as the rest of the recording, judged by blocks
-    of 2 s. `data` is a fitted description as it runs online. `recordings` are as measured, with the events in them;
-    `train` says which samples are judged.
-    """
+    """Return the share of the rms that leaving the events out removes, with a 95 % interval; None without events."""
     if not events:
         return None
     within, samples, free, free_samples = 0.0, 0, [], []
@@ -45,11 +40,9 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
 
 
 def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> Interval | None:
-    """Compute the interval from the sums of r².
-
-    `within` is Σ r² in the events, over `samples` samples. `free` is Σ r² of the blocks outside of events [B], over
-    `free_samples` samples [B].
-    """
+    """Compute the interval from the sums of r²."""
+    # `within` is Σ r² in the events, over `samples` samples. `free` is Σ r² of the blocks outside of events [B], over
+    # `free_samples` samples [B].
     rest, count = float(free.sum()), float(free_samples.sum())
     if len(free) < paired_gain.FEWEST or not rest > 0.0:
         return None

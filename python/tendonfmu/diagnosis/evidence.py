@@ -22,12 +22,7 @@ FEWEST = 10  # blocks in a bin
 def evidence(
     places: Sequence[Place], candidate: Candidate, series: Series, before: Numbers, after: Numbers
 ) -> tuple[Evidence, ...]:
-    """Return a picture of the residual at the joint where the cause changes most.
-
-    The picture is drawn over the effect's own coordinate. If that shows little, it is drawn over the torque that the
-    cause adds: without the cause, the residual follows this torque with slope 1. `places` are those of the cause;
-    `before` and `after` [B, n], N·m, are the residuals without and with it.
-    """
+    """Return a picture of the residual at the joint where the cause changes most."""
     change = np.sum((before - after)[series.used] ** 2, axis=0)
     joint = int(np.argmax(change))
     pair = (before[:, joint], after[:, joint])
@@ -51,10 +46,7 @@ def shown(found: Evidence) -> bool:
 def _binned(
     label: str, unit: str, values: Numbers, series: Series, pair: tuple[Numbers, Numbers], joint: int
 ) -> tuple[Evidence, ...]:
-    """Average over bins of equal count; return nothing if there are too few blocks.
-
-    `values` [B] is the coordinate; `pair` holds the residuals [B] without and with the cause.
-    """
+    """Average over bins of equal count; return nothing if there are too few blocks."""
     kept = series.used & np.isfinite(values)
     bins = min(BINS, int(kept.sum()) // FEWEST)
     if bins < 2:
@@ -68,10 +60,7 @@ def _binned(
 
 
 def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
-    """Return the standard errors of the bins' means.
-
-    Neighbouring blocks of time are not independent, so each whole second counts as one sample.
-    """
+    """Return the standard errors of the bins' means."""
     second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
     found = []
     for rows in parts:

@@ -61,57 +61,28 @@ class Accepted:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Options of a fit, as of `FrictionFit` with method batch.
+    """Options of a fit, as of `FrictionFit` with method batch."""
 
-    Attributes
-    ----------
-    choice
-        Which numbers are fitted.
-    prior
-        Prior standard deviation, in units of each number's expected magnitude.
-    max_passes
-        Largest number of passes over the recordings.
-    tolerance
-        Length of the last step, in standard errors of all unknowns together.
-    threads
-        Number of threads; 0 for all cores.
-    path
-        File of the description, for messages.
-    """
-
-    choice: Choice = field(default_factory=Choice)
-    prior: float = 1.0
-    max_passes: int = 60
-    tolerance: float = 0.3
-    threads: int = 0
-    path: Path = Path("finger")
+    choice: Choice = field(default_factory=Choice)  # which numbers are fitted
+    prior: float = 1.0  # prior standard deviation, in units of each number's expected magnitude
+    max_passes: int = 60  # largest number of passes over the recordings
+    tolerance: float = 0.3  # length of the last step, in standard errors of all unknowns together
+    threads: int = 0  # number of threads; 0 for all cores
+    path: Path = Path("finger")  # file of the description, for messages
 
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A description whose numbers were fitted.
-
-    Attributes
-    ----------
-    given
-        The description that says how large each number may be: its values are the standard deviations of the prior.
-    values, errors
-        By path of an estimated number, SI units. Errors are standard errors for white noise; NaN at a bound.
-    cost
-        ½ Σ e²/S including the prior.
-    at_bound
-        Paths of numbers at a bound.
-    warnings
-        Sentences.
-    """
+    """A description whose numbers were fitted."""
 
     data: Mapping[str, Any]
+    # the description that says how large each number may be: its values are the standard deviations of the prior
     given: Mapping[str, Any]
-    values: Mapping[str, float]
+    values: Mapping[str, float]  # by path of an estimated number, SI units
     errors: Mapping[str, float]
-    cost: float
-    at_bound: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    cost: float  # ½ Σ e²/S including the prior
+    at_bound: tuple[str, ...] = ()  # paths of numbers at a bound
+    warnings: tuple[str, ...] = ()  # sentences
 
     def text(self) -> str:
         """Return the description as JSON, as `tendonfmu fit -o` writes it."""
@@ -125,25 +96,9 @@ def fit_numbers(
     *,
     given: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`.
-
-    The torque to be explained is `FitRecording.target`, even if the forces of the recording are different ones. This is
-    so for `regressors.predicted_forces`: they lack the noise, which a term that scales with the force would otherwise
-    fit by shrinking the force.
-
-    Parameters
-    ----------
-    data
-        Where the fit starts.
-    given
-        The description that says how large numbers may be; None for `data` itself. A number that an earlier fit has
-        driven towards 0 can return if it is present in `given`.
-
-    Raises
-    ------
-    InputError
-        If the description is not valid.
-    """
+    """Fit the numbers of a description to the samples of `FitRecording.train`."""
+    # This is so for `regressors.predicted_forces`: they lack the noise, which a term that scales with the force would
+    # otherwise fit by shrinking the force.
     origin = data if given is None else given
     structure, learned = learn_numbers(data, recordings, settings, given=origin)
     numbers = np.asarray(learned.estimator.values(learned.z))
@@ -164,33 +119,7 @@ def fit_numbers(
 def learn_numbers(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
 ) -> tuple[Structure, Learned]:
-    """Fit the numbers of a description and return everything known about the fit.
-
-    Parameters
-    ----------
-    data
-        Where the fit starts.
-    recordings
-        Their `train` samples are used, thinned to about MOST_SAMPLES.
-    settings
-        Options of the fit.
-    given
-        The description that says how large numbers may be.
-
-    Returns
-    -------
-    Structure
-        The description with its numbers and their scales.
-    Learned
-        Unknowns, covariance and cost.
-
-    Raises
-    ------
-    InputError
-        If the description is not valid.
-    KeyboardInterrupt
-        If the fit is interrupted.
-    """
+    """Fit the numbers of a description and return everything known about the fit."""
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
     structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
@@ -213,10 +142,7 @@ def fit_extended(
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
 ) -> FittedModel:
-    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit.
-
-    `recordings` are those of the nominal fit, with the same masks. Raises InputError.
-    """
+    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit."""
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
@@ -246,10 +172,7 @@ def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) ->
 
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
-    """Return, for each cause, the paths of the numbers that it adds or replaces.
-
-    It replaces numbers where a law is split into two sides or several working points.
-    """
+    """Return, for each cause, the paths of the numbers that it adds or replaces."""
     found = []
     for cause in causes:
         extended = cause.added_to(data)
@@ -292,10 +215,7 @@ def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRec
 
 
 def _thinned(recording: FitRecording, every: int) -> FitRecording:
-    """Train on every `every`-th sample.
-
-    More samples of coloured noise add no information, and the model still runs over all of them.
-    """
+    """Train on every `every`-th sample."""
     if every == 1:
         return recording
     return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
@@ -310,11 +230,7 @@ def _described(data: Mapping[str, Any], path: Path) -> Finger:
 
 
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
-    """Set the expected magnitudes of the numbers.
-
-    They come from the given description if it has the number, or the law before it was split. A new number gets NEW
-    times its start.
-    """
+    """Set the expected magnitudes of the numbers."""
     scale = structure.scale.copy()
     for number in structure.numbers:
         for path in (number.path, number.with_path):

@@ -40,31 +40,16 @@ _TINY = 1e-12  # N·m; lower limit of a scale, for series that are 0
 
 @dataclass(frozen=True)
 class Gain:
-    """Errors and gain of an extended model.
+    """Errors and gain of an extended model."""
 
-    Attributes
-    ----------
-    nominal, extended
-        Rms per joint on the samples trained on and on those of the test.
-    value
-        1 − rms_extended/rms_nominal over all joints on the test.
-    steps
-        Rms over all joints on the test of each model of a sequence, N·m.
-    blocks
-        Number of blocks of some seconds of the test; the intervals come from them.
-    held_out
-        Whether the test is held-out blocks of the training recordings.
-    agreement
-        Largest difference between the outputs of an FMU and of the core, in units of the output's largest value.
-    """
-
-    nominal: ModelErrors
+    nominal: ModelErrors  # rms per joint on the samples trained on and on those of the test
     extended: ModelErrors
     bias_only_rms: tuple[float, ...]
-    value: Interval
-    steps: tuple[float, ...]
-    blocks: int
-    held_out: bool
+    value: Interval  # 1 − rms_extended/rms_nominal over all joints on the test
+    steps: tuple[float, ...]  # rms over all joints on the test of each model of a sequence, N·m
+    blocks: int  # number of blocks of some seconds of the test; the intervals come from them
+    held_out: bool  # whether the test is held-out blocks of the training recordings
+    # largest difference between the outputs of an FMU and of the core, in units of the output's largest value
     agreement: float
 
 
@@ -77,26 +62,7 @@ def measure_gain(
     between: Sequence[Data] = (),
     seed: int = 0,
 ) -> Gain:
-    """Measure the gain of the extended over the nominal model.
-
-    The FMUs of `nominal` and `extended` are run; for the models between them only the core.
-
-    Parameters
-    ----------
-    nominal, extended
-        Fitted descriptions with the same `bias`.
-    tests
-        Recordings that nothing was fitted to. Without any, the `held_out` samples of the training recordings are used.
-    between
-        Models with some of the causes.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to test on.
-    InternalError
-        If an FMU does not agree with the core.
-    """
+    """Measure the gain of the extended over the nominal model."""
     test = _Test.of(training, tests)
     _check_settings(nominal, extended)
     runs = {"nominal": [run_both(nominal, each) for each in test.recordings]}
@@ -133,22 +99,8 @@ def _filter_of(data: Data) -> BiasSettings:
 
 
 def residual_of(data: Data, recording: FitRecording) -> Numbers:
-    """Return the residual r of a recording before the bias update, from a run of the core.
-
-    Friction remembers across gaps, as in an FMU; the bias starts anew after a gap.
-
-    Parameters
-    ----------
-    data
-        Description that runs.
-    recording
-        Recording prepared for it.
-
-    Returns
-    -------
-    array
-        r, N·m [N, n]; NaN where there is none.
-    """
+    """Return the residual r of a recording before the bias update, from a run of the core."""
+    # returns r, N·m [N, n]; NaN where there is none
     return residuals(data, recording, _model(data, recording, _core_outputs(data, recording))).residual
 
 
@@ -164,26 +116,14 @@ def squared_residual(data: Data, recordings: Sequence[FitRecording], flags: Sequ
 
 @dataclass(frozen=True)
 class BothRun:
-    """The residual and how well FMU and core agree.
+    """The residual and how well FMU and core agree."""
 
-    Attributes
-    ----------
-    residual
-        r, N·m [N, n].
-    agreement
-        Largest difference of the outputs of FMU and core, in units of the output's largest value. If the recording is
-        one piece of free motion, the difference of r counts, too.
-    """
-
-    residual: Numbers
-    agreement: float
+    residual: Numbers  # r, N·m [N, n]
+    agreement: float  # largest difference of the outputs of FMU and core, in units of the output's largest value
 
 
 def run_both(data: Data, recording: FitRecording) -> BothRun:
-    """Pack the FMU of a description, run it over a recording without contact detection, and compute r from its T.
-
-    Raises InternalError if FMU and core do not agree.
-    """
+    """Pack the FMU of a description, run it over a recording without contact detection, and compute r from its T."""
     outputs, beside = _fmu_outputs(data, recording), _core_outputs(data, recording)
     agreement = max(_difference(outputs[name], beside[name]) for name in NUMBERS)
     left = residuals(data, recording, _model(data, recording, {**beside, **outputs})).residual
@@ -199,10 +139,7 @@ def run_both(data: Data, recording: FitRecording) -> BothRun:
 
 
 def _fmu_outputs(data: Data, recording: FitRecording) -> dict[str, Numbers]:
-    """Return the outputs of the packed FMU by group [N, n].
-
-    Start values put its contact thresholds out of reach.
-    """
+    """Return the outputs of the packed FMU by group [N, n]."""
     out_of_reach = {
         parameter.path: min(_NEVER, parameter.maximum)
         for parameter in native.Instance.from_description(data).parameters()
@@ -225,10 +162,7 @@ def _core_outputs(data: Data, recording: FitRecording) -> dict[str, Any]:
 
 
 def _model(data: Data, recording: FitRecording, outputs: Mapping[str, Any]) -> Model:
-    """Return T and Δb of a run.
-
-    The bias moves by Δb and by what the update takes from r, which is r − compensated_torque.
-    """
+    """Return T and Δb of a run."""
     bias = outputs["bias_torque"]
     torque = outputs["friction_torque"] - bias
     jump = np.diff(bias, axis=0, prepend=bias[:1]) - (outputs["residual"] - outputs["compensated_torque"])
@@ -299,19 +233,13 @@ class _Test:
         return _pooled(left, self.masks)
 
     def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
-        """Return the rms on the samples trained on.
-
-        `left` holds the residuals of the tested recordings; these are the training recordings if blocks were held out.
-        """
+        """Return the rms on the samples trained on."""
         found = left if self.held_out else [residual_of(data, each) for each in self.training]
         return _pooled(found, [_judged(each, each.train) for each in self.training])
 
 
 def _judged(recording: FitRecording, chosen: Flags) -> Flags:
-    """Return the chosen samples that have a residual [N].
-
-    The first sample of each part and those before the bias has started have none.
-    """
+    """Return the chosen samples that have a residual [N]."""
     judged = np.zeros(len(recording.time), dtype=bool)
     for part in recording.parts:
         if recording.tracked[part].any():

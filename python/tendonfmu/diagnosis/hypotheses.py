@@ -52,31 +52,17 @@ class Member:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect at a place or group of places.
+    """One effect at a place or group of places."""
 
-    Attributes
-    ----------
-    effect, joint, tendon
-        As reported; None if everywhere.
-    level
-        EVERYWHERE, SOMEWHERE or HERE.
-    mix
-        Map from magnitudes to candidate columns [c, d].
-    low, high
-        Bounds of the magnitudes [d].
-    least_gain
-        Share of the rms that it must remove to be considered.
-    """
-
-    effect: str
+    effect: str  # as reported; None if everywhere
     joint: int | None
     tendon: int | None
-    level: int
+    level: int  # EVERYWHERE, SOMEWHERE or HERE
     members: tuple[Member, ...]
-    mix: Numbers
-    low: Numbers
+    mix: Numbers  # map from magnitudes to candidate columns [c, d]
+    low: Numbers  # bounds of the magnitudes [d]
     high: Numbers
-    least_gain: float = 0.0
+    least_gain: float = 0.0  # share of the rms that it must remove to be considered
 
     @property
     def key(self) -> Key:
@@ -84,10 +70,7 @@ class Hypothesis:
 
 
 def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Hypothesis]:
-    """Return all hypotheses, the coarse ones first.
-
-    `arms` are in m [m, n]; `reach` is the largest angle of each joint, rad [n].
-    """
+    """Return all hypotheses, the coarse ones first."""
     count = columns.values.shape[2]
     found = [
         _single(proposal, shape, count, arms, reach) for proposal in columns.proposals for shape in proposal.shapes

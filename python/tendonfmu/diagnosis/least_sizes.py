@@ -25,24 +25,12 @@ BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
 
 @dataclass(frozen=True)
 class LeastSizes:
-    """What limits the sensors.
+    """What limits the sensors."""
 
-    Attributes
-    ----------
-    joint_noise
-        Standard deviation of the noise of the joint positions, rad [n].
-    tendon_noise
-        Standard deviation of the noise of the tendon positions, m [m].
-    step
-        Time between samples, s.
-    lag
-        Lag of the filters, s.
-    """
-
-    joint_noise: Numbers
-    tendon_noise: Numbers
-    step: float
-    lag: float
+    joint_noise: Numbers  # standard deviation of the noise of the joint positions, rad [n]
+    tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
+    step: float  # time between samples, s
+    lag: float  # lag of the filters, s
 
     def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
@@ -56,10 +44,7 @@ class LeastSizes:
         return 0.0
 
     def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
-        """Return whether a step of this size can lead to a size that the sensors resolve.
-
-        A column is valid for up to LARGEST_SECANT times its step.
-        """
+        """Return whether a step of this size can lead to a size that the sensors resolve."""
         least = self.least(candidate.name, place.joint, place.tendon)
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
@@ -87,10 +72,7 @@ def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> floa
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:
-    """Return the noise [d] of positions [N, d]: the spread of what smoothing removes, at least the quantisation noise.
-
-    The spread is a standard deviation from the median absolute deviation, so it is robust.
-    """
+    """Return the noise [d] of positions [N, d]: the spread of what smoothing removes, at least that of quantisation."""
     left = raw - smooth
     spread = 1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)
     steps = np.abs(np.diff(raw, axis=0))

@@ -20,34 +20,18 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause as it was found.
+    """A cause as it was found."""
 
-    Attributes
-    ----------
-    effect, joint, tendon
-        Where it is; None everywhere.
-    accepted
-        Its places, in the form that a description takes.
-    gain, error
-        1 − rms with / rms without on held-out folds, and its standard error.
-    alike
-        What the data cannot distinguish from it.
-    hypothesis
-        As it was selected; None if it is part of the start.
-    measured
-        Gain on unseen data as it runs online.
-    """
-
-    effect: str
+    effect: str  # where it is; None everywhere
     joint: int | None
     tendon: int | None
-    accepted: tuple[Accepted, ...]
-    gain: float
+    accepted: tuple[Accepted, ...]  # its places, in the form that a description takes
+    gain: float  # 1 − rms with / rms without on held-out folds, and its standard error
     error: float
     p_value: float
-    alike: tuple[Hypothesis, ...]
-    hypothesis: Hypothesis | None = None
-    measured: Interval | None = None
+    alike: tuple[Hypothesis, ...]  # what the data cannot distinguish from it
+    hypothesis: Hypothesis | None = None  # as it was selected; None if it is part of the start
+    measured: Interval | None = None  # gain on unseen data as it runs online
 
     @property
     def key(self) -> Key:

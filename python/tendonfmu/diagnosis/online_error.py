@@ -26,15 +26,7 @@ class OnlineError:
     """Errors of several models over the same samples of the same recordings."""
 
     def __init__(self, data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> None:
-        """Prepare the recordings.
-
-        Parameters
-        ----------
-        data
-            Any of the models; they share the settings of the bias.
-        recordings
-            As they were measured; `train` says which samples are judged.
-        """
+        """Prepare the recordings."""
         self._recordings, self._grid = recordings, make_grid(recordings)
         series = series_of(data, recordings, self._grid)
         folds = make_folds(series)

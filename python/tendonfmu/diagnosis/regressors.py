@@ -28,10 +28,7 @@ MOST_SHIFT = 10.0  # times the largest measured force
 def predicted_forces(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series, residual: Numbers
 ) -> list[FitRecording]:
-    """Return the recordings with predicted forces, and with tendon positions that keep the joint angles as measured.
-
-    `data` is the fitted description. `residual` [B, n], N·m, is what it leaves, with the bias removed.
-    """
+    """Return the recordings with predicted forces, and with tendon positions that keep the joint angles as measured."""
     arms = moment_arms(data)
     spread = np.linalg.pinv(arms)
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])

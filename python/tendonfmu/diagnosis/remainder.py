@@ -33,49 +33,23 @@ CERTAIN = 2.0  # standard errors over the stretches
 
 @dataclass(frozen=True)
 class Remainder:
-    """The predictable part of a residual [B, n].
+    """The predictable part of a residual [B, n]."""
 
-    Attributes
-    ----------
-    share
-        Per joint, share of the variance that is predicted on unseen stretches.
-    gain
-        The same by stretch, (N·m)² [stretches, n].
-    square
-        Sum of squares of the residual, (N·m)² [n].
-    p_value
-        Probability of such a result if nothing is predictable, over all joints.
-    unknown
-        Whether some part is certainly predictable.
-    prediction
-        N·m [B, n], 0 where not used.
-    findings
-        The parts that are certain.
-    """
-
-    share: tuple[float, ...]
-    gain: Numbers
-    square: Numbers
-    p_value: float
-    unknown: bool
+    share: tuple[float, ...]  # per joint, share of the variance that is predicted on unseen stretches
+    gain: Numbers  # the same by stretch, (N·m)² [stretches, n]
+    square: Numbers  # sum of squares of the residual, (N·m)² [n]
+    p_value: float  # probability of such a result if nothing is predictable, over all joints
+    unknown: bool  # whether some part is certainly predictable
     description: str
-    prediction: Numbers
-    findings: tuple[Finding, ...]
+    prediction: Numbers  # N·m [B, n], 0 where not used
+    findings: tuple[Finding, ...]  # the parts that are certain
 
 
 def measure_remainder(
     series: Series, residual: Numbers, splines: Splines, *, force: Numbers | None = None, seed: int = 0
 ) -> Remainder:
-    """Measure the predictable part of a residual [B, n], N·m.
-
-    Parameters
-    ----------
-    splines
-        Splines of the bias [B, s]; their span has been removed from the residual.
-    force
-        Forces for the learner that the model predicts, N [B, m]. Without them, the learner uses only the part of the
-        measured forces that makes no torque.
-    """
+    """Measure the predictable part of a residual [B, n], N·m."""
+    # splines: [B, s]; force: [B, m]
     joints, folds = residual.shape[1], make_folds(series)
     residual = np.where(series.used[:, None], residual, 0.0)
     if not folds.enough:

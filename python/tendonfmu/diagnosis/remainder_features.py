@@ -32,43 +32,21 @@ MOVING = 0.03  # of the 95 % quantile of a speed: slower motion counts as rest
 
 @dataclass(frozen=True)
 class Finding:
-    """One part of the remainder.
+    """One part of the remainder."""
 
-    Attributes
-    ----------
-    joint
-        Number from 1.
-    group
-        Key of GROUPS, or "line".
-    subject
-        "joint 2", "tendons 1 and 3", or "".
-    line
-        The oscillation, for group "line".
-    """
-
-    joint: int
-    group: str
-    subject: str
-    line: Line | None = None
+    joint: int  # number from 1
+    group: str  # key of GROUPS, or "line"
+    subject: str  # "joint 2", "tendons 1 and 3", or ""
+    line: Line | None = None  # the oscillation, for group "line"
 
 
 @dataclass(frozen=True)
 class Features:
-    """Columns of the learner.
+    """Columns of the learner."""
 
-    Attributes
-    ----------
-    values
-        Columns [B, D].
-    group
-        Of each column, a key of GROUPS.
-    subject
-        Of each column, the part of the finger that it describes.
-    """
-
-    values: Numbers
-    group: NDArray[np.str_]
-    subject: NDArray[np.str_]
+    values: Numbers  # columns [B, D]
+    group: NDArray[np.str_]  # of each column, a key of GROUPS
+    subject: NDArray[np.str_]  # of each column, the part of the finger that it describes
 
 
 # name of a group -> what the residual follows, in plain words
@@ -91,12 +69,7 @@ GROUPS = {
 
 
 def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> Features:
-    """Compute all columns for the blocks of a series, standardised; constant columns are left out.
-
-    `force` [B, m], N, must be independent of the residual, so it is predicted by the model. The measured force is not
-    independent: the residual is computed from its torque, including the noise, so it would explain the residual.
-    Without a prediction, only the part of the measured force that makes no torque is used.
-    """
+    """Compute all columns for the blocks of a series, standardised; constant columns are left out."""
     series = replace(series, force=_without_torque(series) if force is None else force)
     columns: list[Numbers] = []
     group: list[str] = []
@@ -138,27 +111,13 @@ def _without_torque(series: Series) -> Numbers:
 
 @dataclass(frozen=True)
 class _States:
-    """States of the motion.
+    """States of the motion."""
 
-    Attributes
-    ----------
-    side
-        Sign of the last motion of the joints [B, n]; 0 before any.
-    moving
-        The side, fading to 0 at rest [B, n].
-    rest
-        Length of the last rest, s [B, n].
-    speed
-        95 % quantile of |velocity|, rad/s [n].
-    tendon_speed
-        The same of the tendon's velocity at its first joint, m/s [m].
-    """
-
-    side: Numbers
-    moving: Numbers
-    rest: Numbers
-    speed: Numbers
-    tendon_speed: Numbers
+    side: Numbers  # sign of the last motion of the joints [B, n]; 0 before any
+    moving: Numbers  # the side, fading to 0 at rest [B, n]
+    rest: Numbers  # length of the last rest, s [B, n]
+    speed: Numbers  # 95 % quantile of |velocity|, rad/s [n]
+    tendon_speed: Numbers  # the same of the tendon's velocity at its first joint, m/s [m]
 
 
 _Made = Iterator[tuple[str, str, Numbers]]
@@ -235,10 +194,7 @@ def _spline(signal: Numbers, knots: int) -> Numbers:
 
 
 def _bends(one: Numbers, two: Numbers) -> Numbers:
-    """Return smooth functions of two signals together [B, 9].
-
-    They are products of Legendre polynomials 1 to 3 of the signals' ranges.
-    """
+    """Return smooth functions of two signals together [B, 9]."""
 
     def polynomials(signal: Numbers) -> Numbers:
         low, high = np.quantile(signal, (0.01, 0.99))

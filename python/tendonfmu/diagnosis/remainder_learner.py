@@ -19,21 +19,11 @@ PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column w
 
 @dataclass(frozen=True)
 class Choice:
-    """A set of columns.
+    """A set of columns."""
 
-    Attributes
-    ----------
-    group
-        Key of GROUPS; "" for all groups.
-    subject
-        Subject within the group; "" for the whole group.
-    columns
-        Indices of the columns.
-    """
-
-    group: str
-    subject: str
-    columns: Indices
+    group: str  # key of GROUPS; "" for all groups
+    subject: str  # subject within the group; "" for the whole group
+    columns: Indices  # indices of the columns
 
 
 def choices(seen: Features) -> list[Choice]:

@@ -31,21 +31,7 @@ LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model l
 
 
 def reported_causes(found: Diagnosis) -> list[Cause]:
-    """Return the causes that a report lists, in order of gain.
-
-    Contact and unknown come last. Each is listed only if its gain is certainly above 0: the lower end of its 95 %
-    interval is positive, for contact at least LEAST_GAIN.
-
-    Parameters
-    ----------
-    found
-        The result of `diagnose`.
-
-    Returns
-    -------
-    list of Cause
-        The causes of `found`, then a steady load, contact and unknown where they apply.
-    """
+    """Return the causes that a report lists, in order of gain."""
     return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
 
 

@@ -25,15 +25,8 @@ LONGEST_LAG = 1.0  # s
 def residual_views(
     series: Series, before: Numbers, after: Numbers, *, load: Numbers | None = None
 ) -> tuple[ResidualView, ...]:
-    """Return all pictures of the residual, joint after joint.
-
-    Parameters
-    ----------
-    before, after
-        Residual of the nominal and of the extended model, N·m [B, n].
-    load
-        Torque of the tendons, or known load, N·m [B, n]; without it the view over the load is left out.
-    """
+    """Return all pictures of the residual, joint after joint."""
+    # before, after: [B, n]; load: [B, n]
     return tuple(view for joint in range(before.shape[1]) for view in _of_joint(series, before, after, load, joint))
 
 

@@ -52,47 +52,21 @@ MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
 
 @dataclass(frozen=True)
 class Search:
-    """The result of a search.
+    """The result of a search."""
 
-    Attributes
-    ----------
-    estimation
-        Signals and recordings.
-    nominal, extended
-        Fitted descriptions with the settings for estimation.
-    first, last
-        What each of them lacks and leaves.
-    causes
-        In the order in which they were found.
-    models
-        The nominal model, then the model after each cause [causes + 1].
-    small
-        Effects that are certain but not material.
-    events
-        Contact and stalls.
-    out
-        Blocks that lie in events [B].
-    fitted_to
-        Recordings with the forces that the model predicts, without events.
-    everything
-        The same with the samples in which something is stuck.
-    only_sliding
-        Whether these are left out, because they would mislead (`sliding.py`).
-    """
-
-    estimation: Estimation
-    nominal: FittedModel
+    estimation: Estimation  # signals and recordings
+    nominal: FittedModel  # fitted descriptions with the settings for estimation
     extended: FittedModel
-    first: View
+    first: View  # what each of them lacks and leaves
     last: View
-    causes: tuple[NamedCause, ...]
-    models: tuple[FittedModel, ...]
-    small: tuple[NamedCause, ...]
-    events: tuple[Event, ...]
-    out: Flags
-    fitted_to: Sequence[FitRecording]
-    everything: Sequence[FitRecording]
-    only_sliding: bool
+    causes: tuple[NamedCause, ...]  # in the order in which they were found
+    models: tuple[FittedModel, ...]  # the nominal model, then the model after each cause [causes + 1]
+    small: tuple[NamedCause, ...]  # effects that are certain but not material
+    events: tuple[Event, ...]  # contact and stalls
+    out: Flags  # blocks that lie in events [B]
+    fitted_to: Sequence[FitRecording]  # recordings with the forces that the model predicts, without events
+    everything: Sequence[FitRecording]  # the same with the samples in which something is stuck
+    only_sliding: bool  # whether these are left out, because they would mislead (`sliding.py`)
 
 
 def search(
@@ -104,10 +78,7 @@ def search(
     seed: int,
     phases: Phases,
 ) -> Search:
-    """Search for the causes that a description lacks.
-
-    `recordings` are as measured; their `train` says where to look. `chosen` holds what is estimated from.
-    """
+    """Search for the causes that a description lacks."""
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
     measured = [without_events(each, events) for each in recordings]
@@ -159,10 +130,7 @@ def _searched(
     least_gain: float,
     step: Step,
 ) -> _Searched:
-    """Search in all samples, and without those in which something is stuck if these may mislead; return what is better.
-
-    A model that was fitted without them has to run nearly as well on all samples.
-    """
+    """Search in all samples, and without those in which something is stuck if these may mislead; return the better."""
     online = OnlineError(chosen.online(chosen.nominal.data), measured)
     rounds = _Rounds(chosen, out, online, least_gain)
     rounds.run(step)
@@ -184,10 +152,7 @@ def _searched(
 
 
 def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:
-    """Return an estimation without some blocks [B], and its recordings with the forces that its nominal model predicts.
-
-    The nominal model is fitted to these.
-    """
+    """Return an estimation without some blocks [B], and its recordings with the nominal model's forces."""
     nominal = chosen.nominal
     own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
     clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
@@ -202,26 +167,8 @@ def _overlap(one: Event, other: Event) -> bool:
 def events_of(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
 ) -> tuple[tuple[Event, ...], Flags]:
-    """Find the stretches that no friction explains in the residual of a model.
-
-    Parameters
-    ----------
-    data
-        Fitted description.
-    recordings
-        Prepared for it.
-    grid
-        Blocks of the recordings.
-    seed
-        Seed of the learner's random functions.
-
-    Returns
-    -------
-    tuple of Event
-        In order of recording and time.
-    array of bool
-        Blocks that lie in an event [B].
-    """
+    """Find the stretches that no friction explains in the residual of a model."""
+    # returns blocks that lie in an event [B]
     series = series_of(data, recordings, grid)
     names = [str(recording.path) for recording in recordings]
     events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
@@ -238,24 +185,8 @@ def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecor
 
 
 def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
-    """Return a recording that does not train on the samples of some blocks.
-
-    Parameters
-    ----------
-    recording
-        The recording.
-    number
-        Its number in the grid, from 0.
-    grid
-        Blocks of all recordings.
-    out
-        Blocks to leave out [B].
-
-    Returns
-    -------
-    FitRecording
-        With `train` False in these blocks.
-    """
+    """Return a recording that does not train on the samples of some blocks."""
+    # out: [B]
     train = recording.train.copy()
     for segment in grid.segments:
         if segment.recording == number:
@@ -267,10 +198,7 @@ def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags)
 
 @dataclass(frozen=True)
 class _Trial:
-    """A cause and the model fitted with it; the model is None if there is none.
-
-    `error` is Σ e² on held-out folds by stretch [K].
-    """
+    """A cause and the model fitted with it; the model is None if there is none."""
 
     cause: NamedCause
     model: FittedModel | None
@@ -336,10 +264,7 @@ class _Rounds:
         return replace(best, cause=replace(best.cause, alike=tuple(alike)))
 
     def _at_best_place(self, trial: _Trial, selection: Selection) -> _Trial:
-        """Fit the effect at the nearly best places, too, and take the best.
-
-        Derivatives distinguish the places of a large effect less well than fitted models.
-        """
+        """Fit the effect at the nearly best places, too, and take the best."""
         judged = selection.refined(trial.cause.effect)
         if trial.cause.hypothesis is not judged.hypothesis:
             return trial
@@ -348,10 +273,7 @@ class _Rounds:
         return min(trials, key=lambda each: float(each.error.sum()))
 
     def _tries_presliding(self) -> bool:
-        """Try presliding with a short distance if none was taken; return whether it was taken.
-
-        Its distance may be far below the scanned ones.
-        """
+        """Try presliding with a short distance if none was taken; return whether it was taken."""
         chosen = self._chosen
         if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
             return False
@@ -387,10 +309,7 @@ class _Rounds:
         return _Trial(cause, model, self._look(model, ()).selection.base)
 
     def _take(self, trial: _Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
-        """Keep a further cause if it lowers the error on unseen stretches materially and certainly.
-
-        The error of the model that runs online must fall, too. `candidates` are computed around the new model.
-        """
+        """Keep a further cause if it lowers the error on unseen stretches materially and certainly."""
         before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
         gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
         if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
@@ -403,10 +322,7 @@ class _Rounds:
         return True
 
     def _runs_better(self, model: FittedModel) -> bool:
-        """Return whether the model runs better online than the last one.
-
-        Both its error without a slow bias and its r must be smaller.
-        """
+        """Return whether the model runs better online than the last one."""
         before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
         left, found = (self._online.by_stretch(each).sum() for each in (before, after))
         return bool(found < left and self._online.square(after) < self._online.square(before))
@@ -437,10 +353,8 @@ class _Rounds:
 
 
 def _to_fit(picked: Pick) -> list[Hypothesis]:
-    """Return the effects that cannot be distinguished from a pick and may replace it.
-
-    A correction of the torque itself may replace only another such correction, because it lowers any error.
-    """
+    """Return the effects that cannot be distinguished from a pick and may replace it."""
+    # A correction of the torque itself may replace only another such correction, because it lowers any error.
     scaling = picked.hypothesis.effect in SCALING
     return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
 

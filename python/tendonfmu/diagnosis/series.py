@@ -30,25 +30,13 @@ _NEVER = 1e9  # N·m; a contact threshold that is never passed
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a recording without a gap, cut into blocks with equally many samples.
+    """A stretch of a recording without a gap, cut into blocks with equally many samples."""
 
-    Attributes
-    ----------
-    recording
-        Its number, from 0.
-    part
-        Its samples there.
-    first, count
-        First block in the whole series, and number of blocks.
-    samples
-        Samples of a block.
-    """
-
-    recording: int
-    part: slice
-    first: int
+    recording: int  # its number, from 0
+    part: slice  # its samples there
+    first: int  # first block in the whole series, and number of blocks
     count: int
-    samples: int
+    samples: int  # samples of a block
 
     @property
     def blocks(self) -> slice:
@@ -74,47 +62,18 @@ class Grid:
 
 @dataclass(frozen=True)
 class Series(BlockSeries):
-    """Block means of all recordings, one after another; n joints, m tendons.
+    """Block means of all recordings, one after another; n joints, m tendons."""
 
-    Attributes
-    ----------
-    target
-        y − G, N·m [B, n].
-    angle
-        rad [B, n].
-    velocity
-        rad/s [B, n].
-    acceleration
-        rad/s² [B, n].
-    force
-        N [B, m].
-    tendon_velocity
-        ẋ_ij, m/s [B, m, n].
-    travel
-        Travel since the joint last reversed, rad [B, n].
-    """
-
-    angle: Numbers
-    velocity: Numbers
-    acceleration: Numbers
-    force: Numbers
-    tendon_velocity: Numbers
-    travel: Numbers
+    angle: Numbers  # rad [B, n]
+    velocity: Numbers  # rad/s [B, n]
+    acceleration: Numbers  # rad/s² [B, n]
+    force: Numbers  # N [B, m]
+    tendon_velocity: Numbers  # ẋ_ij, m/s [B, m, n]
+    travel: Numbers  # travel since the joint last reversed, rad [B, n]
 
 
 def make_grid(recordings: Sequence[FitRecording]) -> Grid:
-    """Cut recordings into blocks of about 10 ms.
-
-    Parameters
-    ----------
-    recordings
-        Recordings prepared for a fit.
-
-    Returns
-    -------
-    Grid
-        Blocks are longer if there would be more than MOST_BLOCKS, and never shorter than a sample.
-    """
+    """Cut recordings into blocks of about 10 ms."""
     duration = sum(recording.duration for recording in recordings)
     step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
     segments, first = [], 0
@@ -131,12 +90,7 @@ def make_grid(recordings: Sequence[FitRecording]) -> Grid:
 def exact_model(
     data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None, jumps: bool = True
 ) -> Numbers:
-    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts.
-
-    Without `jumps` it is T alone; the jumps depend on how a recording begins. `entry_load` replaces the description's
-    value. If the description delays the forces, the delay of the measured torque is subtracted: measured τ less the
-    result is bias plus noise.
-    """
+    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
     given = data.get("bias") or {}
     joints = len(data["joints"])
     kept = {key: given[key] for key in ("forget_rate", "entry_load") if given.get(key) is not None}
@@ -164,10 +118,7 @@ def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording]
 
 
 def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, torque: Numbers) -> Series:
-    """Average the signals over the blocks of a grid.
-
-    `torque` [B, n] is G of the description. Angles and velocities are those that the model uses.
-    """
+    """Average the signals over the blocks of a grid."""
     whole = [recordings[segment.recording] for segment in grid.segments]
     pieces = list(zip(grid.segments, whole, strict=True))
     threshold = _joint_threshold(data)

@@ -38,33 +38,17 @@ BETTER = 0.7  # of the error of smoothed signals, which raw ones must stay below
 
 @dataclass(frozen=True)
 class Estimation:
-    """The signals and models that the estimation starts from.
-
-    Attributes
-    ----------
-    recordings
-        `train` says which samples are used.
-    least
-        Sizes that the sensors can show.
-    nominal
-        The given structure, fitted with these settings.
-    start
-        Delay and presliding that the search starts with.
-    model
-        The model fitted with `start`.
-    given
-        The given description, with the filter that suits it online.
-    """
+    """The signals and models that the estimation starts from."""
 
     signals: Signals
-    recordings: list[FitRecording]
+    recordings: list[FitRecording]  # `train` says which samples are used
     grid: Grid
-    least: LeastSizes
-    nominal: FittedModel
-    start: Start
-    model: FittedModel
+    least: LeastSizes  # sizes that the sensors can show
+    nominal: FittedModel  # the given structure, fitted with these settings
+    start: Start  # delay and presliding that the search starts with
+    model: FittedModel  # the model fitted with `start`
     settings: FitSettings
-    given: Mapping[str, Any]
+    given: Mapping[str, Any]  # the given description, with the filter that suits it online
 
     def online(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Return an estimated description with the settings for raw samples."""
@@ -78,10 +62,7 @@ class Estimation:
 
 
 def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
-    """Choose signals and starting point for recordings as they were measured.
-
-    Of long recordings only a part is compared. Raises InputError.
-    """
+    """Choose signals and starting point for recordings as they were measured."""
     smoothing = smoothing_of([each.recording for each in recordings], given.data)
     raw = Signals()
     part = part_of(given, recordings)
@@ -103,10 +84,7 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
 
 
 def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
-    """Return the first seconds of each recording, ENOUGH in total.
-
-    Signals and starting point vary little along a recording.
-    """
+    """Return the first seconds of each recording, ENOUGH in total."""
     share = ENOUGH / max(sum(each.duration for each in recordings), 1e-300)
     if share >= 1.0:
         return list(recordings)
@@ -128,11 +106,7 @@ def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecord
 
 
 def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
-    """Add an online position filter if the estimated models then leave a smaller error on raw samples.
-
-    The comparison is with the description's own velocity filter. A model estimated from raw signals keeps its own
-    filter.
-    """
+    """Add an online position filter if the estimated models then leave a smaller error on raw samples."""
     long_enough = all(len(each.time) >= FEWEST_SAMPLES for each in recordings)
     if chosen.signals.cutoff is None or "position_filter" in chosen.given or not long_enough:
         return chosen
@@ -189,22 +163,7 @@ def starting_point(
 
 
 def estimation_recordings(finger: Finger, recordings: Sequence[FitRecording], signals: Signals) -> list[FitRecording]:
-    """Return recordings whose signals are smoothed as chosen.
-
-    Parameters
-    ----------
-    finger
-        Description that the recordings are prepared for.
-    recordings
-        As they were measured.
-    signals
-        The chosen signals; without a cutoff the recordings are returned unchanged.
-
-    Returns
-    -------
-    list of FitRecording
-        Samples that are not trained on or held out in `recordings` are not in these either.
-    """
+    """Return recordings whose signals are smoothed as chosen."""
     if signals.cutoff is None:
         return list(recordings)
     found = []
@@ -236,10 +195,7 @@ def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], ste
 
 
 def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, cutoff: float | None) -> float:
-    """Return the rms on held-out folds, N·m, with the description's numbers refitted.
-
-    Target and derivatives are smoothed at the cutoff, Hz.
-    """
+    """Return the rms on held-out folds, N·m, with the description's numbers refitted."""
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
     columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())

@@ -21,10 +21,7 @@ _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude
 
 
 def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -> str:
-    """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number.
-
-    `thresholds` are the velocities at which tendons, m/s, and joints, rad/s, begin to move.
-    """
+    """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number."""
     told = [each for each in places if each.parameters]
     if not told:
         return ""
@@ -41,22 +38,7 @@ def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -
 
 
 def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
-    """Return the size of an effect at one place in plain words.
-
-    Parameters
-    ----------
-    effect
-        Name of the effect.
-    parameters
-        Numbers of that place in the extended description: path -> (value, unit).
-    thresholds
-        Velocities at which tendons, m/s, and joints, rad/s, begin to move.
-
-    Returns
-    -------
-    str
-        Such as "a play of 0.32 mm"; names and values if the effect has no words of its own.
-    """
+    """Return the size of an effect at one place in plain words."""
     if effect == "presliding" and (told := _travel(parameters, thresholds)):
         return told
     numbers: Numbers = {}
@@ -83,22 +65,7 @@ def _first(place: FoundPlace) -> tuple[float, str]:
 
 
 def quantity(value: float, unit: str, *, sign: bool = False) -> str:
-    """Format a value with three digits and a suitable unit prefix.
-
-    Parameters
-    ----------
-    value
-        In `unit`.
-    unit
-        SI unit as in the FMU, such as "N.m"; "" or "1" for a plain number, which is shown in per cent.
-    sign
-        Whether positive values get a "+".
-
-    Returns
-    -------
-    str
-        Such as "+3.2 mN·m"; value and unit are joined by a no-break space.
-    """
+    """Format a value with three digits and a suitable unit prefix."""
     if unit in ("", "1"):
         text, told = f"{100 * value:.3g}", "%"
     else:
@@ -197,10 +164,7 @@ def _delay(numbers: Numbers) -> str:
 
 
 def _sides(numbers: Numbers) -> str:
-    """Return the two sides, positive before negative as in a description.
-
-    Of several working points, the one is used where the sides differ most.
-    """
+    """Return the two sides, positive before negative as in a description."""
     coulomb = numbers["coulomb"]
     pairs = list(zip(coulomb[::2], coulomb[1::2], strict=True))
     (one, unit), (other, _) = max(pairs, key=lambda pair: abs(pair[0][0] - pair[1][0]))

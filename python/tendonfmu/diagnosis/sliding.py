@@ -58,10 +58,7 @@ def without_stuck(given: Finger, recordings: Sequence[FitRecording], signals: Si
 
 @dataclass(frozen=True)
 class Sliding:
-    """Recordings without stuck samples, as they were measured, and what is estimated from them.
-
-    The estimation's `model` is still that of all samples.
-    """
+    """Recordings without stuck samples, as they were measured, and what is estimated from them."""
 
     measured: list[FitRecording]
     estimation: Estimation
@@ -75,19 +72,7 @@ class Sliding:
 def sliding_alone(
     given: Finger, recordings: Sequence[FitRecording], chosen: Estimation, model: FittedModel
 ) -> Sliding | None:
-    """Return recordings and estimation without stuck samples; None if these leave no larger error than the others.
-
-    Parameters
-    ----------
-    given
-        The description.
-    recordings
-        As they were measured; `train` says which samples are looked at.
-    chosen
-        What is estimated from with the stuck samples.
-    model
-        Fitted to all samples.
-    """
+    """Return recordings and estimation without stuck samples; None if these leave no larger error than the others."""
     free = without_stuck(given, recordings, chosen.signals)
     if not _enough(free):
         return None
@@ -102,10 +87,7 @@ def sliding_alone(
 
 
 def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]) -> Mapping[str, Any]:
-    """Choose the time of presliding everywhere, which sliding hardly shows; keep the other numbers of a description.
-
-    `error` of a description counts all samples. It has several minima over the time, which is taken from a grid.
-    """
+    """Choose the time of presliding everywhere, which sliding hardly shows; keep the other numbers of a description."""
     rows = list(data.get("extensions") or [])
     at = [k for k, row in enumerate(rows) if row["effect"] == "presliding" and not {"joint", "tendon"} & {*row}]
     if not at:

@@ -22,45 +22,19 @@ _DEAD = 0.02  # of the range: smaller turns are noise, not reversals
 
 @dataclass(frozen=True)
 class Span:
-    """Ranges of the signals over all samples that are used.
+    """Ranges of the signals over all samples that are used."""
 
-    Attributes
-    ----------
-    angle
-        1 % and 99 % quantiles, rad [n, 2].
-    speed
-        95 % quantile of |q̇|, rad/s [n].
-    tendon_speed
-        95 % quantile of |ẋ_ij|, m/s [m, n].
-    position
-        1 % and 99 % quantiles of the joint-side tendon position x1 = R q, m [m, 2].
-    travel
-        Median distance of a joint between reversals, rad [n].
-    tendon_travel
-        Median distance of a tendon between reversals, m [m].
-    force
-        1 % and 99 % quantiles, N [m, 2].
-    acceleration
-        95 % quantile, rad/s² [n].
-    torque
-        Standard deviation of the torque to be explained, N·m [n].
-    duration
-        Length of the longest part without a gap, s.
-    step
-        Median time between samples, s.
-    """
-
-    angle: Numbers
-    speed: Numbers
-    tendon_speed: Numbers
-    position: Numbers
-    travel: Numbers
-    tendon_travel: Numbers
-    force: Numbers
-    acceleration: Numbers
-    torque: Numbers
-    duration: float
-    step: float
+    angle: Numbers  # 1 % and 99 % quantiles, rad [n, 2]
+    speed: Numbers  # 95 % quantile of |q̇|, rad/s [n]
+    tendon_speed: Numbers  # 95 % quantile of |ẋ_ij|, m/s [m, n]
+    position: Numbers  # 1 % and 99 % quantiles of the joint-side tendon position x1 = R q, m [m, 2]
+    travel: Numbers  # median distance of a joint between reversals, rad [n]
+    tendon_travel: Numbers  # median distance of a tendon between reversals, m [m]
+    force: Numbers  # 1 % and 99 % quantiles, N [m, 2]
+    acceleration: Numbers  # 95 % quantile, rad/s² [n]
+    torque: Numbers  # standard deviation of the torque to be explained, N·m [n]
+    duration: float  # length of the longest part without a gap, s
+    step: float  # median time between samples, s
 
 
 def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span:

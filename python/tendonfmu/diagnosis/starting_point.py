@@ -40,21 +40,11 @@ PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 
 @dataclass(frozen=True)
 class Start:
-    """One point of the scan.
+    """One point of the scan."""
 
-    Attributes
-    ----------
-    presliding
-        At all places; () for none.
-    delay
-        By how much forces are late, s.
-    error
-        Σ e² on held-out folds, (N·m)².
-    """
-
-    presliding: tuple[Accepted, ...]
-    delay: float
-    error: float
+    presliding: tuple[Accepted, ...]  # at all places; () for none
+    delay: float  # by how much forces are late, s
+    error: float  # Σ e² on held-out folds, (N·m)²
 
     @property
     def causes(self) -> list[tuple[Accepted, ...]]:
@@ -97,11 +87,7 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
 
 
 def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Accepted, ...]]:
-    """Return presliding at all places with one distance, for each distance of a grid.
-
-    It is one number for all places, or a number for each place if a threshold of 0 sets no scale. The list is empty if
-    the description already has presliding.
-    """
+    """Return presliding at all places with one distance, for each distance of a grid."""
     places = PRESLIDING.places(data, source)
     if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
         return []
@@ -120,11 +106,7 @@ def _delays(step: float) -> Numbers:
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
-    """Return by how many seconds forces are later than positions; None if the recordings do not show it.
-
-    The delay is found from the part of x0 − f0/k that no joint angles can produce. It needs more tendons than joints
-    and a pretension that changes enough.
-    """
+    """Return by how many seconds forces are later than positions; None if the recordings do not show it."""
     arms = moment_arms(data)
     apart = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
     if np.linalg.matrix_rank(apart) == 0:

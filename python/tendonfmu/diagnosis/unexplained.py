@@ -14,17 +14,8 @@ Numbers = NDArray[np.float64]
 
 
 def unexplained_of(left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float) -> Unexplained:
-    """Return the share of the remaining variance that unseen stretches show to be no noise.
-
-    Parameters
-    ----------
-    left
-        What is predictable in the samples that were looked at.
-    looked_at, everything
-        Sums of squares of the residual in these samples and in all samples, (N·m)² [n].
-    least_gain
-        Share of the rms that is material.
-    """
+    """Return the share of the remaining variance that unseen stretches show to be no noise."""
+    # looked_at, everything: [n] (N·m)
     part = np.divide(looked_at, everything, out=np.zeros_like(looked_at), where=everything > 0.0)
     shares = np.clip(np.array(left.share), 0.0, 1.0) * part
     whole = float(everything.sum())

@@ -17,19 +17,11 @@ SMALLEST_GAIN = 1e-6  # where every gain counts as material
 
 @dataclass(frozen=True)
 class Unseen:
-    """An effect at a place, and what keeps it from being seen.
-
-    Attributes
-    ----------
-    share
-        Share of its variance that survives the refit.
-    gain, needed
-        1 − rms ratio that an ordinary size would bring, and that a cause has to bring.
-    """
+    """An effect at a place, and what keeps it from being seen."""
 
     hypothesis: Hypothesis
-    share: float
-    gain: float
+    share: float  # share of its variance that survives the refit
+    gain: float  # 1 − rms ratio that an ordinary size would bring, and that a cause has to bring
     needed: float
 
     @property
@@ -41,24 +33,7 @@ class Unseen:
 def unseen_effects(
     selection: Selection, causes: Sequence[NamedCause], known: Sequence[NamedCause], least_gain: float
 ) -> list[Unseen]:
-    """Return, for each place at which an effect of ordinary size would not become a cause, its best shape.
-
-    Parameters
-    ----------
-    selection
-        Of the model with all causes.
-    causes
-        Those that are named; each raises what a further one has to gain.
-    known
-        Those and whatever else was seen there; none of them is listed.
-    least_gain
-        Share of the rms that a first cause must remove.
-
-    Returns
-    -------
-    list of Unseen
-        The places nearest to being visible first.
-    """
+    """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
     places = {(cause.effect, each.place.joint, each.place.tendon) for cause in known for each in cause.accepted}
     names = [cause.effect for cause in causes]
     best: dict[Key, Unseen] = {}

@@ -30,21 +30,11 @@ _MOST_LETTERS = (70, 36)  # in a line of keys, and in one of the heading of a pa
 
 @dataclass(frozen=True)
 class SeriesRow:
-    """Curves over a common x.
+    """Curves over a common x."""
 
-    Attributes
-    ----------
-    label
-        Of the y axis, with its unit in brackets.
-    curves
-        Name -> y [N].
-    log_y
-        Whether the y axis is logarithmic.
-    """
-
-    label: str
-    curves: Mapping[str, Numbers]
-    log_y: bool = False
+    label: str  # of the y axis, with its unit in brackets
+    curves: Mapping[str, Numbers]  # name -> y [N]
+    log_y: bool = False  # whether the y axis is logarithmic
 
 
 def series_figure(
@@ -54,26 +44,8 @@ def series_figure(
     rows: Sequence[SeriesRow],
     stripes: Mapping[str, Sequence[Interval]] | None = None,
 ) -> Any:
-    """Draw rows of curves below each other; they are zoomed together along x.
-
-    Parameters
-    ----------
-    title
-        Heading.
-    x_label
-        Of the x axis, with its unit in brackets.
-    x
-        [N]. Long curves are thinned to the minima and maxima of 1000 stretches.
-    rows
-        What is drawn.
-    stripes
-        Colour -> intervals shaded along x.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-        The figure.
-    """
+    """Draw rows of curves below each other; they are zoomed together along x."""
+    # x: [N]
     height = 80.0 + _SERIES * len(rows)
     data: list[Figure] = []
     layout: Figure = {"title": {"text": html.escape(title)}, "height": height, "hovermode": "x", "shapes": []}
@@ -104,20 +76,7 @@ def series_figure(
 
 
 def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
-    """Draw the panels of sheets, two in a row.
-
-    Parameters
-    ----------
-    title
-        Heading.
-    sheets
-        What is drawn; matrices are left out.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-        The figure.
-    """
+    """Draw the panels of sheets, two in a row."""
     panels = [(sheet, panel) for sheet in sheets for panel in sheet.panels if not isinstance(panel, MatrixPanel)]
     columns = max(1, min(_COLUMNS, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))

@@ -24,19 +24,7 @@ Mark = Callable[[Raster, float, float], None]
 
 
 def draw_finger(drawing: FingerDrawing, target: IO[bytes], icon: IO[bytes] | None = None) -> None:
-    """Draw the routing of a finger as PNG, as in fig. 3 of the paper.
-
-    It shows links, joints, tendons over and under them, pulleys, and edges (red).
-
-    Parameters
-    ----------
-    drawing
-        Geometry of the drawing.
-    target
-        Binary stream.
-    icon
-        The same for a small square copy without words.
-    """
+    """Draw the routing of a finger as PNG, as in fig. 3 of the paper."""
     longest = max(len(tendon.name) for tendon in drawing.tendons)
     labels = 0.5 + 0.115 * longest  # room for names on the left, in drawing units
     half = drawing.height + 0.8

@@ -61,20 +61,7 @@ _TEMPLATE = {
 
 
 def figures_json(panels: Sequence[Panel | MatrixPanel], names: Sequence[dict[str, str]]) -> Markup:
-    """Return the figures of a page as JSON that is safe inside a `script` element.
-
-    Parameters
-    ----------
-    panels
-        All panels of the page, in its order.
-    names
-        Of each panel: style -> meaning, shown under the pointer.
-
-    Returns
-    -------
-    Markup
-        The common template and the figures, with `<` escaped.
-    """
+    """Return the figures of a page as JSON that is safe inside a `script` element."""
     figures = [figure_of(panel, named) for panel, named in zip(panels, names, strict=True)]
     text = json.dumps({"template": _TEMPLATE, "figures": figures}, allow_nan=False, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c"))
@@ -89,13 +76,7 @@ def packed_plotly() -> Markup:
 
 
 def plotly_figure(figure: Figure) -> Any:
-    """Return data and layout as a `plotly.graph_objects.Figure` with the look of the pages.
-
-    Parameters
-    ----------
-    figure
-        `data` and `layout`.
-    """
+    """Return data and layout as a `plotly.graph_objects.Figure` with the look of the pages."""
     from plotly.graph_objects import Figure as PlotlyFigure
 
     # the title is at the left: the buttons are at the right
@@ -124,10 +105,7 @@ def height_in_page(panel: Panel | MatrixPanel) -> int:
 
 
 def figure_of(panel: Panel | MatrixPanel, names: dict[str, str]) -> Figure:
-    """Return data and layout of a panel as Plotly expects them.
-
-    Panels of a page with the same `zoom` share their range along x.
-    """
+    """Return data and layout of a panel as Plotly expects them."""
     if isinstance(panel, MatrixPanel):
         return _matrix(panel)
     drawing = _Drawing(panel, names)
@@ -379,10 +357,7 @@ def _matrix(panel: MatrixPanel) -> Figure:
 
 
 def pooled(matrix: Numbers) -> tuple[NDArray[np.int8], int]:
-    """Return a matrix in per cent, and how many of its rows each row stands for.
-
-    Of the entries pooled, the one furthest from 0 is kept.
-    """
+    """Return a matrix in per cent, and how many of its rows each row stands for."""
     every = math.ceil(len(matrix) / _MOST_CELLS) or 1
     room = -len(matrix) % every
     whole = np.pad(matrix, ((0, room), (0, room)))

@@ -19,194 +19,94 @@ Size = Literal["small", "medium", "large"]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line.
+    """A line."""
 
-    Attributes
-    ----------
-    style
-        Key of `panel_styles.STYLES`.
-    x, y : [N]
-        NaN breaks the line.
-    """
-
-    style: str
-    x: Numbers
+    style: str  # key of `panel_styles.STYLES`
+    x: Numbers  # naN breaks the line
     y: Numbers
 
 
 @dataclass(frozen=True)
 class Band:
-    """The area between two curves.
+    """The area between two curves."""
 
-    Attributes
-    ----------
-    style
-        Key of `panel_styles.STYLES`.
-    x, low, high : [N]
-    """
-
-    style: str
-    x: Numbers
+    style: str  # key of `panel_styles.STYLES`
+    x: Numbers  #
     low: Numbers
     high: Numbers
 
 
 @dataclass(frozen=True)
 class Dots:
-    """Single points.
+    """Single points."""
 
-    Attributes
-    ----------
-    style
-        Key of `panel_styles.STYLES`.
-    x, y : [N]
-    """
-
-    style: str
-    x: Numbers
+    style: str  # key of `panel_styles.STYLES`
+    x: Numbers  #
     y: Numbers
 
 
 @dataclass(frozen=True)
 class Bars:
-    """Error bars.
+    """Error bars."""
 
-    Attributes
-    ----------
-    style
-        Key of `panel_styles.STYLES`.
-    x, low, high : [N]
-        At each x a bar from low to high.
-    lying
-        Bars lie along the horizontal axis; `x` is then their height.
-    """
-
-    style: str
-    x: Numbers
+    style: str  # key of `panel_styles.STYLES`
+    x: Numbers  # at each x a bar from low to high
     low: Numbers
     high: Numbers
-    lying: bool = False
+    lying: bool = False  # bars lie along the horizontal axis; `x` is then their height
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes.
+    """One pair of axes."""
 
-    Attributes
-    ----------
-    title, x_label, y_label
-        Texts. A unit is in brackets at the end of a label.
-    alt
-        What the panel shows, in words, for readers who cannot see it.
-    size
-        Key of `panel_styles.SIZES`.
-    note
-        Small text at the right end of the title's line.
-    curves, bands, dots, bars
-        What is drawn.
-    stripes
-        Intervals shaded along x, in `stripe_style`.
-    ticks
-        (place, name) along x.
-    data
-        Where samples are: bin edges [k + 1] and heights [k] from 0 to 1, drawn along the bottom.
-    x_limits, y_limits
-        Ends of the axes; None for those of the data.
-    log_x, log_y
-        Logarithmic axes.
-    near_x
-        x is linear up to this value on both sides of 0 and logarithmic beyond; 0: linear.
-    rows
-        Names of y = 0, 1, ... from the top; empty: y is a number.
-    line
-        A marked x.
-    height : CSS pixels
-        0: that of the size.
-    zoom
-        Panels of a page with the same word are zoomed together along x; empty: this one alone.
-    """
-
-    title: str
-    alt: str
+    title: str  # texts
+    alt: str  # what the panel shows, in words, for readers who cannot see it
     x_label: str
     y_label: str
-    size: Size = "small"
-    note: str = ""
-    curves: tuple[Curve, ...] = ()
+    size: Size = "small"  # key of `panel_styles.SIZES`
+    note: str = ""  # small text at the right end of the title's line
+    curves: tuple[Curve, ...] = ()  # what is drawn
     bands: tuple[Band, ...] = ()
     dots: tuple[Dots, ...] = ()
     bars: tuple[Bars, ...] = ()
-    stripes: tuple[Interval, ...] = ()
+    stripes: tuple[Interval, ...] = ()  # intervals shaded along x, in `stripe_style`
     stripe_style: str = "held_out"
-    ticks: tuple[tuple[float, str], ...] = ()
+    ticks: tuple[tuple[float, str], ...] = ()  # (place, name) along x
+    # where samples are: bin edges [k + 1] and heights [k] from 0 to 1, drawn along the bottom
     data: tuple[Numbers, Numbers] | None = None
-    x_limits: Interval | None = None
+    x_limits: Interval | None = None  # ends of the axes; None for those of the data
     y_limits: Interval | None = None
-    log_x: bool = False
+    log_x: bool = False  # logarithmic axes
     log_y: bool = False
-    near_x: float = 0.0
-    rows: tuple[str, ...] = ()
-    line: float | None = None
+    near_x: float = 0.0  # x is linear up to this value on both sides of 0 and logarithmic beyond; 0: linear
+    rows: tuple[str, ...] = ()  # names of y = 0, 1, ... from the top; empty: y is a number
+    line: float | None = None  # A marked x
     height: int = 0
-    zoom: str = ""
+    zoom: str = ""  # panels of a page with the same word are zoomed together along x; empty: this one alone
 
 
 @dataclass(frozen=True)
 class MatrixPanel:
-    """A matrix of numbers from −1 to 1.
+    """A matrix of numbers from −1 to 1."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    alt
-        What the panel shows, in words, for readers who cannot see it.
-    matrix : [p, p]
-    groups
-        (name, begin, end) of the rows of each group, in order.
-    marked : [k, 2]
-        Rows and columns of entries that are drawn enlarged where entries are too small to be seen.
-    names : [p]
-        Names of the rows, all different.
-    size
-        Key of `panel_styles.SIZES`.
-    """
-
-    title: str
-    alt: str
+    title: str  # heading
+    alt: str  # what the panel shows, in words, for readers who cannot see it
     matrix: Numbers
-    groups: tuple[tuple[str, int, int], ...]
+    groups: tuple[tuple[str, int, int], ...]  # (name, begin, end) of the rows of each group, in order
     marked: NDArray[np.intp]
     names: tuple[str, ...]
-    size: Size = "large"
+    size: Size = "large"  # key of `panel_styles.SIZES`
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """Panels that belong together.
+    """Panels that belong together."""
 
-    Attributes
-    ----------
-    section
-        Heading of the page under which the sheet is.
-    name
-        Stem of the PNG file.
-    title
-        Heading.
-    caption
-        What to see, in a sentence or two.
-    keys
-        (style, meaning) of what is drawn.
-    panels
-        The panels.
-    folded
-        Shown on demand only.
-    """
-
-    section: str
-    name: str
-    title: str
-    caption: str
-    keys: tuple[tuple[str, str], ...]
-    panels: tuple[Panel | MatrixPanel, ...]
-    folded: bool = False
+    section: str  # heading of the page under which the sheet is
+    name: str  # stem of the PNG file
+    title: str  # heading
+    caption: str  # what to see, in a sentence or two
+    keys: tuple[tuple[str, str], ...]  # (style, meaning) of what is drawn
+    panels: tuple[Panel | MatrixPanel, ...]  # the panels
+    folded: bool = False  # shown on demand only

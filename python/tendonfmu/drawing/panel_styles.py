@@ -29,28 +29,14 @@ SIZES = {"small": (370, 250), "medium": (560, 250), "large": (560, 400)}  # CSS 
 
 @dataclass(frozen=True)
 class Style:
-    """How something is drawn.
+    """How something is drawn."""
 
-    Attributes
-    ----------
-    colour
-        As "#RRGGBB".
-    width, dash
-        Of a curve; a width of 0 means dots.
-    alpha
-        Opacity.
-    filled
-        Whether dots are filled.
-    patch
-        Whether its key is a patch, as for a band.
-    """
-
-    colour: str
-    width: float = 1.2
+    colour: str  # as "#RRGGBB"
+    width: float = 1.2  # of a curve; a width of 0 means dots
     dash: Literal["-", "--", ":"] = "-"
-    alpha: float = 1.0
-    filled: bool = True
-    patch: bool = False
+    alpha: float = 1.0  # opacity
+    filled: bool = True  # whether dots are filled
+    patch: bool = False  # whether its key is a patch, as for a band
 
     @property
     def shape(self) -> str:

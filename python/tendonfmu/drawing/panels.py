@@ -40,18 +40,8 @@ _DIVERGING = LinearSegmentedColormap.from_list("diverging", DIVERGING)
 
 
 def draw_panel(panel: Panel | MatrixPanel) -> Pixels:
-    """Draw a panel alone.
-
-    Parameters
-    ----------
-    panel
-        What to draw.
-
-    Returns
-    -------
-    ndarray
-        Pixels [height, width, 3].
-    """
+    """Draw a panel alone."""
+    # returns pixels [height, width, 3]
     width, height = size_of(panel)
     figure = Figure(figsize=(width / _CSS, height / _CSS), facecolor="white")
     named = isinstance(panel, MatrixPanel) or bool(panel.rows)
@@ -74,10 +64,7 @@ def _room_for_names(panel: Panel | MatrixPanel) -> float:
 
 
 def png(pixels: Pixels, *, exact: bool = False) -> bytes:
-    """Encode pixels as PNG; the same pixels give the same bytes.
-
-    Unless `exact`, each colour has 32 shades, which saves a third.
-    """
+    """Encode pixels as PNG; the same pixels give the same bytes."""
     file = BytesIO()
     if not exact:
         pixels = ((pixels.astype(np.uint16) * 31 + 127) // 255 * 255 // 31).astype(np.uint8)
@@ -87,22 +74,7 @@ def png(pixels: Pixels, *, exact: bool = False) -> bytes:
 
 
 def write_sheet(sheet: Sheet, panels: list[Pixels], file: Path) -> None:
-    """Write all panels of a sheet side by side below its title and its keys, as PNG, whole or not at all.
-
-    Parameters
-    ----------
-    sheet
-        Sheet with title and keys.
-    panels
-        Its panels, drawn by `draw_panel`.
-    file
-        PNG file.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write all panels of a sheet side by side below its title and its keys, as PNG, whole or not at all."""
     columns = min(COLUMNS[sheet.panels[0].size], len(panels))
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
     width = columns * panels[0].shape[1]

@@ -37,22 +37,7 @@ Target = Path | IO[bytes]
 
 
 def save(figure: Figure, target: Target, dpi: int) -> None:
-    """Save a figure as PNG without date or version, so that the same drawing gives the same bytes.
-
-    Parameters
-    ----------
-    figure
-        What to save.
-    target
-        File, written whole or not at all; or binary stream.
-    dpi
-        Pixels per inch.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Save a figure as PNG without date or version, so that the same drawing gives the same bytes."""
     with any_names(figure):
         if isinstance(target, Path):
             with whole_file(target) as partial:
@@ -73,15 +58,7 @@ def any_names(figure: Figure) -> Iterator[FigureCanvasAgg]:
 
 
 def clean(axes: Axes, labels: float = 12.0) -> None:
-    """Leave two spines and a light grid of horizontal lines.
-
-    Parameters
-    ----------
-    axes
-        The axes.
-    labels : pt
-        Size of the numbers.
-    """
+    """Leave two spines and a light grid of horizontal lines."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#E6E6E6", linewidth=0.8)
     axes.set_axisbelow(True)

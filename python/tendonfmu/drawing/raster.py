@@ -22,15 +22,7 @@ FONT = "mpl-data/fonts/ttf/DejaVuSans.ttf"  # in matplotlib's package; it has th
 
 
 class Raster:
-    """A picture with a white ground. All lengths are in units of the drawing, with y upward.
-
-    Parameters
-    ----------
-    left, right, bottom, top
-        Bounds of the drawing.
-    scale
-        Pixels of the picture per unit.
-    """
+    """A picture with a white ground. All lengths are in units of the drawing, with y upward."""
 
     def __init__(self, left: float, right: float, bottom: float, top: float, scale: float) -> None:
         self._left, self._top, self._scale = left, top, LARGER * scale

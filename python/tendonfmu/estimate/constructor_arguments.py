@@ -12,33 +12,11 @@ class ConstructorArguments:
     """Base of classes that store each constructor argument in an attribute of the same name."""
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the constructor arguments by name.
-
-        Parameters
-        ----------
-        deep
-            Ignored; accepted for scikit-learn.
-
-        Returns
-        -------
-        dict
-            Name of each argument with its present value.
-        """
+        """Return the constructor arguments by name."""
         return {name: getattr(self, name) for name in list(inspect.signature(type(self).__init__).parameters)[1:]}
 
     def set_params(self: Own, **params: Any) -> Own:
-        """Set constructor arguments by name and return the object itself.
-
-        Parameters
-        ----------
-        **params
-            New values by name.
-
-        Raises
-        ------
-        ValueError
-            A name is not a constructor argument.
-        """
+        """Set constructor arguments by name and return the object itself."""
         known = self.get_params()
         for name, value in params.items():
             if name not in known:

@@ -29,44 +29,21 @@ class Times:
 
 @dataclass(frozen=True)
 class EffectCoverage:
-    """How long a motion makes one effect slide or stick.
+    """How long a motion makes one effect slide or stick."""
 
-    Attributes
-    ----------
-    effect
-        Friction effect of the description.
-    threshold
-        v_min (m/s or rad/s).
-    times
-        Times of the effect (s).
-    points
-        [k] times by working point (s), each sample weighted by the share of the point in the interpolated value.
-    slowest, fastest
-        Least and greatest |v| while it slides (m/s or rad/s), for the positive and the negative side. None where it
-        never slides to that side.
-    """
-
-    effect: Effect
-    threshold: float
-    times: Times
+    effect: Effect  # friction effect of the description
+    threshold: float  # v_min (m/s or rad/s)
+    times: Times  # times of the effect (s)
+    # [k] times by working point (s), each sample weighted by the share of the point in the interpolated value
     points: list[Times]
+    # least and greatest |v| while it slides (m/s or rad/s), for the positive and the negative side
     slowest: tuple[float | None, float | None]
     fastest: tuple[float | None, float | None]
 
 
 def durations(time: Numbers) -> Numbers:
-    """Compute the time that each sample stands for, by the trapezoidal rule.
-
-    Parameters
-    ----------
-    time
-        [N] (s).
-
-    Returns
-    -------
-    ndarray
-        [N] (s); the sum is the duration of the motion.
-    """
+    """Compute the time that each sample stands for, by the trapezoidal rule."""
+    # time: [N] (s); returns [N] (s); the sum is the duration of the motion
     step = np.diff(time)
     result = np.zeros(len(time))
     result[:-1] += step / 2
@@ -77,17 +54,8 @@ def durations(time: Numbers) -> Numbers:
 def coverage_of(
     data: Mapping[str, Any], joint_position: Numbers, joint_velocity: Numbers, share: Numbers
 ) -> list[EffectCoverage]:
-    """Compute how long a motion makes every effect of a finger slide or stick.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    joint_position, joint_velocity
-        [N, n] (rad, rad/s), samples in any order.
-    share
-        [N] time that each sample stands for (s).
-    """
+    """Compute how long a motion makes every effect of a finger slide or stick."""
+    # joint_position, joint_velocity: [N, n]; share: [N] (s)
     return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
 
 

@@ -36,10 +36,7 @@ BatchWatch = Callable[[int, int, int, int, float, Numbers], bool | None]
 
 
 class EstimationError(ValueError):
-    """The estimation refuses a structure, a recording or unknowns.
-
-    Callers that know the file turn it into an InputError.
-    """
+    """The estimation refuses a structure, a recording or unknowns."""
 
 
 @contextmanager
@@ -52,70 +49,33 @@ def _refusals() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Unknown:
-    """One unknown of the estimation.
+    """One unknown of the estimation."""
 
-    Attributes
-    ----------
-    path
-        First number of the description that it moves.
-    role
-        "coulomb" (Fc), "drop" (Fs − Fc), "rate" (1/vs), "viscous" (Fv), or "value", a number as it is.
-    parameters
-        Indices of all numbers that it moves.
-    start, lower, upper
-        Value at the start, and the bounds that it stays within.
-    scale
-        Expected magnitude.
-    """
-
-    path: str
-    role: str
-    parameters: tuple[int, ...]
-    start: float
+    path: str  # first number of the description that it moves
+    role: str  # "coulomb" (Fc), "drop" (Fs − Fc), "rate" (1/vs), "viscous" (Fv), or "value", a number as it is
+    parameters: tuple[int, ...]  # indices of all numbers that it moves
+    start: float  # value at the start, and the bounds that it stays within
     lower: float
     upper: float
-    scale: float
+    scale: float  # expected magnitude
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """A fit of all recordings at once, with u unknowns.
+    """A fit of all recordings at once, with u unknowns."""
 
-    Attributes
-    ----------
-    z
-        [u] estimate.
-    cost
-        ½ Σ e²/S + prior_cost.
-    prior_cost
-        Part of the cost that is due to the prior.
-    gradient, information
-        [u], [u, u] of the data's part of the cost at z.
-    covariance
-        [u, u] inverse of the sum of information and prior; unknowns at a bound count as if they were free.
-    steps
-        Steps of Levenberg and Marquardt.
-    passes
-        Passes over the data, coarse ones included.
-    converged
-        Whether the last step was short enough.
-    stopped
-        Whether `progress` stopped the fit.
-    seconds
-        Time of the computation (s).
-    """
-
-    z: Numbers
-    cost: float
-    prior_cost: float
-    gradient: Numbers
+    z: Numbers  # [u] estimate
+    cost: float  # ½ Σ e²/S + prior_cost
+    prior_cost: float  # part of the cost that is due to the prior
+    gradient: Numbers  # [u], [u, u] of the data's part of the cost at z
     information: Numbers
+    # [u, u] inverse of the sum of information and prior; unknowns at a bound count as if they were free
     covariance: Numbers
-    steps: int
-    passes: int
-    converged: bool
-    stopped: bool
-    seconds: float
+    steps: int  # steps of Levenberg and Marquardt
+    passes: int  # passes over the data, coarse ones included
+    converged: bool  # whether the last step was short enough
+    stopped: bool  # whether `progress` stopped the fit
+    seconds: float  # time of the computation (s)
 
 
 def _matrix(values: Array | None) -> Numbers | None:
@@ -137,29 +97,7 @@ def _unknowns(source: Any) -> list[Unknown]:
 
 
 class Estimator:
-    """A finger, its unknown numbers, and recordings.
-
-    Parameters
-    ----------
-    image
-        Image of the description (`native.image_from_json`). Its numbers are the start and the mean of the prior.
-    group
-        [p] by parameter: −1 is fixed, others are estimated, equal numbers share one value. None: all that is present.
-    scale
-        [p] expected magnitudes in the units of the description; NaN or None: those of the start.
-
-    Attributes
-    ----------
-    unknowns
-        [u] what is estimated.
-
-    Raises
-    ------
-    InputError
-        The package was built without the estimation.
-    EstimationError
-        The estimation refuses an argument. All methods raise it, too.
-    """
+    """A finger, its unknown numbers, and recordings."""
 
     def __init__(self, image: bytes, group: Array | None = None, scale: Array | None = None) -> None:
         if not HAS_ESTIMATION:
@@ -190,34 +128,14 @@ class Estimator:
         return np.array([unknown.scale for unknown in self.unknowns])
 
     def values(self, z: Array) -> Numbers:
-        """Convert unknowns within their bounds into the numbers of the description.
-
-        Parameters
-        ----------
-        z
-            [u] unknowns.
-
-        Returns
-        -------
-        ndarray
-            [p] numbers of the description, in its units.
-        """
+        """Convert unknowns within their bounds into the numbers of the description."""
+        # z: [u]; returns [p] numbers of the description, in its units
         with _refusals():
             return np.asarray(self._estimator.values(_matrix(z)))
 
     def unknown_values(self, parameters: Array) -> Numbers:
-        """Convert numbers of the description into unknowns.
-
-        Parameters
-        ----------
-        parameters
-            [p] numbers of the description.
-
-        Returns
-        -------
-        ndarray
-            [u] unknowns.
-        """
+        """Convert numbers of the description into unknowns."""
+        # parameters: [p]; returns [u] unknowns
         with _refusals():
             return np.asarray(self._estimator.unknown_values(_matrix(parameters)))
 
@@ -228,25 +146,8 @@ class Estimator:
         external_torque: Array | None = None,
         use: Array | None = None,
     ) -> int:
-        """Copy a recording into the estimator and return its number.
-
-        Parameters
-        ----------
-        arrays
-            `time` [N] (s), `tendon_force` [N, m] (N), `tendon_position` [N, m] (m), `joint_position` [N, n] (rad) and
-            `joint_velocity` [N, n] (rad/s), those that the kinematics source needs.
-        kinematics_source
-            1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-        external_torque
-            [N, n] known load (N·m), or None.
-        use
-            [N] bool: samples to learn from. None: all.
-
-        Returns
-        -------
-        int
-            Number of the recording, from 0.
-        """
+        """Copy a recording into the estimator and return its number."""
+        # arrays: [N] (s); external_torque: [N, n] (N·m); use: [N]
         with _refusals():
             return int(
                 self._estimator.add_recording(
@@ -258,97 +159,37 @@ class Estimator:
             )
 
     def set_weights(self, recording: int, weight: Array) -> None:
-        """Let each sample of a recording count as a part of a sample in `evaluate` and `fit`.
-
-        Parameters
-        ----------
-        recording
-            Number of the recording.
-        weight
-            [n] by joint, above 0 and at most 1; initially 1.
-        """
+        """Let each sample of a recording count as a part of a sample in `evaluate` and `fit`."""
+        # weight: [n]
         with _refusals():
             self._estimator.set_weights(recording, np.ascontiguousarray(weight, dtype=np.float64))
 
     def set_known(self, information: Array) -> None:
-        """Set the information of an earlier fit, which `fit` adds to its prior.
-
-        Parameters
-        ----------
-        information
-            [u, u] of the unknowns about the numbers of the description, symmetric and positive semidefinite.
-        """
+        """Set the information of an earlier fit, which `fit` adds to its prior."""
+        # information: [u, u]
         with _refusals():
             self._estimator.set_known(np.ascontiguousarray(information, dtype=np.float64))
 
     def evaluate(self, z: Array, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]:
-        """Compute cost, gradient and information of the data at z, without the prior.
-
-        Parameters
-        ----------
-        z
-            [u] unknowns.
-        stride
-            Only every stride-th sample is evaluated, and counts `stride` times.
-        threads
-            0 for all cores; the result does not depend on it.
-
-        Returns
-        -------
-        cost : float
-            ½ Σ w e²/S.
-        gradient : ndarray
-            [u] derivative of the cost.
-        information : ndarray
-            [u, u] Fisher information.
-        """
+        """Compute cost, gradient and information of the data at z, without the prior."""
+        # z: [u]; returns [u] derivative of the cost, [u, u] Fisher information
         with _refusals():
             cost, gradient, information = self._estimator.evaluate(_matrix(z), stride, threads)
         return float(cost), np.asarray(gradient), np.asarray(information)
 
     def jacobian(self, recording: int, z: Array, start: int, stop: int) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """Compute the friction torque, the bias jumps and their derivatives.
-
-        Parameters
-        ----------
-        recording
-            Number of the recording.
-        z
-            [u] unknowns.
-        start, stop
-            Samples start to stop − 1.
-
-        Returns
-        -------
-        torque, jump : ndarray
-            [N, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m).
-        by_torque, by_jump : ndarray
-            [N, n, u] their derivatives by the unknowns.
-        """
+        """Compute the friction torque, the bias jumps and their derivatives."""
+        # z: [u]; returns [N, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m), [N, n, u] their derivatives by the
+        # unknowns
         with _refusals():
             found = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
         torque, jump, by_torque, by_jump = (np.asarray(array) for array in found)
         return torque, jump, by_torque, by_jump
 
     def innovations(self, recording: int, z: Array) -> tuple[Numbers, Numbers, Numbers]:
-        """Compute the residuals of a recording before each bias update.
-
-        Parameters
-        ----------
-        recording
-            Number of the recording.
-        z
-            [u] unknowns.
-
-        Returns
-        -------
-        innovation : ndarray
-            [N, n] residuals before the bias update (N·m); NaN where the bias has not started.
-        variance : ndarray
-            [N] their variance ((N·m)²); NaN also at samples that are not used.
-        bias : ndarray
-            [N, n] bias after the update (N·m).
-        """
+        """Compute the residuals of a recording before each bias update."""
+        # z: [u]; returns [N, n] (N·m), [N] their variance ((N·m)²); NaN also at samples that are not used, [N, n] bias
+        # after the update (N·m)
         with _refusals():
             found = self._estimator.innovations(recording, _matrix(z))
         innovation, variance, bias = (np.asarray(array) for array in found)
@@ -365,26 +206,8 @@ class Estimator:
         stride: int = 0,
         progress: BatchWatch | None = None,
     ) -> BatchResult:
-        """Maximise the likelihood under a Gaussian prior about the numbers of the description.
-
-        Parameters
-        ----------
-        start
-            [u] unknowns to start from; None: those of the description.
-        prior_std
-            Standard deviation of the prior, in units of `scale`.
-        max_passes
-            Most passes over the data.
-        tolerance
-            The fit ends with a step of this length in standard errors, over all unknowns together.
-        threads
-            0 for all cores; the result does not depend on it.
-        stride
-            Stride of the first, coarse passes; 0: chosen by the number of samples.
-        progress
-            Called repeatedly with pass, stride, samples done, samples, best cost and its unknowns; returns False to
-            stop.
-        """
+        """Maximise the likelihood under a Gaussian prior about the numbers of the description."""
+        # start: [u]
         begun = perf_counter()
         first = self.start if start is None else start
         with _refusals():
@@ -393,19 +216,7 @@ class Estimator:
 
 
 class Learner:
-    """The extended Kalman filter of the paper over recordings, one after another.
-
-    Parameters
-    ----------
-    image, group, scale
-        As for `Estimator`.
-    prior_std
-        Standard deviation of an unknown about its start, in units of `scale`.
-    block
-        Samples that are processed at once, 1 to 64 (tendonfmu_learner.h gives the cost).
-    parameter_drift
-        Variance that an unknown gains per second, in units of `scale`²; 0 for constants.
-    """
+    """The extended Kalman filter of the paper over recordings, one after another."""
 
     def __init__(
         self,
@@ -466,21 +277,8 @@ class Learner:
         use: Array | None = None,
         progress: LearnerWatch | None = None,
     ) -> dict[str, Numbers]:
-        """Learn from a recording; the bias starts anew.
-
-        Parameters
-        ----------
-        arrays, kinematics_source, external_torque, use
-            As for `Estimator.add_recording`.
-        progress
-            Called repeatedly with samples done and samples; returns False to stop.
-
-        Returns
-        -------
-        dict
-            `innovation` [N, n] (N·m), the residuals before each sample is processed, and their `innovation_variance`
-            [N, n]. NaN where the bias has not started, and after a stop.
-        """
+        """Learn from a recording; the bias starts anew."""
+        # returns [N, n] [N, n] (N·m)
         with _refusals():
             innovation, variance, _ = self._learner.run(
                 **_samples(arrays),

@@ -17,30 +17,14 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A recording under the fitted finger.
+    """A recording under the fitted finger."""
 
-    As at run time, the bias filter learns from every sample without contact, held out or not.
-
-    Attributes
-    ----------
-    recording
-        Prepared recording.
-    model
-        T of the fitted finger.
-    fit, start
-        Residuals with the fitted numbers and with those of the start.
-    bias_only
-        Residuals with the same bias filter and no friction at all.
-    model_only
-        [N, n] y − T less a constant per part (N·m).
-    """
-
-    recording: FitRecording
-    model: Model
-    fit: Residuals
+    recording: FitRecording  # prepared recording
+    model: Model  # T of the fitted finger
+    fit: Residuals  # residuals with the fitted numbers and with those of the start
     start: Residuals
-    bias_only: Residuals
-    model_only: Numbers
+    bias_only: Residuals  # residuals with the same bias filter and no friction at all
+    model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
 
 
 def model_over(data: Mapping[str, Any], recording: FitRecording) -> Model:
@@ -50,22 +34,7 @@ def model_over(data: Mapping[str, Any], recording: FitRecording) -> Model:
 
 
 def residuals(data: Mapping[str, Any], recording: FitRecording, model: Model | None) -> Residuals:
-    """Compute the residuals of a recording with the bias filter of a description.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    recording
-        Prepared recording.
-    model
-        T over the recording; None: no friction at all.
-
-    Returns
-    -------
-    Residuals
-        Residuals before each bias update, with their variance.
-    """
+    """Compute the residuals of a recording with the bias filter of a description."""
     mean_force = np.abs(recording.recording.groups["tendon_force"]).mean(axis=1)
     remainder = recording.target if model is None else recording.target - model.torque
     jump = None if model is None else model.jump
@@ -74,15 +43,7 @@ def residuals(data: Mapping[str, Any], recording: FitRecording, model: Model | N
 
 
 def evaluate(start: Mapping[str, Any], fitted: Mapping[str, Any], recording: FitRecording) -> Evaluation:
-    """Judge a fitted finger on a recording.
-
-    Parameters
-    ----------
-    start, fitted
-        Descriptions before and after the fit.
-    recording
-        Prepared recording; its `model` is that of `start`.
-    """
+    """Judge a fitted finger on a recording."""
     model = model_over(fitted, recording)
     rest = recording.target - model.torque
     for part in recording.parts:

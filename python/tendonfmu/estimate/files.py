@@ -26,24 +26,7 @@ DIGITS = 10  # of a fitted number: far finer than any standard error, and static
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
-    """Check that the results of a command can be written, before a long computation.
-
-    Parameters
-    ----------
-    output
-        File of the description.
-    report
-        File of the report, or None.
-    figures
-        Folder of the figures, or None.
-    inputs
-        Files that no result may replace.
-
-    Raises
-    ------
-    InputError
-        A file does not end in .json, cannot be written, or is an input; report and description are the same file.
-    """
+    """Check that the results of a command can be written, before a long computation."""
     for file in (output, *([report] if report is not None else [])):
         if file.suffix.lower() != ".json":
             raise InputError(f"{file}: expected a name that ends in .json")
@@ -55,25 +38,8 @@ def check_outputs(output: Path, report: Path | None, figures: Path | None, input
 
 
 def check_given_once(training: Iterable[object], compared: Iterable[object], role: str = "compared with") -> None:
-    """Check that no recording is given twice, as if it were two measurements, or trained on and compared with.
-
-    Files are the same if one name leads to the other, or if they hold the same bytes. Recordings in memory are not
-    checked, since they may be pieces of one file. `check_unseen` compares the measured values.
-
-    Parameters
-    ----------
-    training
-        Recordings, or their files, to train on.
-    compared
-        Recordings, or their files, to compare with.
-    role
-        Name of the compared recordings in the error.
-
-    Raises
-    ------
-    InputError
-        A file is given twice.
-    """
+    """Check that no recording is given twice, as if it were two measurements, or trained on and compared with."""
+    # Recordings in memory are not checked, since they may be pieces of one file.
     seen: dict[Path, bool] = {}
     for sources, trained in ((training, True), (compared, False)):
         for source in sources:
@@ -98,24 +64,7 @@ def _same_bytes(one: Path, other: Path) -> bool:
 
 
 def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role: str = "a test") -> None:
-    """Check that no test recording holds the samples of a recording that is trained on.
-
-    Samples are compared by value, so another start time, file format or order of columns makes no difference.
-
-    Parameters
-    ----------
-    training
-        Recordings to train on.
-    tests
-        Recordings that the training must not have seen.
-    role
-        Name of the tests in the error.
-
-    Raises
-    ------
-    InputError
-        A test has the same samples as a training recording.
-    """
+    """Check that no test recording holds the samples of a recording that is trained on."""
     known = [(each, _measured(each)) for each in training]
     for test in tests:
         own = _measured(test)
@@ -136,20 +85,8 @@ def _measured(recording: Recording) -> Numbers:
 
 
 def with_values(structure: Structure, values: Numbers) -> Finger:
-    """Replace the estimated numbers in the description of the start.
-
-    Parameters
-    ----------
-    structure
-        What was fitted.
-    values
-        [p] all parameters in canonical order, in the units of the description.
-
-    Raises
-    ------
-    InternalError
-        The core refuses the new description.
-    """
+    """Replace the estimated numbers in the description of the start."""
+    # values: [p]
     data = own_copy(structure.start.data)
     for number in structure.numbers:
         for path in (number.path, number.with_path):
@@ -165,17 +102,7 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
 
 
 def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
-    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given.
-
-    Parameters
-    ----------
-    finger
-        Description to copy.
-    directions
-        By joint, up to four lists of m + 3 numbers each.
-    level
-        `contact.uncertainty_level`, or None to keep that of the description.
-    """
+    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given."""
     contact = {**finger.data["contact"], "uncertainty": directions}
     data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
     text = description_text(data).encode()
@@ -187,33 +114,15 @@ def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[floa
 
 @dataclass(frozen=True)
 class Unfinished:
-    """State of an interrupted fit: the best estimate so far.
+    """State of an interrupted fit: the best estimate so far."""
 
-    Attributes
-    ----------
-    finger
-        Name of the finger.
-    method
-        "batch" or "ekf".
-    z
-        [u] unknowns.
-    unknowns
-        [u] "path role" of each unknown.
-    cost
-        Negative log likelihood with the prior, or NaN.
-    options
-        Options of the fit.
-    description
-        Description with the values of z.
-    """
-
-    finger: str
-    method: str
-    z: Numbers
-    unknowns: Sequence[str]
-    cost: float
-    options: Mapping[str, Any]
-    description: Mapping[str, Any]
+    finger: str  # name of the finger
+    method: str  # "batch" or "ekf"
+    z: Numbers  # [u] unknowns
+    unknowns: Sequence[str]  # [u] "path role" of each unknown
+    cost: float  # negative log likelihood with the prior, or NaN
+    options: Mapping[str, Any]  # options of the fit
+    description: Mapping[str, Any]  # description with the values of z
 
 
 def unfinished_path(output: Path) -> Path:
@@ -222,20 +131,7 @@ def unfinished_path(output: Path) -> Path:
 
 
 def write_unfinished(output: Path, found: Unfinished) -> Path:
-    """Write the state of an interrupted fit next to its output.
-
-    Parameters
-    ----------
-    output
-        File that the finished fit would have written.
-    found
-        State to write.
-
-    Returns
-    -------
-    Path
-        `NAME.unfinished.json` in the folder of `output`.
-    """
+    """Write the state of an interrupted fit next to its output."""
     content = {
         "format": UNFINISHED,
         "finger": found.finger,
@@ -252,10 +148,7 @@ def write_unfinished(output: Path, found: Unfinished) -> Path:
 
 
 def read_unfinished(path: Path) -> Unfinished:
-    """Read the state of an interrupted fit.
-
-    Raises InputError if the file is missing, has another format, or lacks a key or holds a wrong value.
-    """
+    """Read the state of an interrupted fit."""
     content = read_json(path, "the state of an interrupted fit")
     if not isinstance(content, dict) or content.get("format") != UNFINISHED:
         found = content.get("format") if isinstance(content, dict) else None

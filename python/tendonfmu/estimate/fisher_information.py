@@ -35,33 +35,15 @@ _ELEMENTS = 4_000_000  # sensitivities in memory at a time
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number of the description to be estimated.
+    """A number of the description to be estimated."""
 
-    Attributes
-    ----------
-    path
-        Path in the description.
-    value
-        Value in SI units.
-    effect
-        Friction effect that the number belongs to, if any.
-    point
-        Which of the laws of the effect, from 0.
-    with_path
-        Number that moves by the same amount (static where it equals coulomb), if any.
-    extension
-        Name of the effect in `extensions` that the number belongs to, if any.
-    size
-        Expected magnitude, where the value may be 0.
-    """
-
-    path: str
-    value: float
-    effect: Effect | None = None
-    point: int = 0
-    with_path: str | None = None
-    extension: str | None = None
-    size: float = 1.0
+    path: str  # path in the description
+    value: float  # value in SI units
+    effect: Effect | None = None  # friction effect that the number belongs to, if any
+    point: int = 0  # which of the laws of the effect, from 0
+    with_path: str | None = None  # number that moves by the same amount (static where it equals coulomb), if any
+    extension: str | None = None  # name of the effect in `extensions` that the number belongs to, if any
+    size: float = 1.0  # expected magnitude, where the value may be 0
 
     @property
     def kind(self) -> str:
@@ -87,13 +69,7 @@ class Unknown:
 
 
 def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
-    """List the numbers that a fit estimates, without the biases, which are tracked.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    """
+    """List the numbers that a fit estimates, without the biases, which are tracked."""
     found = [number for effect in effects(data) for number in _numbers_of(effect)]
     for j, joint in enumerate(data["joints"], start=1):
         stiffness = (joint.get("cover") or {}).get("stiffness")
@@ -126,11 +102,7 @@ def _numbers_of(effect: Effect) -> Iterator[Unknown]:
 
 @dataclass(frozen=True)
 class _Bundle:
-    """Numbers that one run changes together, because their effects can be separated afterwards.
-
-    `members` are the numbers, `columns` their indices. Friction in different joints turns different joints. Of the
-    working points of an edge, every second one is never active at the same angle.
-    """
+    """Numbers that one run changes together, because their effects can be separated afterwards."""
 
     members: list[Unknown]
     columns: list[int]
@@ -208,24 +180,8 @@ def sensitivities(
     motion: Mapping[str, Numbers],
     progress: Progress | None = None,
 ) -> Iterator[Numbers]:
-    """Compute the change of T_eff per relative change of each number; only fig. 5 moves the bias.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    numbers
-        The p numbers.
-    motion
-        `time` [N] (s), `joint_position`, `joint_velocity` [N, n] (rad, rad/s), `tendon_force` [N, m] (N).
-    progress
-        Called with steps done and steps.
-
-    Yields
-    ------
-    ndarray
-        [S, n, p] of successive parts of the motion (N·m).
-    """
+    """Compute the change of T_eff per relative change of each number; only fig. 5 moves the bias."""
+    # motion: [N] (s); returns [S, n, p] of successive parts of the motion (N·m)
     finger = friction_probe(data)
     samples, joints = motion["joint_position"].shape
     bundles = _bundles(numbers)
@@ -267,41 +223,19 @@ def _share_out(
 
 @dataclass(frozen=True)
 class Noise:
-    """Assumed noise of the measured torque.
+    """Assumed noise of the measured torque."""
 
-    Attributes
-    ----------
-    std
-        Standard deviation of a sample that stands for `time` (N·m).
-    per_force
-        Standard deviation per mean tendon force (N·m/N).
-    time
-        Time that a sample stands for (s).
-    drift
-        Drift of the bias ((N·m)²/s).
-    initial
-        Initial variance of the bias ((N·m)²); None: that of one sample.
-    """
-
-    std: float
-    per_force: float
-    time: float
-    drift: float
-    initial: float | None
+    std: float  # standard deviation of a sample that stands for `time` (N·m)
+    per_force: float  # standard deviation per mean tendon force (N·m/N)
+    time: float  # time that a sample stands for (s)
+    drift: float  # drift of the bias ((N·m)²/s)
+    initial: float | None  # initial variance of the bias ((N·m)²); None: that of one sample
 
 
 def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
-    """Return the noise of a description's `bias`, with its defaults.
-
-    A finger without noise gets the default noise_std; otherwise every number would be identifiable.
-
-    Parameters
-    ----------
-    data
-        Finger description.
-    sample_time
-        Time that a sample stands for, where the noise is per sample (s).
-    """
+    """Return the noise of a description's `bias`, with its defaults."""
+    # A finger without noise gets the default noise_std; otherwise every number would be identifiable.
+    # sample_time: (s)
     bias = data.get("bias") or {}
     std, per_force = (number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     initial = bias.get("initial_variance")
@@ -315,26 +249,8 @@ def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
 
 
 def information(parts: Iterable[Numbers], time: Numbers, mean_force: Numbers, noise: Noise) -> Numbers:
-    """Compute the Fisher information of the innovations about relative changes of the numbers.
-
-    The bias filter of fig. 5 runs over every column. It takes the first sample as it is.
-
-    Parameters
-    ----------
-    parts
-        From `sensitivities`.
-    time
-        [N] (s).
-    mean_force
-        [N] mean tendon force (N).
-    noise
-        Assumed noise.
-
-    Returns
-    -------
-    ndarray
-        [p, p].
-    """
+    """Compute the Fisher information of the innovations about relative changes of the numbers."""
+    # time: [N] (s); mean_force: [N] (N); returns [p, p]
     step = np.diff(time, prepend=time[0])
     per_sample = (noise.std + noise.per_force * mean_force) ** 2
     variance = float(per_sample[0]) if noise.initial is None else noise.initial

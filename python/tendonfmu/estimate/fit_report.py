@@ -24,10 +24,7 @@ FORMAT = "tendonfmu-fit-1"
 
 @dataclass(frozen=True)
 class Run:
-    """How the estimation went.
-
-    `method` is "batch" or "ekf"; `cost` is the negative log likelihood with the prior, or NaN.
-    """
+    """How the estimation went."""
 
     method: str
     converged: bool
@@ -39,61 +36,24 @@ class Run:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished fit, with all that its report contains.
+    """A finished fit, with all that its report contains."""
 
-    Attributes
-    ----------
-    fitted
-        Fitted description.
-    run
-        How the estimation went.
-    options
-        Options that shape the result.
-    warnings
-        Sentences.
-    numbers
-        Every estimated number, judged.
-    names
-        [u] "path.role" of the unknowns.
-    covariance
-        [u, u] of the unknowns.
-    innovations
-        By recording, [N, n] standardised innovations; NaN where not trained on.
-    weights
-        By recording, [N, n] the weight of each sample.
-    training, comparisons
-        Judged recordings.
-    uncertainty
-        Uncertainty of the modelled friction torque; None if not asked for.
-    """
-
-    fitted: Finger
-    run: Run
-    options: Mapping[str, Any]
-    warnings: Sequence[str]
-    numbers: Sequence[Fitted]
-    names: Sequence[str]
-    covariance: Numbers
-    innovations: Sequence[Numbers]
-    weights: Sequence[Numbers]
-    training: Sequence[Evaluation]
+    fitted: Finger  # fitted description
+    run: Run  # how the estimation went
+    options: Mapping[str, Any]  # options that shape the result
+    warnings: Sequence[str]  # sentences
+    numbers: Sequence[Fitted]  # every estimated number, judged
+    names: Sequence[str]  # [u] "path.role" of the unknowns
+    covariance: Numbers  # [u, u] of the unknowns
+    innovations: Sequence[Numbers]  # by recording, [N, n] standardised innovations; NaN where not trained on
+    weights: Sequence[Numbers]  # by recording, [N, n] the weight of each sample
+    training: Sequence[Evaluation]  # judged recordings
     comparisons: Sequence[Evaluation]
-    uncertainty: Mapping[str, Any] | None
+    uncertainty: Mapping[str, Any] | None  # uncertainty of the modelled friction torque; None if not asked for
 
 
 def build_report(found: Outcome) -> dict[str, Any]:
-    """Build the report of a finished fit; numbers that are not finite become None.
-
-    Parameters
-    ----------
-    found
-        The finished fit.
-
-    Returns
-    -------
-    dict
-        Report "tendonfmu-fit-1" (schema/fit_report.schema.json).
-    """
+    """Build the report of a finished fit; numbers that are not finite become None."""
     run = found.run
     units = {parameter.path: parameter.unit for parameter in native.Instance(found.fitted.image).parameters()}
     report = {

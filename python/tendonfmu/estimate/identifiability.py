@@ -25,28 +25,15 @@ _TIME = 1e-9  # s; shorter times are rounding errors
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether one number is identifiable, and why not.
+    """Whether one number is identifiable, and why not."""
 
-    Attributes
-    ----------
-    number
-        The number.
-    error, error_alone
-        Relative standard error when all numbers are estimated, and when all others are known; at most `PRIOR`.
-    cause
-        "" if identifiable, else a key of `CAUSES`.
-    reason
-        The cause in words.
-    partners
-        Paths of the numbers that it can only be told in combination with.
-    """
-
-    number: Unknown
+    number: Unknown  # the number
+    # relative standard error when all numbers are estimated, and when all others are known; at most `PRIOR`
     error: float
     error_alone: float
-    cause: str
-    reason: str
-    partners: list[str]
+    cause: str  # "" if identifiable, else a key of `CAUSES`
+    reason: str  # the cause in words
+    partners: list[str]  # paths of the numbers that it can only be told in combination with
 
     @property
     def identifiable(self) -> bool:
@@ -65,36 +52,17 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a motion identifies.
+    """What a motion identifies."""
 
-    Attributes
-    ----------
-    verdicts
-        On all numbers, in order.
-    directions
-        Number of independent combinations of relative changes that are known within `LIMIT`.
-    combinations
-        The least known combinations of numbers that are visible on their own: (relative standard error,
-        [(path, weight)]).
-    """
-
-    verdicts: list[Verdict]
-    directions: int
+    verdicts: list[Verdict]  # on all numbers, in order
+    directions: int  # number of independent combinations of relative changes that are known within `LIMIT`
+    # the least known combinations of numbers that are visible on their own: (relative standard error, [(path, weight)])
     combinations: list[tuple[float, list[tuple[str, float]]]]
 
 
 def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
-    """Judge which numbers a motion identifies.
-
-    Parameters
-    ----------
-    numbers
-        The p numbers.
-    information
-        [p, p] about relative changes, from `estimate.information`.
-    coverage
-        What the motion covers.
-    """
+    """Judge which numbers a motion identifies."""
+    # information: [p, p]
     if not numbers:
         return Judgement([], 0, [])
     known = information + np.eye(len(numbers)) / PRIOR**2
@@ -109,24 +77,8 @@ def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[E
 def explain(
     numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
 ) -> list[Verdict]:
-    """Explain for each number whether it is identifiable.
-
-    Parameters
-    ----------
-    numbers
-        The p numbers.
-    error, alone
-        [p] relative standard errors when all numbers are estimated, and when all others are known.
-    correlation
-        [p, p] of the errors.
-    coverage
-        What the motion covers.
-
-    Returns
-    -------
-    list of Verdict
-        One per number.
-    """
+    """Explain for each number whether it is identifiable."""
+    # error, alone: [p]; correlation: [p, p]
     by_path = {cover.effect.path: cover for cover in coverage}
     verdicts = []
     for k, number in enumerate(numbers):
@@ -203,18 +155,7 @@ def _combinations(
 
 
 def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[int, int, int]]:
-    """Count the verdicts by kind and key of the number.
-
-    Parameters
-    ----------
-    verdicts
-        Verdicts of a judgement.
-
-    Returns
-    -------
-    dict
-        (kind, key) -> (numbers, identifiable, within `LIMIT` if all else is known).
-    """
+    """Count the verdicts by kind and key of the number."""
     result: dict[tuple[str, str], tuple[int, int, int]] = {}
     for verdict in verdicts:
         place = (verdict.number.kind, verdict.number.key)

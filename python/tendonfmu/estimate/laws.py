@@ -26,22 +26,12 @@ _LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "v
 
 @dataclass(frozen=True)
 class LawCurve:
-    """Friction of one side of a law, with its confidence band.
+    """Friction of one side of a law, with its confidence band."""
 
-    Attributes
-    ----------
-    fitted
-        [N] friction with the fitted numbers, in the unit of the law.
-    low, high
-        [N] ends of the band.
-    start
-        [N] friction with the numbers of the start.
-    """
-
-    fitted: Numbers
-    low: Numbers
+    fitted: Numbers  # [N] friction with the fitted numbers, in the unit of the law
+    low: Numbers  # [N] ends of the band
     high: Numbers
-    start: Numbers
+    start: Numbers  # [N] friction with the numbers of the start
 
 
 def side_of(law: Law, sign: int) -> Law:
@@ -74,13 +64,7 @@ def slopes(side: Law, speed: Numbers) -> Mapping[str, Numbers]:
 
 
 class LawBands:
-    """Curves of the laws of a fit, with their confidence bands.
-
-    Parameters
-    ----------
-    picture
-        The finished fit.
-    """
+    """Curves of the laws of a fit, with their confidence bands."""
 
     def __init__(self, picture: FitPicture) -> None:
         parameters = Instance.from_description(json.dumps(picture.fitted)).parameters()
@@ -93,44 +77,14 @@ class LawBands:
         }
 
     def over_speed(self, start: Effect, fitted: Effect, sign: int, speed: Numbers) -> LawCurve:
-        """Compute the curve of an effect with a single law over speed.
-
-        Parameters
-        ----------
-        start, fitted
-            The effect before and after the fit.
-        sign
-            Direction of sliding, +1 or −1.
-        speed
-            [N] speeds (m/s or rad/s).
-
-        Returns
-        -------
-        LawCurve
-            [N] each.
-        """
+        """Compute the curve of an effect with a single law over speed."""
+        # speed: [N]; returns [N] each
         weights = np.ones((len(speed), 1))
         return self._curve(start, fitted, sign, speed, weights)
 
     def over_angle(self, start: Effect, fitted: Effect, sign: int, speed: float, angle: Numbers) -> LawCurve:
-        """Compute the curve of an effect with working points over the angle, at one speed.
-
-        Parameters
-        ----------
-        start, fitted
-            The effect before and after the fit.
-        sign
-            Direction of sliding, +1 or −1.
-        speed
-            Speed (m/s or rad/s).
-        angle
-            [N] angles of the preceding joint (rad).
-
-        Returns
-        -------
-        LawCurve
-            [N] each.
-        """
+        """Compute the curve of an effect with working points over the angle, at one speed."""
+        # angle: [N] (rad); returns [N] each
         unit = np.eye(len(fitted.angles))
         weights = np.column_stack([np.interp(angle, fitted.angles, row) for row in unit])
         return self._curve(start, fitted, sign, np.full_like(angle, speed), weights)
@@ -163,24 +117,10 @@ def _mixed(effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbe
 
 
 def asymmetric(effect: Effect) -> bool:
-    """Tell whether any law of an effect has two sides.
-
-    Parameters
-    ----------
-    effect
-        Friction effect.
-    """
+    """Tell whether any law of an effect has two sides."""
     return any(law.get("positive") is not None for law in effect.laws)
 
 
 def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the entries of the report for the estimated numbers of an effect.
-
-    Parameters
-    ----------
-    effect
-        Friction effect.
-    report
-        Report "tendonfmu-fit-1".
-    """
+    """Return the entries of the report for the estimated numbers of an effect."""
     return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

@@ -32,105 +32,49 @@ Start = Callable[[Sequence[str]], Numbers]
 
 @dataclass(frozen=True)
 class Settings:
-    """Options of a fit, named as those of `FrictionFit`.
-
-    Attributes
-    ----------
-    effective
-        Whether samples count for their share of an effective number.
-    previous
-        Previous fit that the start of the structure comes from, or None.
-    change
-        Relative standard deviation of what may have changed since.
-    noise
-        Torque noise of the description (N·m).
-    """
+    """Options of a fit, named as those of `FrictionFit`."""
 
     prior: float = 1.0
     max_passes: int = 60
     tolerance: float = 0.3
     threads: int = 0
     parameter_drift: float = 0.0
-    effective: bool = True
-    previous: PreviousFit | None = None
-    change: float = 0.0
-    noise: float = 0.0
+    effective: bool = True  # whether samples count for their share of an effective number
+    previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
+    change: float = 0.0  # relative standard deviation of what may have changed since
+    noise: float = 0.0  # torque noise of the description (N·m)
 
 
 @dataclass(frozen=True)
 class FitProgress:
-    """Progress of a fit.
+    """Progress of a fit."""
 
-    Attributes
-    ----------
-    phase
-        Phase in words.
-    iteration
-        Number of the pass.
-    done, total
-        Samples of this phase.
-    cost
-        Cost so far; NaN if unknown.
-    """
-
-    phase: str
-    iteration: int
-    done: int
+    phase: str  # phase in words
+    iteration: int  # number of the pass
+    done: int  # samples of this phase
     total: int
-    cost: float
+    cost: float  # cost so far; NaN if unknown
 
 
 @dataclass(frozen=True)
 class Learned:
-    """A finished estimation.
+    """A finished estimation."""
 
-    Attributes
-    ----------
-    estimator
-        Unknowns, and their conversion into numbers of the description.
-    z
-        [u] estimate.
-    covariance
-        [u, u] of z, prior included.
-    information
-        [u, u] of the data alone.
-    cost
-        Negative log likelihood with the prior; NaN for the filter.
-    iterations, passes
-        Number of steps, and of passes over the data.
-    converged
-        Whether the method converged.
-    weights
-        By recording, [N, n] the weight of each sample.
-    innovations
-        By recording, [N, n] standardised innovations, if the method computes them; else empty.
-    warnings
-        Sentences.
-    """
-
-    estimator: Estimator
-    z: Numbers
-    covariance: Numbers
-    information: Numbers
-    cost: float
-    iterations: int
+    estimator: Estimator  # unknowns, and their conversion into numbers of the description
+    z: Numbers  # [u] estimate
+    covariance: Numbers  # [u, u] of z, prior included
+    information: Numbers  # [u, u] of the data alone
+    cost: float  # negative log likelihood with the prior; NaN for the filter
+    iterations: int  # number of steps, and of passes over the data
     passes: int
-    converged: bool
-    weights: list[Numbers]
-    innovations: list[Numbers]
-    warnings: list[str]
+    converged: bool  # whether the method converged
+    weights: list[Numbers]  # by recording, [N, n] the weight of each sample
+    innovations: list[Numbers]  # by recording, [N, n] standardised innovations, if the method computes them; else empty
+    warnings: list[str]  # sentences
 
 
 class Interrupted(Exception):
-    """The estimation was stopped.
-
-    Attributes
-    ----------
-    estimator, z, cost
-        What it had found: [u] unknowns and their cost.
-    by_user
-        Whether Ctrl-C stopped it.
-    """
+    """The estimation was stopped."""
 
     def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
         super().__init__("stopped")
@@ -138,20 +82,7 @@ class Interrupted(Exception):
 
 
 class Watch:
-    """Passes progress on, and records a wish to stop, such as a Ctrl-C while the library computes.
-
-    Parameters
-    ----------
-    progress
-        Called with each `FitProgress`; returns False to stop.
-
-    Attributes
-    ----------
-    stopped
-        Whether the fit was asked to stop.
-    by_user
-        Whether Ctrl-C asked for it.
-    """
+    """Passes progress on, and records a wish to stop, such as a Ctrl-C while the library computes."""
 
     def __init__(self, progress: Callable[[FitProgress], bool | None] | None) -> None:
         self._progress = progress
@@ -169,18 +100,8 @@ class Watch:
 
 
 def unknown_names(estimator: Estimator) -> list[str]:
-    """Name the unknowns of an estimator.
-
-    Parameters
-    ----------
-    estimator
-        With u unknowns.
-
-    Returns
-    -------
-    list of str
-        [u] path of each unknown with its role: `….drop` is static − coulomb, `….rate` is 1/stribeck_velocity.
-    """
+    """Name the unknowns of an estimator."""
+    # returns [u]
     return [
         unknown.path if unknown.role == "value" else f"{unknown.path.rsplit('.', 1)[0]}.{unknown.role}"
         for unknown in estimator.unknowns
@@ -250,28 +171,8 @@ def learn_batch(
     settings: Settings,
     start: Start | None,
 ) -> Learned:
-    """Estimate by maximum likelihood.
-
-    Parameters
-    ----------
-    structure
-        What to fit.
-    recordings
-        Prepared recordings.
-    watch
-        Receives the progress, and may stop the fit.
-    settings
-        Options.
-    start
-        Called with [u] the names of the unknowns, returns [u] where to start. None: the description.
-
-    Raises
-    ------
-    Interrupted
-        The fit was stopped.
-    InputError
-        The recordings do not allow a fit.
-    """
+    """Estimate by maximum likelihood."""
+    # start: [u]
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
@@ -350,15 +251,7 @@ def learn_ekf(
     settings: Settings,
     start: Start | None,
 ) -> Learned:
-    """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted.
-
-    Each pass after the first is linearised where the previous one ended.
-
-    The noise of the filter is also that of its bias filter, so samples cannot have weights in it. Instead, the Gaussian
-    that the last pass gives for the data is weighted as a whole, with the common share of all samples, and combined
-    with the prior again. Numbers that drift (`parameter_drift`) have no such Gaussian and keep the result of the
-    filter.
-    """
+    """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)
     innovations: list[Numbers] = []

@@ -25,18 +25,7 @@ Role = Literal["training", "comparison"]
 
 
 class FittedUnknown(Protocol):
-    """The attributes of `estimation.Unknown` that are read here: one entry of z.
-
-    Attributes
-    ----------
-    path
-        Path of its first parameter.
-    role
-        "coulomb", "drop" (static − coulomb), "rate" (1/stribeck_velocity), "viscous", "static" (static and coulomb
-        move together) or "value".
-    parameters
-        Indices of the parameters that it moves, in the order of `native.Instance.parameters()`.
-    """
+    """The attributes of `estimation.Unknown` that are read here: one entry of z."""
 
     @property
     def path(self) -> str: ...
@@ -48,73 +37,35 @@ class FittedUnknown(Protocol):
 
 @dataclass(frozen=True)
 class FitSeries:
-    """One recording under the fitted model; all arrays have one row per sample, in SI units.
+    """One recording under the fitted model; all arrays have one row per sample, in SI units."""
 
-    Attributes
-    ----------
-    label
-        Name for people, such as "free motion" or the name of the file.
-    role
-        "training" or "comparison".
-    mean_force
-        Mean of all tendon forces over all samples (N).
-    time
-        [N] (s).
-    torque
-        [N, n] torque that the model has to explain: τ, or τ − external_torque where that was used (N·m).
-    residual
-        [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m).
-    model_torque
-        [N, n] T of eq. (10) without the bias (`friction_torque` − `bias_torque` of `native.Instance.run`) (N·m).
-    joint_angle, joint_speed
-        [N, n] the kinematics in use (rad, rad/s).
-    used
-        [N] bool: trained on. False for contact and for held-out samples, and everywhere in a comparison.
-    held_out
-        [N] bool: held out of training and judged. None if nothing was.
-    """
-
-    label: str
-    role: Role
-    mean_force: float
-    time: Numbers
-    torque: Numbers
+    label: str  # name for people, such as "free motion" or the name of the file
+    role: Role  # "training" or "comparison"
+    mean_force: float  # mean of all tendon forces over all samples (N)
+    time: Numbers  # [N] (s)
+    torque: Numbers  # [N, n] torque that the model has to explain: τ, or τ − external_torque where that was used (N·m)
+    # [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m)
     residual: Numbers
-    model_torque: Numbers
-    joint_angle: Numbers
+    model_torque: Numbers  # [N, n] T of eq
+    joint_angle: Numbers  # [N, n] the kinematics in use (rad, rad/s)
     joint_speed: Numbers
-    used: NDArray[np.bool_]
-    held_out: NDArray[np.bool_] | None = None
+    used: NDArray[np.bool_]  # [N] bool: trained on
+    held_out: NDArray[np.bool_] | None = None  # [N] bool: held out of training and judged
 
 
 @dataclass(frozen=True)
 class FitPicture:
-    """A finished fit: all that its figures and its page are made of.
+    """A finished fit: all that its figures and its page are made of."""
 
-    Attributes
-    ----------
-    report
-        "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
-        "rms" (the residual with the parameters of the start), it is shown.
-    start, fitted
-        Descriptions as parsed JSON.
-    unknowns
-        [p] unknowns of the estimation.
-    z
-        [p] their estimate.
-    covariance
-        [p, p] of z, prior included.
-    series
-        Recordings, training first, in the order given.
-    """
-
+    # "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
+    # "rms" (the residual with the parameters of the start), it is shown
     report: Mapping[str, Any]
-    start: Mapping[str, Any]
+    start: Mapping[str, Any]  # descriptions as parsed JSON
     fitted: Mapping[str, Any]
-    unknowns: Sequence[FittedUnknown]
-    z: Numbers
-    covariance: Numbers
-    series: Sequence[FitSeries]
+    unknowns: Sequence[FittedUnknown]  # [p] unknowns of the estimation
+    z: Numbers  # [p] their estimate
+    covariance: Numbers  # [p, p] of z, prior included
+    series: Sequence[FitSeries]  # recordings, training first, in the order given
 
     @property
     def joint_names(self) -> list[str]:

@@ -30,42 +30,17 @@ _LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended 
 
 @dataclass(frozen=True)
 class PreviousFit:
-    """Numbers of a previous fit.
+    """Numbers of a previous fit."""
 
-    Attributes
-    ----------
-    path
-        File of the report or of the description.
-    values
-        Numbers of the description by path (SI).
-    names
-        [k] unknowns with a known covariance; empty if the previous fit did not state it.
-    covariance
-        [k, k] of these unknowns.
-    share
-        Effective samples per sample of its residuals, the least of all joints; 1 if unknown.
-    """
-
-    path: Path
-    values: Mapping[str, float]
-    names: Sequence[str]
-    covariance: Numbers
-    share: float
+    path: Path  # file of the report or of the description
+    values: Mapping[str, float]  # numbers of the description by path (SI)
+    names: Sequence[str]  # [k] unknowns with a known covariance; empty if the previous fit did not state it
+    covariance: Numbers  # [k, k] of these unknowns
+    share: float  # effective samples per sample of its residuals, the least of all joints; 1 if unknown
 
 
 def read_previous_fit(path: Path) -> PreviousFit:
-    """Read the report of a fit ("tendonfmu-fit-1"), or the description that a fit wrote.
-
-    Parameters
-    ----------
-    path
-        File of the report or of the description.
-
-    Raises
-    ------
-    InputError
-        The file is neither, or the report is incomplete.
-    """
+    """Read the report of a fit ("tendonfmu-fit-1"), or the description that a fit wrote."""
     content = read_json(path, "a previous fit: its report, or the description that it wrote")
     if isinstance(content, dict) and content.get("format") == FORMAT:
         return _of_report(path, content)
@@ -96,20 +71,7 @@ def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:
 
 
 def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
-    """Return the finger with the previous values of all numbers that both have.
-
-    Parameters
-    ----------
-    finger
-        The finger to fit.
-    previous
-        The previous fit.
-
-    Raises
-    ------
-    InputError
-        They have no number in common.
-    """
+    """Return the finger with the previous values of all numbers that both have."""
     numbers = [number for number in estimable_numbers(finger.data) if number.path in previous.values]
     if not numbers:
         raise InputError(
@@ -127,12 +89,8 @@ def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
 def known_information(
     estimator: Estimator, names: Sequence[str], previous: PreviousFit, change: float, prior: float, noise: float
 ) -> Numbers:
-    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start.
-
-    `names` are those of the u unknowns, `change` the relative standard deviation of what may have changed since.
-    `prior` is the standard deviation of unknowns that the previous fit lacks, in expected magnitudes. With `noise`
-    (N·m) a bias.initial_torque counts as at least that large.
-    """
+    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start."""
+    # `names` are those of the u unknowns, `change` the relative standard deviation of what may have changed since.
     start, scale = estimator.start, estimator.scale
     size = np.maximum(np.abs(start), _LEAST * scale)
     is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)

@@ -31,11 +31,7 @@ _LEAST = 8  # samples in a block
 
 @dataclass(frozen=True)
 class Scores:
-    """Scores of blocks of time.
-
-    `scores` is [B, u] the gradient of ½ Σ e²/S over each block, less the mean of all blocks; `block_time` the length of
-    a block (s).
-    """
+    """Scores of blocks of time."""
 
     scores: Numbers
     block_time: float
@@ -48,12 +44,7 @@ def block_scores(
     training: Sequence[Evaluation],
     weights: Sequence[Numbers],
 ) -> Scores:
-    """Compute the scores at the estimate z [u] of a fitted description, over the samples trained on.
-
-    `estimator` is that of the start's description; the blocks are added to its recordings. `weights` are by recording
-    [N, n] the weights of the samples. Only every k-th sample is used, with a bias filter of that rate. The bias of each
-    block starts anew.
-    """
+    """Compute the scores at the estimate z [u] of a fitted description, over the samples trained on."""
     seconds = sum(found.recording.duration for found in training)
     samples = sum(len(found.recording.time) for found in training)
     size = len(data["joints"]) * len(z)

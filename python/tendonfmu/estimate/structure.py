@@ -27,71 +27,31 @@ _INDEX = re.compile(r"\[(\d+)\]")
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fitted.
+    """What is fitted."""
 
-    Attributes
-    ----------
-    start
-        Description that the fit starts from: laws expanded or merged, shared values made equal, no
-        `contact.uncertainty`.
-    numbers
-        The estimated numbers in the order of `unknowns`, `bias.initial_torque` last.
-    group
-        [p] by parameter of the description in canonical order: −1 is fixed, equal numbers share one value.
-    scale
-        [p] expected magnitudes; NaN: that of the start.
-    index
-        Path -> index among the p parameters.
-    sensor_fault
-        `sensor_fault` of the description, which `start` lacks.
-    """
-
+    # description that the fit starts from: laws expanded or merged, shared values made equal, no `contact.uncertainty`
     start: Finger
-    numbers: list[Unknown]
+    numbers: list[Unknown]  # the estimated numbers in the order of `unknowns`, `bias.initial_torque` last
+    # [p] by parameter of the description in canonical order: −1 is fixed, equal numbers share one value
     group: NDArray[np.int32]
-    scale: NDArray[np.float64]
-    index: Mapping[str, int]
-    sensor_fault: Mapping[str, Any] | None = None
+    scale: NDArray[np.float64]  # [p] expected magnitudes; NaN: that of the start
+    index: Mapping[str, int]  # path -> index among the p parameters
+    sensor_fault: Mapping[str, Any] | None = None  # `sensor_fault` of the description, which `start` lacks
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The options of a fit that shape its structure.
+    """The options of a fit that shape its structure."""
 
-    Attributes
-    ----------
-    sides
-        "given", "symmetric" or "asymmetric".
-    only, fix
-        Patterns of the numbers to estimate, or not to estimate.
-    share
-        "tendons", "pulleys" or patterns of the laws that share their values.
-    scale
-        "PATTERN=VALUE": expected magnitude in the unit of the description.
-    """
-
-    sides: str = "given"
-    only: Sequence[str] = ()
+    sides: str = "given"  # "given", "symmetric" or "asymmetric"
+    only: Sequence[str] = ()  # patterns of the numbers to estimate, or not to estimate
     fix: Sequence[str] = ()
-    share: Sequence[str] = ()
-    scale: Sequence[str] = ()
+    share: Sequence[str] = ()  # "tendons", "pulleys" or patterns of the laws that share their values
+    scale: Sequence[str] = ()  # "PATTERN=VALUE": expected magnitude in the unit of the description
 
 
 def build_structure(finger: Finger, choice: Choice) -> Structure:
-    """Choose the numbers of a finger that a fit estimates.
-
-    Parameters
-    ----------
-    finger
-        Description.
-    choice
-        Options of the fit.
-
-    Raises
-    ------
-    InputError
-        A pattern matches nothing, nothing is left to estimate, or shared laws differ in kind.
-    """
+    """Choose the numbers of a finger that a fit estimates."""
     data = _model_alone(with_sides(finger.data, choice.sides))
     numbers = estimable_numbers(data)
     if not numbers:
@@ -118,11 +78,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
 
 
 def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Remove `contact.uncertainty*` and `sensor_fault`.
-
-    The directions of uncertainty belong to numbers that are about to change; the watch over sensors is no part of the
-    friction model.
-    """
+    """Remove `contact.uncertainty*` and `sensor_fault`."""
     if data.get("sensor_fault") is not None:
         data = {key: value for key, value in data.items() if key != "sensor_fault"}
     contact = data.get("contact") or {}
@@ -149,13 +105,7 @@ def _numbered(finger: Finger, numbers: Sequence[Unknown]) -> list[Unknown]:
 
 
 def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a description so that no two laws are the same object, as in JSON data built by a program.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    """
+    """Copy a description so that no two laws are the same object, as in JSON data built by a program."""
     copied: dict[str, Any] = json.loads(json.dumps(data))
     return copied
 
@@ -166,20 +116,7 @@ def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
 
 
 def described(finger: Finger, data: Mapping[str, Any]) -> Finger:
-    """Return the finger with another description, checked by the core.
-
-    Parameters
-    ----------
-    finger
-        The finger.
-    data
-        Its new description.
-
-    Raises
-    ------
-    InputError
-        The core refuses the description.
-    """
+    """Return the finger with another description, checked by the core."""
     if data is finger.data or data == finger.data:
         return finger
     text = json.dumps(data).encode()
@@ -198,10 +135,7 @@ def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
 
 
 def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
-    """Return the description with every law "symmetric", "asymmetric", or as "given".
-
-    A symmetric law becomes two equal sides. Two sides become one, the mean of their magnitudes.
-    """
+    """Return the description with every law "symmetric", "asymmetric", or as "given"."""
     if wanted == "given":
         return data
     change = _two_sides if wanted == "asymmetric" else _one_side
@@ -379,17 +313,8 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
 
 
 def set_number(data: Any, path: str, value: float) -> None:
-    """Set a number of a parsed description in place.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    path
-        Path of the number, such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
-    value
-        New value in the unit of the description.
-    """
+    """Set a number of a parsed description in place."""
+    # path: [1]
     *way, last = steps_of(path)
     for step in way:
         data = data[step]
@@ -407,25 +332,8 @@ def _value(data: Any, path: str) -> float:
 
 
 def get_number(data: Any, path: str) -> Any:
-    """Return a number of a parsed description.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    path
-        Path of the number, such as `tendons[1].edge_friction[2].coulomb`, indices from 1.
-
-    Returns
-    -------
-    float or None
-        The number in the unit of the description, or None where the key is null.
-
-    Raises
-    ------
-    KeyError
-        The description lacks a key of the path.
-    """
+    """Return a number of a parsed description."""
+    # path: [1]
     for step in steps_of(path):
         data = data[step]
     return data

@@ -50,11 +50,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class Seen:
-    """Samples of the motion, by joint.
-
-    `parts` is [n, K, m + 3] of the friction torque (N·m), `slopes` [n, K, u] the derivative of T by each column of
-    `Known.factor` (N·m).
-    """
+    """Samples of the motion, by joint."""
 
     parts: Numbers
     slopes: Numbers
@@ -62,31 +58,19 @@ class Seen:
 
 @dataclass(frozen=True)
 class Known:
-    """The covariance C of the unknowns, and how much of it is due to the data.
-
-    `factor` is F [u, u] with C = F Fᵀ. Fᵀ H F is diagonal, H being the information of the data; its diagonal is `share`
-    [u], from 0 (prior alone) to 1 (data alone).
-    """
+    """The covariance C of the unknowns, and how much of it is due to the data."""
 
     factor: Numbers
     share: Numbers
 
     def growth(self, inflation: float) -> Numbers:
-        """Return [u] the growth of the variance along each column of F if the data know `inflation` times less.
-
-        The prior is no measurement and stays as it is.
-        """
+        """Return [u] the growth of the variance along each column of F if the data know `inflation` times less."""
         return np.asarray(1 / (1 - self.share + self.share / inflation))
 
 
 @dataclass(frozen=True)
 class JointUncertainty:
-    """Uncertainty of one joint.
-
-    `captured` is the share of the variance in the leading directions, before the remainder is added to them. `stated`
-    has for each set of samples the rms standard deviation, the rms error of the predicted one, and the quantile `WORST`
-    of that error.
-    """
+    """Uncertainty of one joint."""
 
     directions: list[list[float]]
     inflation: float
@@ -97,24 +81,7 @@ class JointUncertainty:
 def parameter_uncertainty(
     structure: Structure, learned: Learned, data: Mapping[str, Any], training: Sequence[Evaluation]
 ) -> Uncertainty:
-    """Compute the uncertainty of the friction torque of a finished fit.
-
-    Parameters
-    ----------
-    structure
-        What was fitted.
-    learned
-        The finished estimation.
-    data
-        Fitted description.
-    training
-        Judged recordings.
-
-    Returns
-    -------
-    Uncertainty
-        Directions for `contact.uncertainty`, and the entry of the report.
-    """
+    """Compute the uncertainty of the friction torque of a finished fit."""
     known = known_of(learned.covariance, learned.information)
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
     blocks = block_scores(estimator, learned.z, data, training, learned.weights)
@@ -183,11 +150,7 @@ def known_of(covariance: Numbers, information: Numbers) -> Known:
 
 
 def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
-    """Compute by how much the sampling variance of the torque exceeds that of white residuals, on average over samples.
-
-    White residuals have the size of the noise settings. `slopes` is [K, u] by the columns of F, `scores` is [B, u] Fᵀ s
-    of each block. The result is 1 if nothing of the torque is estimated or if there are too few blocks.
-    """
+    """Compute by how much the sampling variance of the torque exceeds that of white residuals, on average."""
     if len(scores) < 2:
         return 1.0
     found = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
@@ -200,10 +163,7 @@ def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
 
 @dataclass(frozen=True)
 class Motion:
-    """Evaluates samples of recordings.
-
-    `estimator` is that of the start's description, `z` [u] the estimate, `data` the fitted description.
-    """
+    """Evaluates samples of recordings."""
 
     estimator: Estimator
     z: Numbers
@@ -236,10 +196,7 @@ class Motion:
 
 
 def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Numbers:
-    """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m).
-
-    `arrays` are those of `native.Instance.run`, with measured angles and speeds.
-    """
+    """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m)."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints
     asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}, "sensor_fault": None}

@@ -56,33 +56,15 @@ class Estimates(Protocol):
 
 @dataclass(frozen=True)
 class Fitted:
-    """One number after a fit.
+    """One number after a fit."""
 
-    Attributes
-    ----------
-    number
-        The number, with its fitted value.
-    start
-        Value before the fit.
-    standard_error
-        Standard error of the value.
-    at_bound
-        "lower", "upper" or None.
-    cause
-        "" if identified, else a key of `CAUSES`.
-    reason
-        The cause in words.
-    advice
-        Motion, load or option that would identify the number.
-    """
-
-    number: Unknown
-    start: float
-    standard_error: float
-    at_bound: str | None
-    cause: str
-    reason: str
-    advice: str
+    number: Unknown  # the number, with its fitted value
+    start: float  # value before the fit
+    standard_error: float  # standard error of the value
+    at_bound: str | None  # "lower", "upper" or None
+    cause: str  # "" if identified, else a key of `CAUSES`
+    reason: str  # the cause in words
+    advice: str  # motion, load or option that would identify the number
 
     @property
     def value(self) -> float:
@@ -97,40 +79,20 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a fit knows.
+    """What a fit knows."""
 
-    Attributes
-    ----------
-    estimator
-        Unknowns, and their conversion into numbers of the description.
-    z
-        [u] estimate.
-    covariance
-        [u, u] of z, prior included.
-    information
-        [u, u] of the data alone.
-    fitted
-        Description with the values at z.
-    coverage
-        What the recorded motion covers.
-    noise
-        Torque noise (N·m); a bias.initial_torque counts as at least that large.
-    """
-
-    estimator: Estimates
-    z: Numbers
-    covariance: Numbers
-    information: Numbers
-    fitted: Finger
-    coverage: Sequence[EffectCoverage]
-    noise: float
+    estimator: Estimates  # unknowns, and their conversion into numbers of the description
+    z: Numbers  # [u] estimate
+    covariance: Numbers  # [u, u] of z, prior included
+    information: Numbers  # [u, u] of the data alone
+    fitted: Finger  # description with the values at z
+    coverage: Sequence[EffectCoverage]  # what the recorded motion covers
+    noise: float  # torque noise (N·m); a bias.initial_torque counts as at least that large
 
 
 def slopes(estimator: Estimates, z: Numbers) -> Numbers:
-    """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method.
-
-    The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
-    """
+    """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
+    # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
     base = np.asarray(estimator.values(z))
     columns = []
     for k, unknown in enumerate(estimator.unknowns):
@@ -143,22 +105,8 @@ def slopes(estimator: Estimates, z: Numbers) -> Numbers:
 
 
 def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted], Numbers]:
-    """Judge every estimated number.
-
-    Parameters
-    ----------
-    structure
-        What was fitted.
-    known
-        What the fit knows.
-
-    Returns
-    -------
-    numbers : list of Fitted
-        The estimated numbers in order.
-    covariance : ndarray
-        [p, p] of their values.
-    """
+    """Judge every estimated number."""
+    # returns [p, p] of their values
     numbers = values_of(structure, known.fitted)
     matrix = slopes(known.estimator, known.z)[[structure.index[number.path] for number in numbers]]
     covariance = matrix @ known.covariance @ matrix.T

@@ -42,68 +42,33 @@ _GOLDEN = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence: even
 
 @dataclass(frozen=True)
 class Stroke:
-    """One stroke of a joint.
+    """One stroke of a joint."""
 
-    Attributes
-    ----------
-    begin, end
-        Times (s).
-    start, target
-        Angles (rad).
-    speed
-        Speed in its middle (rad/s).
-    """
-
-    begin: float
+    begin: float  # times (s)
     end: float
-    start: float
+    start: float  # angles (rad)
     target: float
-    speed: float
+    speed: float  # speed in its middle (rad/s)
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """A training motion, one row every 1/rate s.
+    """A training motion, one row every 1/rate s."""
 
-    Attributes
-    ----------
-    time
-        [N] (s).
-    joint_position, joint_velocity, joint_acceleration
-        [N, n] (rad, rad/s, rad/s²).
-    tension
-        Tensions [N, m] (N) that balance each other.
-    pretension
-        Their mean [N] (N).
-    tendon_position
-        Motor side x0 [N, m] (m) that holds the posture at that tension without friction.
-    knots
-        For each joint [k, 4]: time, position, velocity, acceleration.
-    strokes
-        Strokes of each joint.
-    blocks
-        Begin (s), end (s) and pretension (N) of each block.
-    """
-
-    time: Numbers
-    joint_position: Numbers
+    time: Numbers  # [N] (s)
+    joint_position: Numbers  # [N, n] (rad, rad/s, rad/s²)
     joint_velocity: Numbers
     joint_acceleration: Numbers
-    tension: Numbers
-    pretension: Numbers
-    tendon_position: Numbers
-    knots: list[Numbers]
-    strokes: list[list[Stroke]]
-    blocks: list[tuple[float, float, float]]
+    tension: Numbers  # tensions [N, m] (N) that balance each other
+    pretension: Numbers  # their mean [N] (N)
+    tendon_position: Numbers  # motor side x0 [N, m] (m) that holds the posture at that tension without friction
+    knots: list[Numbers]  # for each joint [k, 4]: time, position, velocity, acceleration
+    strokes: list[list[Stroke]]  # strokes of each joint
+    blocks: list[tuple[float, float, float]]  # begin (s), end (s) and pretension (N) of each block
 
     def columns(self) -> dict[str, Numbers]:
-        """Return the columns of the motion's file.
-
-        Returns
-        -------
-        dict of Numbers
-            Name -> [N].
-        """
+        """Return the columns of the motion's file."""
+        # returns name -> [N]
         table = {"time": self.time}
         for name in ("joint_position", "joint_velocity", "joint_acceleration", "tendon_position"):
             values: Numbers = getattr(self, name)
@@ -113,61 +78,21 @@ class Excitation:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a motion should be like.
+    """What a motion should be like."""
 
-    Attributes
-    ----------
-    ranges
-        Lowest and highest angle of each joint [n, 2] (rad).
-    max_speed
-        rad/s.
-    duration
-        Duration (s) of the whole motion at each pretension, or with `alternate` of all together.
-    pretensions
-        N.
-    alternate
-        Duration at one pretension before the next (s). None: one after the other.
-    rate
-        Rows per second.
-    seed
-        Of the random numbers.
-    vary
-        How the tensions change. None: constant at each pretension.
-    max_acceleration
-        rad/s².
-    """
-
-    ranges: Numbers
-    max_speed: float = 1.0
-    duration: float = 400.0
-    pretensions: Sequence[float] = (10.0,)
-    alternate: float | None = None
-    rate: float = 100.0
-    seed: int = 0
-    vary: Variation | None = None
-    max_acceleration: float = ACCELERATION
+    ranges: Numbers  # lowest and highest angle of each joint [n, 2] (rad)
+    max_speed: float = 1.0  # rad/s
+    duration: float = 400.0  # duration (s) of the whole motion at each pretension, or with `alternate` of all together
+    pretensions: Sequence[float] = (10.0,)  # N
+    alternate: float | None = None  # duration at one pretension before the next (s)
+    rate: float = 100.0  # rows per second
+    seed: int = 0  # of the random numbers
+    vary: Variation | None = None  # how the tensions change
+    max_acceleration: float = ACCELERATION  # rad/s²
 
 
 def plan_excitation(data: Mapping[str, Any], plan: Plan) -> Excitation:
-    """Plan the motion of a finger.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    plan
-        What the motion should be like.
-
-    Returns
-    -------
-    Excitation
-        The motion.
-
-    Raises
-    ------
-    InputError
-        The duration is too short, or no such tensions exist.
-    """
+    """Plan the motion of a finger."""
     blocks = _blocks(plan)
     home = plan.ranges.mean(axis=1)
     knots, strokes = [], []
@@ -213,10 +138,7 @@ def _blocks(plan: Plan) -> list[tuple[int, int, float]]:
 
 
 def _speed_up(plan: Plan) -> float:
-    """Return the time to speed up (s).
-
-    A quintic piece from rest to v in time T has its greatest acceleration, 1.5 v/T, in the middle.
-    """
+    """Return the time to speed up (s)."""
     return max(SPEED_UP, 1.5 * plan.max_speed / plan.max_acceleration, 1 / plan.rate)
 
 
@@ -233,10 +155,7 @@ class _JointBlock:
         self._strokes: list[Stroke] = []
 
     def draw(self, first: int, last: int) -> tuple[list[tuple[float, float, float, float]], list[Stroke]]:
-        """Return knots (row, position, velocity, acceleration) and strokes from one row to another.
-
-        The joint is at home and at rest at both.
-        """
+        """Return knots (row, position, velocity, acceleration) and strokes from one row to another."""
         rate, position, direction = self._plan.rate, self._home, 1 if self._random.random() < 0.5 else -1
         row = first + round((START + self._random.random() * SHORTEST) * rate)
         self._knots += [(first, position, 0.0, 0.0), (row, position, 0.0, 0.0)]

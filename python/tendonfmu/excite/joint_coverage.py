@@ -15,32 +15,16 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointCoverage:
-    """How one joint moves.
+    """How one joint moves."""
 
-    Attributes
-    ----------
-    lowest, highest
-        Angles (rad).
-    fastest
-        Greatest speed (rad/s).
-    strokes, reversals
-        Their numbers.
-    slow_reversals
-        Number of reversals between two strokes of at most `SLOW` of the greatest speed.
-    rests
-        Number of rests between strokes.
-    resting
-        Time at rest between strokes (s).
-    """
-
-    lowest: float
+    lowest: float  # angles (rad)
     highest: float
-    fastest: float
-    strokes: int
+    fastest: float  # greatest speed (rad/s)
+    strokes: int  # their numbers
     reversals: int
-    slow_reversals: int
-    rests: int
-    resting: float
+    slow_reversals: int  # number of reversals between two strokes of at most `SLOW` of the greatest speed
+    rests: int  # number of rests between strokes
+    resting: float  # time at rest between strokes (s)
 
 
 def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:

@@ -31,27 +31,15 @@ _STREAM = 0x7E17  # of random numbers; joints have 0 to 15
 
 @dataclass(frozen=True)
 class Variation:
-    """How the tensions change.
+    """How the tensions change."""
 
-    Attributes
-    ----------
-    lowest, highest
-        Limits (N) of every tendon that only pulls. Cable loops vary from −highest to highest.
-    every
-        Duration of a pattern (s).
-    """
-
-    lowest: float
+    lowest: float  # limits (N) of every tendon that only pulls
     highest: float
-    every: float = 10.0
+    every: float = 10.0  # duration of a pattern (s)
 
 
 def internal_tensions(data: Mapping[str, Any], variation: Variation, time: Numbers, seed: int) -> Numbers:
-    """Return tensions [N, m] (N) at `time` [N] (s). Raise InputError if the finger has none within the limits.
-
-    For each pattern tendons are drawn tight or loose at random, every tendon equally often. The pattern is the nearest
-    balanced one.
-    """
+    """Return tensions [N, m] (N) at `time` [N] (s). Raise InputError if the finger has none within the limits."""
     count = max(2, math.ceil(float(time[-1]) / variation.every))
     random = np.random.default_rng([seed, _STREAM])
     tight = np.arange(count) % 2 == 0
@@ -100,11 +88,8 @@ class _Patterns:
         return 0.5 * (least + most) * shares
 
     def nearest(self, tight: NDArray[np.bool_]) -> Numbers:
-        """Return the balanced tensions [m] nearest to the highest where `tight` [m], and to the lowest elsewhere.
-
-        Method: Dykstra's alternating projections. The result is shrunk towards the even pattern by the remaining error,
-        so that the limits hold.
-        """
+        """Return the balanced tensions [m] nearest to the highest where `tight` [m], and to the lowest elsewhere."""
+        # The result is shrunk towards the even pattern by the remaining error, so that the limits hold.
         found, correction = self._project @ np.where(tight, self._high, self._low), np.zeros(len(tight))
         for _ in range(_SWEEPS):
             within = np.clip(found + correction, self._low, self._high)

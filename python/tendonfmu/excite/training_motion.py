@@ -46,92 +46,40 @@ ANALYSIS_RATE = 25.0  # 1/s; 100 gives the same count for the index finger, and 
 
 @dataclass(frozen=True)
 class Range:
-    """Range of one joint.
+    """Range of one joint."""
 
-    Attributes
-    ----------
-    name
-        Name of the joint.
-    low, high
-        Lowest and highest angle (rad).
-    source
-        Where the range comes from, in words.
-    guessed
-        Whether nothing was known about it.
-    """
-
-    name: str
-    low: float
+    name: str  # name of the joint
+    low: float  # lowest and highest angle (rad)
     high: float
-    source: str
-    guessed: bool = False
+    source: str  # where the range comes from, in words
+    guessed: bool = False  # whether nothing was known about it
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The finger that is moved.
+    """The finger that is moved."""
 
-    Attributes
-    ----------
-    finger
-        Its description.
-    limits
-        Lowest and highest angle of each joint [n] (rad), if a rig gives them.
-    """
-
-    finger: Finger
-    limits: list[tuple[float, float]] | None
+    finger: Finger  # its description
+    limits: list[tuple[float, float]] | None  # lowest and highest angle of each joint [n] (rad), if a rig gives them
 
 
 @dataclass(frozen=True)
 class ExciteResult:
-    """A motion and what it excites.
+    """A motion and what it excites."""
 
-    Attributes
-    ----------
-    subject, plan, ranges
-        What was asked for.
-    motion
-        The motion.
-    joints, effects
-        How each joint moves and each friction effect slides.
-    noise
-        The assumed noise.
-    slack
-        Time during which each tendon would have to push [m] (s).
-    judgement
-        What the motion tells about each number.
-    """
-
-    subject: Subject
+    subject: Subject  # what was asked for
     plan: Plan
     ranges: list[Range]
-    motion: Excitation
-    joints: list[JointCoverage]
+    motion: Excitation  # the motion
+    joints: list[JointCoverage]  # how each joint moves and each friction effect slides
     effects: list[EffectCoverage]
-    noise: Noise
-    slack: list[float]
-    judgement: Judgement
+    noise: Noise  # the assumed noise
+    slack: list[float]  # time during which each tendon would have to push [m] (s)
+    judgement: Judgement  # what the motion tells about each number
 
 
 def read_subject(path: Path) -> Subject:
-    """Read a finger description or a rig.
-
-    Parameters
-    ----------
-    path
-        A JSON file.
-
-    Returns
-    -------
-    Subject
-        With limits if a rig gives them for all joints.
-
-    Raises
-    ------
-    InputError
-        The description or the rig is refused.
-    """
+    """Read a finger description or a rig."""
     try:
         data = json.loads(path.read_bytes())
     except (OSError, ValueError):
@@ -170,25 +118,8 @@ def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[floa
 
 
 def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
-    """Return the range of each joint.
-
-    Parameters
-    ----------
-    subject
-        The finger.
-    given
-        "JOINT=LOW:HIGH" (rad), joint by number or name.
-
-    Returns
-    -------
-    list of Range
-        [n]. Ranges that are not given come from the rig's limits, from working points, or are guessed.
-
-    Raises
-    ------
-    InputError
-        A range is malformed, or beyond the joint's limits.
-    """
+    """Return the range of each joint."""
+    # given: (rad); returns [n]
     names = subject.finger.joint_names
     asked = dict(_parse_range(text, names) for text in given)
     ranges = []
@@ -208,25 +139,8 @@ def find_ranges(subject: Subject, given: Sequence[str]) -> list[Range]:
 
 
 def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
-    """Return the pretensions of the motion.
-
-    Parameters
-    ----------
-    subject
-        The finger.
-    given
-        As asked for (N).
-
-    Returns
-    -------
-    list of float
-        N. 10 if none is given; 0 for a finger of cable loops that can hold no pretension.
-
-    Raises
-    ------
-    InputError
-        A pretension is given for a finger that can hold none.
-    """
+    """Return the pretensions of the motion."""
+    # given: (N)
     if pretension_vector(subject.finger.data).any():
         return list(given) or [DEFAULT_PRETENSION]
     if any(given):
@@ -237,27 +151,8 @@ def find_pretensions(subject: Subject, given: Sequence[float]) -> list[float]:
 def find_variation(
     given: str | None, every: float, pretension: Sequence[float] | None = None, alternate: float | None = None
 ) -> Variation | None:
-    """Return how the tensions change.
-
-    Parameters
-    ----------
-    given
-        "LOW:HIGH" (N), or None.
-    every
-        Duration of a pattern (s).
-    pretension, alternate
-        Other options that were given. They exclude this one.
-
-    Returns
-    -------
-    Variation or None
-        None if `given` is None.
-
-    Raises
-    ------
-    InputError
-        The text is malformed, or given together with one of the other options.
-    """
+    """Return how the tensions change."""
+    # given: (N); every: (s)
     if given is None:
         return None
     for option, value in (("--pretension", pretension), ("--alternate", alternate)):
@@ -315,29 +210,8 @@ def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[flo
 
 
 def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress | None = None) -> ExciteResult:
-    """Plan the motion and judge it.
-
-    Parameters
-    ----------
-    subject
-        The finger.
-    ranges
-        Range of each joint [n].
-    plan
-        What the motion should be like.
-    progress
-        Called with (done, total) parts of the judgement.
-
-    Returns
-    -------
-    ExciteResult
-        The motion and what it excites.
-
-    Raises
-    ------
-    InputError
-        No such motion exists.
-    """
+    """Plan the motion and judge it."""
+    # ranges: [n]
     data = subject.finger.data
     motion = plan_excitation(data, plan)
     every = max(1, round(plan.rate / ANALYSIS_RATE))

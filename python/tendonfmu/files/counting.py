@@ -4,22 +4,7 @@ from __future__ import annotations
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
-    """Write a number with its noun.
-
-    Parameters
-    ----------
-    number
-        How many.
-    noun
-        In the singular.
-    plural
-        Where it is more than the singular with an "s".
-
-    Returns
-    -------
-    str
-        Such as `1 joint`, `2 joints` or `3 passes`.
-    """
+    """Write a number with its noun."""
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 

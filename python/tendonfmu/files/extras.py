@@ -9,25 +9,7 @@ from tendonfmu.errors import InputError
 
 
 def require_extra(module: str, what: str) -> Any:
-    """Import a module of the extra `logs`.
-
-    Parameters
-    ----------
-    module
-        Its name.
-    what
-        What needs it, for the message: a file, or a unit.
-
-    Returns
-    -------
-    module
-        The module.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
+    """Import a module of the extra `logs`."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as missing:

@@ -8,18 +8,7 @@ from typing import Any
 
 
 def finite(value: Any) -> Any:
-    """Replace every number that is not finite by None.
-
-    Parameters
-    ----------
-    value
-        A value of a report, nested to any depth.
-
-    Returns
-    -------
-    Any
-        A copy.
-    """
+    """Replace every number that is not finite by None."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

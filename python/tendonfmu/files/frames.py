@@ -19,30 +19,14 @@ if TYPE_CHECKING:
 
 
 def is_frame(value: object) -> TypeIs[pd.DataFrame]:
-    """Return whether a value is a pandas DataFrame, without importing pandas.
-
-    Parameters
-    ----------
-    value
-        Anything.
-    """
+    """Return whether a value is a pandas DataFrame, without importing pandas."""
     pandas = sys.modules.get("pandas")
     return pandas is not None and isinstance(value, pandas.DataFrame)
 
 
 def frame_of(columns: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
-    """Make a DataFrame.
-
-    Parameters
-    ----------
-    columns
-        Columns [N].
-
-    Returns
-    -------
-    DataFrame
-        With rows counted from 0.
-    """
+    """Make a DataFrame."""
+    # columns: [N]
     import pandas as pd
 
     frame: pd.DataFrame = pd.DataFrame(dict(columns))
@@ -50,27 +34,8 @@ def frame_of(columns: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
 
 
 def table_of_frame(file: Path, frame: pd.DataFrame, check_names: CheckNames, flags: Collection[str] = ()) -> Table:
-    """Read the columns of a DataFrame as finite numbers.
-
-    Parameters
-    ----------
-    file
-        Name of the table in messages.
-    frame
-        The DataFrame; its index is not used.
-    check_names, flags
-        As of `read_table`.
-
-    Returns
-    -------
-    dict of ndarray
-        Columns [N] in their order.
-
-    Raises
-    ------
-    InputError
-        Column, row and what was expected.
-    """
+    """Read the columns of a DataFrame as finite numbers."""
+    # returns columns [N] in their order
     if not is_frame(frame):
         raise InputError(f"{file}: {type(frame).__name__}; expected a pandas DataFrame")
     names = [str(name) for name in frame.columns]

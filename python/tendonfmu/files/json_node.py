@@ -21,25 +21,7 @@ class Refusal(ValueError):
 
 
 def read_json(path: Path, what: str) -> Any:
-    """Read a JSON file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    what
-        What the file should be, for messages.
-
-    Returns
-    -------
-    Any
-        The content.
-
-    Raises
-    ------
-    InputError
-        Invalid syntax with line and column, a key that occurs twice, NaN, infinity, or a file that cannot be read.
-    """
+    """Read a JSON file."""
     try:
         size = path.stat().st_size
         text = path.read_bytes() if size <= LARGEST_FILE else b""
@@ -98,17 +80,7 @@ def shown(value: Any) -> str:
 
 
 class Node:
-    """A value of a JSON document with its path. null counts as absent.
-
-    Methods that check a value raise Refusal.
-
-    Parameters
-    ----------
-    value
-        The value.
-    path
-        Its path in the document.
-    """
+    """A value of a JSON document with its path. null counts as absent."""
 
     def __init__(self, value: Any, path: str = "") -> None:
         self.value = value
@@ -120,63 +92,24 @@ class Node:
         return self.value is None
 
     def refuse(self, expectation: str) -> NoReturn:
-        """Refuse the value.
-
-        Parameters
-        ----------
-        expectation
-            What was expected.
-
-        Raises
-        ------
-        Refusal
-            "<path> = <value>: expected ...", or "<path>: missing; expected ...".
-        """
+        """Refuse the value."""
         place = self.path or "the document"
         if self.absent:
             raise Refusal(f"{place}: missing; expected {expectation}")
         raise Refusal(f"{place} = {shown(self.value)}: expected {expectation}")
 
     def member(self, key: str) -> Node:
-        """Return the value of a key.
-
-        Parameters
-        ----------
-        key
-            Name of the key.
-
-        Returns
-        -------
-        Node
-            Absent if there is no such key.
-        """
+        """Return the value of a key."""
         inner = self.value.get(key) if isinstance(self.value, dict) else None
         return Node(inner, f"{self.path}.{key}" if self.path else key)
 
     def elements(self) -> list[Node]:
-        """Return the elements of a list.
-
-        Returns
-        -------
-        list of Node
-            Empty if the value is no list.
-        """
+        """Return the elements of a list."""
         items = self.value if isinstance(self.value, list) else []
         return [Node(item, f"{self.path}[{k}]") for k, item in enumerate(items, start=1)]
 
     def keys(self, known: Collection[str]) -> Node:
-        """Refuse a value that is no object, and the first unknown key.
-
-        Parameters
-        ----------
-        known
-            Names of the keys.
-
-        Returns
-        -------
-        Node
-            This node.
-        """
+        """Refuse a value that is no object, and the first unknown key."""
         if not isinstance(self.value, dict):
             self.refuse("an object")
         for key, value in self.value.items():
@@ -186,35 +119,13 @@ class Node:
         return self
 
     def text(self, expectation: str) -> str:
-        """Return a string of at least one character without control characters.
-
-        Parameters
-        ----------
-        expectation
-            What was expected, for the message.
-
-        Returns
-        -------
-        str
-            The string.
-        """
+        """Return a string of at least one character without control characters."""
         if not isinstance(self.value, str) or not self.value or any(ord(letter) < 32 for letter in self.value):
             self.refuse(expectation)
         return self.value
 
     def choice(self, *choices: str) -> str:
-        """Return a string that is one of some choices.
-
-        Parameters
-        ----------
-        *choices
-            Allowed strings.
-
-        Returns
-        -------
-        str
-            The string.
-        """
+        """Return a string that is one of some choices."""
         if self.value not in choices or not isinstance(self.value, str):
             self.refuse(" or ".join(f'"{choice}"' for choice in choices))
         return self.value
@@ -223,20 +134,7 @@ class Node:
         return isinstance(self.value, kinds) and not isinstance(self.value, bool)
 
     def integer(self, least: int, most: int, default: int | None = None) -> int:
-        """Return a whole number; 3.0 is one.
-
-        Parameters
-        ----------
-        least, most
-            Bounds, both allowed.
-        default
-            Returned if the value is absent. None: absent values are refused.
-
-        Returns
-        -------
-        int
-            The number.
-        """
+        """Return a whole number; 3.0 is one."""
         if self.absent and default is not None:
             return default
         whole = self._numeric((int, float)) and float(self.value) == math.floor(self.value)
@@ -245,24 +143,7 @@ class Node:
         return int(self.value)
 
     def number(self, least: float, most: float, unit: str, default: float | None = None, above: bool = False) -> float:
-        """Return a number.
-
-        Parameters
-        ----------
-        least, most
-            Bounds.
-        unit
-            For the message.
-        default
-            Returned if the value is absent. None: absent values are refused.
-        above
-            Whether `least` itself is refused.
-
-        Returns
-        -------
-        float
-            The number.
-        """
+        """Return a number."""
         if self.absent and default is not None:
             return default
         inside = self._numeric((int, float)) and (least < self.value <= most if above else least <= self.value <= most)
@@ -272,22 +153,7 @@ class Node:
         return float(self.value)
 
     def list_of(self, count: int | None, meaning: str, read: Callable[[Node], float]) -> list[float]:
-        """Return a list of numbers.
-
-        Parameters
-        ----------
-        count
-            Number of elements. None: any number from 1 on.
-        meaning
-            What the list is, for the message.
-        read
-            Reads each element.
-
-        Returns
-        -------
-        list of float
-            The numbers.
-        """
+        """Return a list of numbers."""
         wrong = not isinstance(self.value, list) or not self.value
         if wrong or (count is not None and len(self.value) != count):
             self.refuse(f"a list of {count if count is not None else 'numbers'}, {meaning}")
@@ -296,18 +162,7 @@ class Node:
     def span(
         self, least: float, most: float, unit: str, default: tuple[float, float] | None = None, above: bool = False
     ) -> tuple[float, float]:
-        """Return two numbers [lowest, highest], the second not below the first.
-
-        Parameters
-        ----------
-        least, most, unit, default, above
-            As for `number`.
-
-        Returns
-        -------
-        tuple of float
-            The two numbers.
-        """
+        """Return two numbers [lowest, highest], the second not below the first."""
         if self.absent and default is not None:
             return default
         low, high = self.list_of(

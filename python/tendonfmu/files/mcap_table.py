@@ -25,20 +25,8 @@ LATEST = 2**63  # ns; readers take times as signed 64-bit integers
 
 
 def write_mcap(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
-    """Write a table.
-
-    Parameters
-    ----------
-    file
-        The file to write.
-    blocks
-        Columns [N] of the same names; `time` in s, from 0 on, is the time of the messages.
-
-    Raises
-    ------
-    InputError
-        The package mcap is not installed, or there is no time that MCAP can hold.
-    """
+    """Write a table."""
+    # blocks: [N]
     writer_of = require_extra("mcap.writer", str(file))
     with open(file, "wb") as raw:
         writer = writer_of.Writer(raw)

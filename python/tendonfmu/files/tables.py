@@ -37,28 +37,8 @@ _FLAGS = {"true": 1.0, "false": 0.0}
 
 
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:
-    """Read all columns of a file as finite numbers.
-
-    Parameters
-    ----------
-    path
-        A .csv or .parquet file.
-    check_names
-        Called with the file and its column names before any number is read. It returns the columns to read, or None
-        for all, and raises InputError.
-    flags
-        Columns that may also contain true and false.
-
-    Returns
-    -------
-    dict of ndarray
-        Columns [N] in their order.
-
-    Raises
-    ------
-    InputError
-        File, column, row and what was expected.
-    """
+    """Read all columns of a file as finite numbers."""
+    # returns columns [N] in their order
     file = path if isinstance(path, Path) else Path(path)  # a path of its own kind keeps its name in messages
     check_format(file)
     if not file.is_file():
@@ -72,20 +52,8 @@ def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Col
 
 
 def check_finite(file: Path, table: Mapping[str, NDArray[np.float64]]) -> None:
-    """Check that a table has rows and holds finite numbers.
-
-    Parameters
-    ----------
-    file
-        Name of the table in messages.
-    table
-        Columns [N].
-
-    Raises
-    ------
-    InputError
-        Column and row, and what was expected.
-    """
+    """Check that a table has rows and holds finite numbers."""
+    # table: [N]
     if not len(next(iter(table.values()))):
         raise InputError(f"{file}: no samples; expected at least one row below the column names")
     for name, column in table.items():
@@ -95,35 +63,13 @@ def check_finite(file: Path, table: Mapping[str, NDArray[np.float64]]) -> None:
 
 
 def check_format(file: Path) -> None:
-    """Check the suffix of a table's file.
-
-    Parameters
-    ----------
-    file
-        A file, which need not exist.
-
-    Raises
-    ------
-    InputError
-        The suffix is none of `FORMATS`.
-    """
+    """Check the suffix of a table's file."""
     if file.suffix.lower() not in FORMATS:
         raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv or .parquet")
 
 
 def check_output_format(file: Path) -> None:
-    """Check the suffix of a table that is written for other programs too.
-
-    Parameters
-    ----------
-    file
-        A file, which need not exist.
-
-    Raises
-    ------
-    InputError
-        The suffix is none of `OUTPUTS`, or its library is not installed.
-    """
+    """Check the suffix of a table that is written for other programs too."""
     if file.suffix.lower() not in OUTPUTS:
         raise InputError(f"{file}: unknown format {file.suffix!r}; expected .csv, .parquet or .mcap")
     if file.suffix.lower() == ".mcap":
@@ -191,10 +137,8 @@ def _read_csv(file: Path, check_names: CheckNames, flags: Collection[str]) -> Ta
 
 
 def _lines(file: Path) -> tuple[str, list[str], str]:
-    """Return the line of names, the whole lines of numbers, and the text after the last line end ("" in a whole file).
-
-    A line without a line end may have lost digits, so it never counts as whole.
-    """
+    """Return the line of names, the whole lines of numbers, and the text after the last line end ("" if whole)."""
+    # A line without a line end may have lost digits, so it never counts as whole.
     try:
         text = file.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -257,38 +201,14 @@ def _parse_field(file: Path, name: str, row: int, field: str, flags: Collection[
 
 
 def write_table(path: str | os.PathLike[str], table: Mapping[str, NDArray[Any]]) -> None:
-    """Write columns of equal length as CSV, Parquet or MCAP, by the suffix: whole or not at all.
-
-    Parameters
-    ----------
-    path
-        A .csv, .parquet or .mcap file.
-    table
-        Columns [N]. Numbers read back the same; flags become 0 and 1.
-
-    Raises
-    ------
-    InputError
-        The format is unknown, or the file cannot be written.
-    """
+    """Write columns of equal length as CSV, Parquet or MCAP, by the suffix: whole or not at all."""
+    # table: [N]
     write_blocks(path, [table])
 
 
 def write_blocks(path: str | os.PathLike[str], blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
-    """Write a table that comes in blocks of rows, as `write_table` does; only one block is in memory.
-
-    Parameters
-    ----------
-    path
-        A .csv, .parquet or .mcap file.
-    blocks
-        Columns [N] of the same names, at least one block. A block is a row group of Parquet.
-
-    Raises
-    ------
-    InputError
-        The format is unknown, or the file cannot be written.
-    """
+    """Write a table that comes in blocks of rows, as `write_table` does; only one block is in memory."""
+    # blocks: [N]
     file = Path(path)
     check_output_format(file)
     write = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower(), write_mcap)
@@ -297,18 +217,8 @@ def write_blocks(path: str | os.PathLike[str], blocks: Iterable[Mapping[str, NDA
 
 
 def csv_lines(blocks: Iterable[Mapping[str, NDArray[Any]]]) -> Iterator[str]:
-    """Yield the lines of a CSV file.
-
-    Parameters
-    ----------
-    blocks
-        Columns [N] of the same names, blocks of rows. Numbers read back the same; flags become 0 and 1.
-
-    Yields
-    ------
-    str
-        The names, then each row, with its line end.
-    """
+    """Yield the lines of a CSV file."""
+    # blocks: [N]
     for k, columns in enumerate(map(_columns, blocks)):
         if k == 0:
             yield ",".join(columns) + "\n"

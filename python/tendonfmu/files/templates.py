@@ -10,18 +10,7 @@ if TYPE_CHECKING:
 
 
 def html_template(name: str) -> jinja2.Template:
-    """Return a template of python/tendonfmu/templates. It escapes all texts, and refuses a variable it is not given.
-
-    Parameters
-    ----------
-    name
-        Name of the file.
-
-    Returns
-    -------
-    jinja2.Template
-        The template.
-    """
+    """Return a template of python/tendonfmu/templates. It escapes all texts, and refuses a variable it is not given."""
     return _environment().get_template(name)
 
 

@@ -23,20 +23,7 @@ _YOUNG = 60.0  # s; a younger file may not have its lock yet
 
 
 def check_output(output: Path, *inputs: Path) -> None:
-    """Check that an output can be written and replaces none of its inputs.
-
-    Parameters
-    ----------
-    output
-        The file that will be written.
-    *inputs
-        Files from which it is made.
-
-    Raises
-    ------
-    InputError
-        The output cannot be written, or is one of the inputs.
-    """
+    """Check that an output can be written and replaces none of its inputs."""
     _check_place(output)
     _check_writable(output, output.parent)
     for file in inputs:
@@ -59,18 +46,7 @@ def _check_place(file: Path) -> None:
 
 
 def check_output_folder(folder: Path) -> None:
-    """Check that a folder can be made, if it does not exist, and be written to.
-
-    Parameters
-    ----------
-    folder
-        The folder.
-
-    Raises
-    ------
-    InputError
-        It is a file, lies in a file, or cannot be written to.
-    """
+    """Check that a folder can be made, if it does not exist, and be written to."""
     if folder.name == "-":
         raise InputError("-: standard output takes tables only; expected the name of a folder")
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
@@ -91,23 +67,7 @@ def _check_writable(output: Path, folder: Path) -> None:
 
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
-    """Write a file whole or not at all.
-
-    Parameters
-    ----------
-    file
-        The file.
-
-    Yields
-    ------
-    Path
-        A temporary file in the same folder. It replaces `file` at the end, and is deleted after an error.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write a file whole or not at all."""
     _check_place(file)
     remove_left_behind(file)
     try:
@@ -144,14 +104,7 @@ def in_use(temporary: Path) -> Iterator[None]:
 
 
 def remove_left_behind(target: Path) -> None:
-    """Remove temporary files and folders of an earlier try to write a target, as `kill -9` leaves them.
-
-    Parameters
-    ----------
-    target
-        A file, or a folder whose files are made beside it. What a living process uses stays, and so does all where the
-        file system has no locks.
-    """
+    """Remove temporary files and folders of an earlier try to write a target, as `kill -9` leaves them."""
     pattern = re.compile(rf"\.{re.escape(target.name)}-[a-z0-9_]{{8}}({re.escape(target.suffix)})?")  # of mkstemp
     for path in target.absolute().parent.glob(f".{glob.escape(target.name)}-*"):
         with suppress(OSError):
@@ -181,20 +134,7 @@ def _locked(path: Path) -> int | None:
 
 
 def is_about(error: OSError, folder: Path) -> bool:
-    """Return whether an error in writing concerns a folder.
-
-    Parameters
-    ----------
-    error
-        The error.
-    folder
-        The folder.
-
-    Returns
-    -------
-    bool
-        True if the error names a file in the folder, or no file, such as that of a full disk.
-    """
+    """Return whether an error in writing concerns a folder."""
     if error.errno is None:  # not an error of the operating system
         return False
     if not isinstance(error.filename, str | bytes):
@@ -203,19 +143,6 @@ def is_about(error: OSError, folder: Path) -> bool:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all.
-
-    Parameters
-    ----------
-    path
-        The file.
-    text
-        Its content, written as UTF-8.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write a text file whole or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -12,25 +12,7 @@ TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": 
 
 
 def in_arrays(model: Mapping[str, Any], table: VariableTable, sizes: Mapping[str, int]) -> dict[str, Any]:
-    """Return the template's context for FMI 3.0.
-
-    Every group of the table with a size becomes one array of that size, with the group's name and first value
-    reference. Numbers of the description stay scalars under their paths. The independent variable comes first.
-
-    Parameters
-    ----------
-    model
-        The context for FMI 2.0, from `describe_model`.
-    table
-        The table of variables.
-    sizes
-        From `group_sizes`.
-
-    Returns
-    -------
-    dict
-        See modelDescription/README.md.
-    """
+    """Return the template's context for FMI 3.0."""
     base = table.data["parameters"]["base"]
     groups = {group["base"]: group for group in table.data["groups"]}
     variables = [_time(base - 1)]

@@ -15,22 +15,7 @@ def documentation_page(description: Finger, model: Mapping[str, Any]) -> str:
 
 
 def render_documentation(template: str, model: Mapping[str, Any], **context: Any) -> str:
-    """Render the HTML page of an FMU.
-
-    Parameters
-    ----------
-    template
-        Name of the template.
-    model
-        The context of the FMU's XML (modelDescription/README.md). The template gets its variables by causality.
-    **context
-        Other variables of the template.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Render the HTML page of an FMU."""
     by_causality = {
         f"{causality}s": [variable for variable in model["variables"] if variable["causality"] == causality]
         for causality in ("input", "output", "parameter")

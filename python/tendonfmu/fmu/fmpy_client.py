@@ -32,21 +32,11 @@ KIND_OF = {"Float64": "Real", "Int32": "Integer"}
 
 @dataclass(frozen=True)
 class Group:
-    """A group of variables, such as the forces of all tendons.
+    """A group of variables, such as the forces of all tendons."""
 
-    Attributes
-    ----------
-    names
-        Of the elements, in the order of their index.
-    references
-        Value references: one of each element in FMI 2.0, one of the whole array in FMI 3.0.
-    kind
-        "Real", "Integer" or "Boolean".
-    """
-
-    names: tuple[str, ...]
-    references: tuple[int, ...]
-    kind: str
+    names: tuple[str, ...]  # of the elements, in the order of their index
+    references: tuple[int, ...]  # value references: one of each element in FMI 2.0, one of the whole array in FMI 3.0
+    kind: str  # "Real", "Integer" or "Boolean"
 
 
 def run_fmu(
@@ -57,34 +47,8 @@ def run_fmu(
     parameters: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Run a friction FMU over a recording.
-
-    For sample k the inputs are set, the step takes the sample at t_k, and the outputs after it belong to t_k. The
-    last step goes one sample beyond the recording.
-
-    Parameters
-    ----------
-    path
-        The FMU, of FMI 2.0 or 3.0.
-    recording
-        Signals of the same finger.
-    kinematics_source
-        1, 2 or 3.
-    parameters
-        Start values by path, in addition to `kinematics_source`.
-    progress
-        Called with the number of samples done.
-
-    Returns
-    -------
-    dict of arrays
-        Column name -> [N], `time` first. Each row belongs to the time of its own sample.
-
-    Raises
-    ------
-    InputError
-        The file is no friction FMU, the recording does not fit it, or the FMU refuses something, in its own words.
-    """
+    """Run a friction FMU over a recording."""
+    # returns [N]
     with _unpacked(path) as folder:
         run = _Run(path, folder, parameters or {})
         recording.require(run.joints, run.tendons, run.inputs(kinematics_source))

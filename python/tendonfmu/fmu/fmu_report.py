@@ -12,20 +12,7 @@ FORMAT = "tendonfmu-build-1"
 
 
 def fmu_report(source: Path, fmu: Path) -> dict[str, Any]:
-    """Return what an FMU is, as read from its file.
-
-    Parameters
-    ----------
-    source
-        Finger description or rig that it is made from.
-    fmu
-        A packed FMU.
-
-    Returns
-    -------
-    dict
-        Ready for JSON.
-    """
+    """Return what an FMU is, as read from its file."""
     with zipfile.ZipFile(fmu) as archive:
         names = archive.namelist()
         model = ElementTree.fromstring(archive.read("modelDescription.xml"))

@@ -37,43 +37,21 @@ NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 @dataclass(frozen=True)
 class VariableTable:
-    """The content of variables.json.
+    """The content of variables.json."""
 
-    Attributes
-    ----------
-    data
-        The parsed JSON.
-    patterns
-        Compiled patterns of parameter paths, each with its description.
-    """
-
-    data: Mapping[str, Any]
-    patterns: list[tuple[re.Pattern[str], str]]
+    data: Mapping[str, Any]  # the parsed JSON
+    patterns: list[tuple[re.Pattern[str], str]]  # compiled patterns of parameter paths, each with its description
 
 
 def read_table(text: str) -> VariableTable:
-    """Read a table of variables.
-
-    Parameters
-    ----------
-    text
-        Content of variables.json or plant_variables.json.
-
-    Returns
-    -------
-    VariableTable
-        With compiled patterns.
-    """
+    """Read a table of variables."""
     data = json.loads(text)
     patterns = [(re.compile(pattern), wording) for pattern, wording in data["parameters"]["descriptions"]]
     return VariableTable(data, patterns)
 
 
 def describe_model(description: Finger, table: VariableTable) -> dict[str, Any]:
-    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources.
-
-    See modelDescription/README.md.
-    """
+    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources."""
     finger = native.Instance(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
     has = {"links": finger.has_links, "rest": finger.watches_rest, "sensor_fault": finger.watches_sensors}
@@ -98,18 +76,7 @@ def describe_model(description: Finger, table: VariableTable) -> dict[str, Any]:
 
 
 def group_sizes(joints: int, tendons: int) -> dict[str, int]:
-    """Return the number of elements of a group by its `size` in the table.
-
-    Parameters
-    ----------
-    joints, tendons
-        Numbers of joints and tendons of the finger.
-
-    Returns
-    -------
-    dict of int
-        By "scalar", "joints", "tendons" and "vector".
-    """
+    """Return the number of elements of a group by its `size` in the table."""
     return {"scalar": 1, "joints": joints, "tendons": tendons, "vector": 3}
 
 
@@ -119,20 +86,7 @@ def present_groups(table: VariableTable, has: set[str]) -> list[Mapping[str, Any
 
 
 def units_of(variables: list[dict[str, Any]], table: VariableTable) -> dict[str, Any]:
-    """Return the table's units that the variables use.
-
-    Parameters
-    ----------
-    variables
-        Variables, as `elements` gives them.
-    table
-        The table of variables.
-
-    Returns
-    -------
-    dict
-        Unit -> `base`, its base units, and `display`, the entry of `DISPLAY_UNITS` or None.
-    """
+    """Return the table's units that the variables use."""
     used = {variable.get("unit") for variable in variables}
     return {
         unit: {"base": base, "display": DISPLAY_UNITS.get(unit)}
@@ -147,21 +101,7 @@ def _names(group: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
 
 
 def elements(group: Mapping[str, Any], sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
-    """Yield the variables of a group, as the template needs them.
-
-    Parameters
-    ----------
-    group
-        A group of the table.
-    sizes
-        From `group_sizes`.
-
-    Yields
-    ------
-    dict
-        Name, value reference, type, causality, variability, description and, where there are such, limits, unit, start,
-        nominal value and terminal.
-    """
+    """Yield the variables of a group, as the template needs them."""
     given = {key: group[key] for key in ("type", "causality", "variability")}
     where = {key: group[key] for key in ("initial", "unit", "min", "max", "start", "terminal") if key in group}
     if group["causality"] != "parameter" and group.get("unit") in NOMINAL_VALUES:
@@ -213,12 +153,8 @@ def _outputs(
     structure: Dependencies,
     late: bool,
 ) -> Iterator[dict[str, Any]]:
-    """Yield index and dependencies of the outputs.
-
-    late: forces may be those of earlier samples, so that no dependency has a fixed factor.
-
-    An output that `structure` does not know may depend on all elements of the inputs that its group names.
-    """
+    """Yield index and dependencies of the outputs."""
+    # late: forces may be those of earlier samples, so that no dependency has a fixed factor.
     groups = {group["name"]: group for group in present}
     for group in present:
         if group["causality"] != "output":

@@ -107,36 +107,8 @@ def build_fmu(
     fmi: int = 2,
     experiment: Mapping[str, float] | None = None,
 ) -> Path:
-    """Package the FMU of a finger description.
-
-    Parameters
-    ----------
-    finger
-        The finger, its description, or the file of it.
-    output_path
-        The FMU. It is written whole or not at all.
-    binaries
-        A folder of <FMI platform>/tendonfmu.<so, dll or dylib>, used instead of the installed ones; of FMI 3.0,
-        <FMI platform>/tendonfmu_fmi3.<so, dll or dylib>.
-    illustrated
-        Whether to add pictures and a page for readers. Packaging is faster without them.
-    extra
-        Other files of the archive, such as those of `related_members`: path -> content.
-    fmi
-        Version of FMI, 2 or 3.
-    experiment
-        `start`, `stop` and `step` (s) of the default experiment, where they are not those of `describe_model`.
-
-    Returns
-    -------
-    Path
-        `output_path`.
-
-    Raises
-    ------
-    InputError
-        The description is refused, binaries are missing, or the output cannot be written.
-    """
+    """Package the FMU of a finger description."""
+    # experiment: (s)
     content = members(read_finger(finger), binaries=binaries, illustrated=illustrated, fmi=fmi, experiment=experiment)
     archive = pack(content | dict(extra or {}))
     with whole_file(output_path) as file:
@@ -145,18 +117,7 @@ def build_fmu(
 
 
 def model_identifier(name: str) -> str:
-    """Return a name as a C identifier.
-
-    Parameters
-    ----------
-    name
-        Any name.
-
-    Returns
-    -------
-    str
-        `Zeigefinger, rechts` becomes `Zeigefinger_rechts`.
-    """
+    """Return a name as a C identifier."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii")
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
     if not identifier:
@@ -167,20 +128,7 @@ def model_identifier(name: str) -> str:
 
 
 def guid(resource: bytes, table: VariableTable) -> str:
-    """Return the identifier that the binary expects.
-
-    Parameters
-    ----------
-    resource
-        The model image, or the rig.
-    table
-        The table of variables that the binary was compiled with.
-
-    Returns
-    -------
-    str
-        "{xxxxxxxx-...}", from the resource and the table.
-    """
+    """Return the identifier that the binary expects."""
     return native.image_guid(resource, variable_generator().salt(table.data))
 
 
@@ -192,25 +140,7 @@ def members(
     fmi: int = 2,
     experiment: Mapping[str, float] | None = None,
 ) -> dict[str, bytes]:
-    """Return all files of the FMU.
-
-    Parameters
-    ----------
-    description
-        A valid description.
-    binaries, illustrated, fmi, experiment
-        See `build_fmu`.
-
-    Returns
-    -------
-    dict of bytes
-        Path in the archive -> content.
-
-    Raises
-    ------
-    InputError
-        Binaries are missing.
-    """
+    """Return all files of the FMU."""
     table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     identifier = model_identifier(description.name)
     version = VERSIONS[fmi]
@@ -248,20 +178,7 @@ def members(
 
 
 def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
-    """Draw a finger for the root of an FMU.
-
-    Parameters
-    ----------
-    finger
-        The finger.
-
-    Returns
-    -------
-    pictures : dict of bytes
-        Path in the archive -> PNG.
-    icon : bytes
-        The same, smaller.
-    """
+    """Draw a finger for the root of an FMU."""
     from tendonfmu.drawing import draw_finger
     from tendonfmu.model import finger_drawing
 
@@ -274,18 +191,7 @@ def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
 
 
 def package_file(path: str) -> Traversable:
-    """Return a file of the installed package.
-
-    Parameters
-    ----------
-    path
-        Path in the package.
-
-    Returns
-    -------
-    Traversable
-        The file, which need not exist.
-    """
+    """Return a file of the installed package."""
     return files("tendonfmu") / path
 
 
@@ -301,18 +207,7 @@ def variable_generator() -> ModuleType:
 
 
 def licenses(*names: str) -> dict[str, bytes]:
-    """Return the licence texts of an FMU, where FMI 2.0.4 wants them.
-
-    Parameters
-    ----------
-    names
-        `license.txt`, that of this project; `third_party.txt`, those of what its binary holds.
-
-    Returns
-    -------
-    dict of bytes
-        Path in the archive -> content.
-    """
+    """Return the licence texts of an FMU, where FMI 2.0.4 wants them."""
     return {f"documentation/licenses/{name}": package_file(f"licenses/{name}").read_bytes() for name in names}
 
 
@@ -321,29 +216,7 @@ def _sources(folder: str) -> dict[str, bytes]:
 
 
 def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
-    """Read the binaries of all platforms.
-
-    Parameters
-    ----------
-    folder
-        Folder of <platform>/<stem>.<suffix>, or None.
-    installed
-        Folder of the package that is used if `folder` is None.
-    stem
-        Name of the binaries without suffix.
-    identifier
-        Model identifier of the FMU.
-
-    Returns
-    -------
-    dict of bytes
-        <platform>/<identifier>.<suffix> -> content.
-
-    Raises
-    ------
-    InputError
-        The folder has no binary.
-    """
+    """Read the binaries of all platforms."""
     root: Traversable = package_file(installed) if folder is None else folder
     found = {}
     for platform in root.iterdir() if root.is_dir() else []:
@@ -357,25 +230,7 @@ def find_binaries(folder: Path | None, installed: str, stem: str, identifier: st
 
 
 def model_description(context: Mapping[str, Any], fmi: int = 2) -> bytes:
-    """Render the XML of an FMU, and check it with FMI's schema.
-
-    Parameters
-    ----------
-    context
-        Context of the template (modelDescription/README.md).
-    fmi
-        Version of FMI, 2 or 3.
-
-    Returns
-    -------
-    bytes
-        modelDescription.xml.
-
-    Raises
-    ------
-    InternalError
-        FMI's schema refuses the XML, or is not found.
-    """
+    """Render the XML of an FMU, and check it with FMI's schema."""
     version = VERSIONS[fmi]
     return checked(_render_xml(version.template, context), version.schema)
 
@@ -397,18 +252,7 @@ def _xml_template(name: str) -> jinja2.Template:
 
 
 def pack(content: Mapping[str, bytes]) -> bytes:
-    """Make a zip archive with fixed order, times and permissions.
-
-    Parameters
-    ----------
-    content
-        Path in the archive -> content.
-
-    Returns
-    -------
-    bytes
-        Members sorted by path, all of 1980-01-01 and readable by everyone.
-    """
+    """Make a zip archive with fixed order, times and permissions."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
         for path in sorted(content):

@@ -38,24 +38,12 @@ _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 @dataclass(frozen=True)
 class SetParameter:
-    """One parameter of a set.
+    """One parameter of a set."""
 
-    Attributes
-    ----------
-    path
-        Name of the FMU's variable.
-    value
-        In the unit of the variable.
-    standard_error
-        Of the value, in the same unit; None if it is not known.
-    identified
-        Whether the standard error is at most 30 % of the value.
-    """
-
-    path: str
-    value: float
-    standard_error: float | None = None
-    identified: bool = False
+    path: str  # name of the FMU's variable
+    value: float  # in the unit of the variable
+    standard_error: float | None = None  # of the value, in the same unit; None if it is not known
+    identified: bool = False  # whether the standard error is at most 30 % of the value
 
 
 def check_parameter_set_path(path: Path, *inputs: Path) -> None:
@@ -68,31 +56,7 @@ def check_parameter_set_path(path: Path, *inputs: Path) -> None:
 def write_parameter_set(
     path: Path, name: str, parameters: Sequence[SetParameter], finger: Finger, *, warnings: Sequence[str] = ()
 ) -> Path:
-    """Write a parameter set, whole or not at all.
-
-    Parameters
-    ----------
-    path
-        A .ssv file.
-    name
-        Name of the set.
-    parameters
-        The parameters, with names of `finger`'s.
-    finger
-        A finger, for the units.
-    warnings
-        Those of the fit, such as that its residuals are not white: standard errors are too small then.
-
-    Returns
-    -------
-    Path
-        `path`.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write a parameter set, whole or not at all."""
     with whole_file(path) as file:
         file.write_bytes(_parameter_set(name, parameters, finger, warnings))
     return path
@@ -139,25 +103,7 @@ def _annotation(parent: Any, kind: str) -> Any:
 
 
 def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:
-    """Read a parameter set, and check it against a finger.
-
-    Parameters
-    ----------
-    path
-        A .ssv file.
-    finger
-        The finger of the FMU.
-
-    Returns
-    -------
-    dict of float
-        Value by name, in the order of the file.
-
-    Raises
-    ------
-    InputError
-        The file is no parameter set, a name is none of the FMU's parameters, or the finger refuses a value.
-    """
+    """Read a parameter set, and check it against a finger."""
     from lxml import etree
 
     try:
@@ -196,25 +142,7 @@ def _entries(path: Path, root: Any) -> Iterator[tuple[str, float, str | None]]:
 
 
 def parameter_sets(paths: Sequence[Path], finger: Finger) -> list[Related]:
-    """Return parameter sets as related files of an FMU.
-
-    Parameters
-    ----------
-    paths
-        .ssv files with different names.
-    finger
-        The finger of the FMU.
-
-    Returns
-    -------
-    list of Related
-        With the role `parameter`.
-
-    Raises
-    ------
-    InputError
-        A file is refused (`read_parameter_set`), is not named .ssv, or two have the same name.
-    """
+    """Return parameter sets as related files of an FMU."""
     found: list[Related] = []
     for path in paths:
         if path.suffix.lower() != ".ssv":

@@ -50,67 +50,26 @@ Table = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Related:
-    """A file of the folder.
+    """A file of the folder."""
 
-    Attributes
-    ----------
-    name
-        Name in the folder.
-    content
-        The file.
-    role, kind
-        Role of fmi-ls-ref, and MIME type.
-    description
-        One sentence.
-    """
-
-    name: str
-    content: bytes
-    role: str
+    name: str  # name in the folder
+    content: bytes  # the file
+    role: str  # role of fmi-ls-ref, and MIME type
     kind: str
-    description: str
+    description: str  # one sentence
 
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """The run of a finger over a recording, as an FMU carries it.
+    """The run of a finger over a recording, as an FMU carries it."""
 
-    Attributes
-    ----------
-    files
-        Experiment, inputs, outputs and options.
-    experiment
-        `start`, `stop` and `step` (s), for the DefaultExperiment of the FMU.
-    """
-
-    files: list[Related]
-    experiment: dict[str, float]
+    files: list[Related]  # experiment, inputs, outputs and options
+    experiment: dict[str, float]  # `start`, `stop` and `step` (s), for the DefaultExperiment of the FMU
 
 
 def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False) -> ReferenceRun:
-    """Run a finger over a recording; inputs, outputs and tolerance become files.
-
-    Parameters
-    ----------
-    finger
-        The finger of the FMU.
-    recording
-        Signals of the same finger, for tendon positions as the source of the kinematics. Time starts at 0 in the files.
-        Samples that are not evenly spaced are interpolated to the median step.
-    arrays
-        Whether the variables of the FMU are arrays, as of FMI 3.0: a cell then has the numbers of all elements,
-        separated by spaces. Else they are scalars of their own, such as `joint_torque[2]`.
-
-    Returns
-    -------
-    ReferenceRun
-        The files, and the span and step of the run.
-
-    Raises
-    ------
-    InputError
-        The recording does not fit the finger, or has fewer than two samples.
-    """
+    """Run a finger over a recording; inputs, outputs and tolerance become files."""
+    # arrays: [2]
     grid, step = _on_grid(finger, recording)
     outputs = run_model(finger, grid)
     # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
@@ -154,20 +113,7 @@ def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False)
 
 
 def bridged_rows(recording: Recording) -> tuple[int, int]:
-    """Count the rows that `reference_run` interpolates over gaps.
-
-    Parameters
-    ----------
-    recording
-        Two samples or more.
-
-    Returns
-    -------
-    rows : int
-        All rows of the inputs.
-    bridged : int
-        Those among them without a sample nearby: in steps of more than 1.5 median steps.
-    """
+    """Count the rows that `reference_run` interpolates over gaps."""
     steps = np.diff(recording.time)
     median = float(np.median(steps))
     lost = np.rint(steps[steps > GAP * median] / median) - 1
@@ -175,18 +121,7 @@ def bridged_rows(recording: Recording) -> tuple[int, int]:
 
 
 def related_members(related: Sequence[Related]) -> dict[str, bytes]:
-    """Return the members of an FMU for related files.
-
-    Parameters
-    ----------
-    related
-        At least one file, each with another name.
-
-    Returns
-    -------
-    dict of bytes
-        Path in the FMU -> content: the files, their manifest, and a note for readers. Empty without files.
-    """
+    """Return the members of an FMU for related files."""
     if not related:
         return {}
     files = {f"{FOLDER}/{each.name}": each.content for each in related}

@@ -35,18 +35,7 @@ Outputs = dict[str, NDArray[Any]]
 
 
 def check_model(model: Path) -> None:
-    """Check that a file exists and may be a description or an FMU.
-
-    Parameters
-    ----------
-    model
-        FINGER.json or FINGER.fmu.
-
-    Raises
-    ------
-    InputError
-        The file is missing, or is a recording.
-    """
+    """Check that a file exists and may be a description or an FMU."""
     if model.suffix.lower() in FORMATS:
         raise InputError(f"{model}: a recording; expected FINGER.json or FINGER.fmu here, and the recording after it")
     if not model.is_file():
@@ -54,23 +43,7 @@ def check_model(model: Path) -> None:
 
 
 def finger_of(model: Path) -> Finger | None:
-    """Return the description of a model.
-
-    Parameters
-    ----------
-    model
-        FINGER.json, or FINGER.fmu, which contains the description.
-
-    Returns
-    -------
-    Finger or None
-        None for an FMU without a description.
-
-    Raises
-    ------
-    InputError
-        The description is refused.
-    """
+    """Return the description of a model."""
     if model.suffix.lower() == ".json":
         return read_finger(model)
     try:
@@ -84,18 +57,8 @@ def finger_of(model: Path) -> Finger | None:
 
 
 def columns_of(outputs: Mapping[str, NDArray[Any]]) -> Outputs:
-    """Return outputs as columns of a table.
-
-    Parameters
-    ----------
-    outputs
-        Outputs by name, [N] or [N, k].
-
-    Returns
-    -------
-    dict of arrays
-        Columns [N], such as `joint_torque[2]`, in the same order.
-    """
+    """Return outputs as columns of a table."""
+    # outputs: [N]; returns columns [N], such as `joint_torque[2]`, in the same order
     columns: Outputs = {}
     for name, values in outputs.items():
         if values.ndim == 1:
@@ -106,18 +69,8 @@ def columns_of(outputs: Mapping[str, NDArray[Any]]) -> Outputs:
 
 
 def outputs_of(columns: Mapping[str, NDArray[Any]]) -> Outputs:
-    """Join the columns name[1], name[2], ... to [N, k]; columns without an index stay as they are.
-
-    Parameters
-    ----------
-    columns
-        Columns [N] of a table, as `columns_of` makes them.
-
-    Returns
-    -------
-    dict of arrays
-        Outputs by name, [N] or [N, k].
-    """
+    """Join the columns name[1], name[2], ... to [N, k]; columns without an index stay as they are."""
+    # columns: [N]; returns outputs by name, [N] or [N, k]
     groups: dict[str, list[NDArray[Any]]] = {}
     for name, column in columns.items():
         groups.setdefault(name.partition("[")[0], []).append(column)
@@ -125,18 +78,7 @@ def outputs_of(columns: Mapping[str, NDArray[Any]]) -> Outputs:
 
 
 def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
-    """Describe the outputs in a line whose figures reveal a wrong unit.
-
-    Parameters
-    ----------
-    outputs
-        Outputs by name, from `run_model`.
-
-    Returns
-    -------
-    str
-        Number of samples, duration, range of the joint angles, and samples in contact.
-    """
+    """Describe the outputs in a line whose figures reveal a wrong unit."""
     time, angles = outputs["time"], outputs["joint_angle"]
     return (
         f"{counted(len(time), 'sample')} in {time[-1] - time[0]:.6g} s, "
@@ -148,31 +90,8 @@ def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
 def run_model(
     model: FingerSource, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
 ) -> Outputs:
-    """Run a finger or an FMU over a recording.
-
-    A finger runs in the C library, which gives the same bits as its FMU.
-
-    Parameters
-    ----------
-    model
-        A finger, its description, the file of it, or an FMU.
-    recording
-        Signals of the same finger.
-    kinematics_source
-        1, 2 or 3.
-    progress
-        Called with the number of samples done.
-
-    Returns
-    -------
-    dict of arrays
-        `time` [N], then the FMU's outputs by name, [N] or [N, k].
-
-    Raises
-    ------
-    InputError
-        The model or the recording is refused, or they do not fit.
-    """
+    """Run a finger or an FMU over a recording."""
+    # returns `time` [N], then the FMU's outputs by name, [N] or [N, k]
     if isinstance(model, str | os.PathLike):
         file = model if isinstance(model, Path) else Path(model)
         check_model(file)

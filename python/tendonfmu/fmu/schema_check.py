@@ -9,27 +9,7 @@ from tendonfmu.errors import InternalError
 
 
 def checked(xml: bytes, schema: str) -> bytes:
-    """Return the XML if FMI's schema accepts it.
-
-    The schemas come with fmpy, but fmpy is not imported, which would take half a second.
-
-    Parameters
-    ----------
-    xml
-        Content of a file.
-    schema
-        Path in fmpy's folder of schemas.
-
-    Returns
-    -------
-    bytes
-        `xml`.
-
-    Raises
-    ------
-    InternalError
-        The schema refuses it, or is not found.
-    """
+    """Return the XML if FMI's schema accepts it."""
     from lxml import etree
 
     spec = importlib.util.find_spec("fmpy")

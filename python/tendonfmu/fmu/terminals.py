@@ -32,20 +32,7 @@ SCALE = 0.1  # mm for a unit of coordinates
 
 
 def terminals_and_icons(variables: Sequence[Mapping[str, Any]], icon: bytes | None) -> dict[str, bytes]:
-    """Return the folder `terminalsAndIcons` of an FMU.
-
-    Parameters
-    ----------
-    variables
-        All variables, as the template of the XML gets them; the key `terminal` names the terminal of one.
-    icon
-        A small picture as PNG. Without one, nothing is said about drawing.
-
-    Returns
-    -------
-    dict of bytes
-        Path in the archive -> content.
-    """
+    """Return the folder `terminalsAndIcons` of an FMU."""
     from lxml import etree
     from lxml.builder import ElementMaker
 

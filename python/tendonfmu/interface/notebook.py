@@ -11,24 +11,7 @@ Row = Sequence[str]
 def html_of(
     title: str, tables: Iterable[tuple[str, Row, Sequence[Row]]], lines: Iterable[str], warnings: Iterable[str] = ()
 ) -> str:
-    """Return a result as an HTML element.
-
-    Parameters
-    ----------
-    title
-        What it is.
-    tables
-        (title, headings, rows) each, as the commands print them.
-    lines
-        Sentences below.
-    warnings
-        Remarks that the user should read; a list at the end.
-
-    Returns
-    -------
-    str
-        HTML with all texts escaped.
-    """
+    """Return a result as an HTML element."""
     parts = [f"<p><b>{escape(title)}</b></p>"]
     for caption, headings, rows in tables:
         parts += ["<table>", f'<caption style="text-align: left">{escape(caption)}</caption>', _row("th", headings)]

@@ -157,20 +157,7 @@ OPTIONS: dict[str, Number | Kind | Texts | Paths | Function] = {
 
 
 def read_option(name: str, value: Any) -> Any:
-    """Return the value of an option as a plain one.
-
-    Parameters
-    ----------
-    name
-        One of `OPTIONS`; what goes by another name, such as a recording, is returned as it is.
-    value
-        As given. Numbers of numpy are numbers.
-
-    Raises
-    ------
-    InputError
-        The value has another type or is out of range.
-    """
+    """Return the value of an option as a plain one."""
     option = OPTIONS.get(name)
     if option is None:
         return value
@@ -181,13 +168,7 @@ def read_option(name: str, value: Any) -> Any:
 
 
 def with_checked_options(function: Callable[Given, Found]) -> Callable[Given, Found]:
-    """Check the options of a function, which are given by name, before it begins.
-
-    Parameters
-    ----------
-    function
-        A function of the interface.
-    """
+    """Check the options of a function, which are given by name, before it begins."""
 
     @wraps(function)
     def checked(*sources: Given.args, **options: Given.kwargs) -> Found:

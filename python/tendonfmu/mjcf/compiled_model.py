@@ -21,90 +21,46 @@ KINDS = ("free", "ball", "slide", "hinge")  # of joints, in the order of MuJoCo'
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the model.
+    """A joint of the model."""
 
-    Attributes
-    ----------
-    name, kind
-        Name, and one of `KINDS`.
-    index, body
-        In the model, from 0.
-    position, velocity
-        Place of its first coordinate in MuJoCo's qpos and qvel.
-    limits
-        (rad; m of a slide), or None.
-    stiffness, rest
-        Of its spring (N·m/rad; rad).
-    damping, frictionloss, armature
-        (N·m·s/rad; N·m; kg·m²).
-    is_nonlinear
-        Whether its spring or damper has terms of higher order.
-    """
-
-    name: str
+    name: str  # name, and one of `KINDS`
     kind: str
-    index: int
+    index: int  # in the model, from 0
     body: int
-    position: int
+    position: int  # place of its first coordinate in MuJoCo's qpos and qvel
     velocity: int
-    limits: tuple[float, float] | None
-    stiffness: float
+    limits: tuple[float, float] | None  # (rad; m of a slide), or None
+    stiffness: float  # of its spring (N·m/rad; rad)
     rest: float
-    damping: float
+    damping: float  # (N·m·s/rad; N·m; kg·m²)
     frictionloss: float
     armature: float
-    is_nonlinear: bool
+    is_nonlinear: bool  # whether its spring or damper has terms of higher order
 
 
 @dataclass(frozen=True)
 class Tendon:
-    """A tendon of the model.
+    """A tendon of the model."""
 
-    Attributes
-    ----------
-    name
-        Name.
-    index
-        In the model, from 0.
-    is_spatial
-        Whether it runs through sites and around geoms. A fixed tendon is a sum of joint angles times coefficients.
-    stiffness, damping, frictionloss, armature
-        (N/m; N·s/m; N; kg).
-    is_limited
-        Whether its length has limits.
-    """
-
-    name: str
-    index: int
-    is_spatial: bool
-    stiffness: float
+    name: str  # name
+    index: int  # in the model, from 0
+    is_spatial: bool  # whether it runs through sites and around geoms
+    stiffness: float  # (N/m; N·s/m; N; kg)
     damping: float
     frictionloss: float
     armature: float
-    is_limited: bool
+    is_limited: bool  # whether its length has limits
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """An actuator that acts on a joint or a tendon.
+    """An actuator that acts on a joint or a tendon."""
 
-    Attributes
-    ----------
-    name
-        Name.
-    tendon, joint
-        Index of what it acts on; the other is None.
-    gear
-        Force on the tendon or joint per unit of actuator force.
-    position_gain
-        Force per length of a position servo (N/m), else None.
-    """
-
-    name: str
-    tendon: int | None
+    name: str  # name
+    tendon: int | None  # index of what it acts on; the other is None
     joint: int | None
-    gear: float
-    position_gain: float | None
+    gear: float  # force on the tendon or joint per unit of actuator force
+    position_gain: float | None  # force per length of a position servo (N/m), else None
 
 
 def _library() -> Any:
@@ -116,18 +72,7 @@ def _library() -> Any:
 
 
 class CompiledModel:
-    """A model that MuJoCo has compiled, with the joint angles at which it is evaluated.
-
-    Parameters
-    ----------
-    path
-        An MJCF file.
-
-    Raises
-    ------
-    InputError
-        MuJoCo is missing or refuses the file; the message has MuJoCo's text.
-    """
+    """A model that MuJoCo has compiled, with the joint angles at which it is evaluated."""
 
     def __init__(self, path: Path) -> None:
         if not path.is_file():
@@ -200,43 +145,11 @@ class CompiledModel:
         )
 
     def joint_named(self, name: str) -> Joint:
-        """Return a joint by its name.
-
-        Parameters
-        ----------
-        name
-            Name in the model.
-
-        Returns
-        -------
-        Joint
-            The joint.
-
-        Raises
-        ------
-        InputError
-            The model has no such joint.
-        """
+        """Return a joint by its name."""
         return self.joints[self._index_of("joint", name, [joint.name for joint in self.joints])]
 
     def tendon_named(self, name: str) -> Tendon:
-        """Return a tendon by its name.
-
-        Parameters
-        ----------
-        name
-            Name in the model.
-
-        Returns
-        -------
-        Tendon
-            The tendon.
-
-        Raises
-        ------
-        InputError
-            The model has no such tendon.
-        """
+        """Return a tendon by its name."""
         return self.tendons[self._index_of("tendon", name, [tendon.name for tendon in self.tendons])]
 
     def _index_of(self, kind: str, name: str, names: list[str]) -> int:
@@ -276,13 +189,8 @@ class CompiledModel:
             compute(m, d)
 
     def tendon_jacobian(self) -> Numbers:
-        """Return the change of each tendon's length by each velocity of the model at the angles placed.
-
-        Returns
-        -------
-        ndarray
-            [tendons, velocities] (m/rad; 1 of a slide).
-        """
+        """Return the change of each tendon's length by each velocity of the model at the angles placed."""
+        # returns [tendons, velocities] (m/rad; 1 of a slide)
         m, d = self._model, self._data
         # Until version 3.3 the structure of a sparse matrix was in the data, and a dense one was kept as it is.
         owner = m if hasattr(m, "ten_J_rownnz") else d
@@ -324,25 +232,7 @@ class CompiledModel:
         return np.array(self._data.xmat[body]).reshape(3, 3), np.array(self._data.xpos[body])
 
     def point(self, name: str) -> tuple[int, Numbers]:
-        """Return body and place [3] (m, world frame) of a site, geom or body.
-
-        Parameters
-        ----------
-        name
-            Its name.
-
-        Returns
-        -------
-        int
-            Index of its body.
-        ndarray
-            Its place at the angles placed.
-
-        Raises
-        ------
-        InputError
-            The model has none of this name.
-        """
+        """Return body and place [3] (m, world frame) of a site, geom or body."""
         m, d, kinds = self._model, self._data, self._mujoco.mjtObj
         for kind, bodies, places in (
             (kinds.mjOBJ_SITE, m.site_bodyid, d.site_xpos),

@@ -29,64 +29,29 @@ WEIGHTLESS = 0.02  # share of the largest holding torque that `gravity` rows may
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """What is taken from a model.
+    """What is taken from a model."""
 
-    Attributes
-    ----------
-    joints
-        Names of joints, base first.
-    tendons
-        Names of tendons; None takes all that are driven and move a joint.
-    ranges
-        Ranges of joints by name (rad), in place of the model's limits.
-    bidirectional
-        Names of tendons that are cable loops.
-    tip
-        Site, geom or body that is the fingertip; None leaves `links` out.
-    gravity
-        Whether to write the links' weight as rows `gravity`.
-    stiffness
-        Of tendons whose stiffness the model does not have (N/m); None takes them as rigid.
-    tolerance
-        Share up to which a moment arm counts as constant.
-    threshold
-        `contact.threshold` of all joints (N·m).
-    name
-        Of the finger; None takes the model's.
-    """
-
-    joints: Sequence[str]
-    tendons: Sequence[str] | None = None
+    joints: Sequence[str]  # names of joints, base first
+    tendons: Sequence[str] | None = None  # names of tendons; None takes all that are driven and move a joint
+    # ranges of joints by name (rad), in place of the model's limits
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    bidirectional: Sequence[str] = ()
-    tip: str | None = None
-    gravity: bool = False
-    stiffness: float | None = None
-    tolerance: float = 0.02
-    threshold: float = 0.03
-    name: str | None = None
+    bidirectional: Sequence[str] = ()  # names of tendons that are cable loops
+    tip: str | None = None  # site, geom or body that is the fingertip; None leaves `links` out
+    gravity: bool = False  # whether to write the links' weight as rows `gravity`
+    stiffness: float | None = None  # of tendons whose stiffness the model does not have (N/m); None takes them as rigid
+    tolerance: float = 0.02  # share up to which a moment arm counts as constant
+    threshold: float = 0.03  # `contact.threshold` of all joints (N·m)
+    name: str | None = None  # of the finger; None takes the model's
 
 
 @dataclass(frozen=True)
 class ImportedFinger:
-    """A description made from a model.
+    """A description made from a model."""
 
-    Attributes
-    ----------
-    data
-        The description.
-    notes
-        Where numbers come from that the model has in another form.
-    warnings
-        What the description has less exactly than the model, with figures.
-    left_out
-        What of these joints and tendons the description does not have.
-    """
-
-    data: dict[str, Any]
-    notes: list[str]
-    warnings: list[str]
-    left_out: list[str]
+    data: dict[str, Any]  # the description
+    notes: list[str]  # where numbers come from that the model has in another form
+    warnings: list[str]  # what the description has less exactly than the model, with figures
+    left_out: list[str]  # what of these joints and tendons the description does not have
 
     @property
     def text(self) -> str:
@@ -108,25 +73,7 @@ class ImportedFinger:
 
 
 def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
-    """Make a finger description from a MuJoCo model.
-
-    Parameters
-    ----------
-    path
-        An MJCF file.
-    settings
-        Which joints and tendons, and what of them.
-
-    Returns
-    -------
-    ImportedFinger
-        A valid description, and what it does not have.
-
-    Raises
-    ------
-    InputError
-        MuJoCo refuses the model, a joint or tendon is not in it, or they make no finger; one line that names it.
-    """
+    """Make a finger description from a MuJoCo model."""
     model = CompiledModel(path)
     joints = _chain(model, settings.joints)
     ranges, notes = joint_ranges(model, joints, settings.ranges)
@@ -196,27 +143,8 @@ def _carries(model: CompiledModel, base: Joint, other: Joint) -> bool:
 def joint_ranges(
     model: CompiledModel, joints: Sequence[Joint], given: Mapping[str, tuple[float, float]]
 ) -> tuple[Numbers, list[str]]:
-    """Return the ranges of joints.
-
-    Parameters
-    ----------
-    model, joints
-        The model and its joints.
-    given
-        Ranges by name, in place of the model's limits (rad).
-
-    Returns
-    -------
-    Numbers
-        [n, 2] (rad).
-    list of str
-        A note on each range that had to be guessed.
-
-    Raises
-    ------
-    InputError
-        A range is given for another joint.
-    """
+    """Return the ranges of joints."""
+    # given: (rad); returns [n, 2] (rad)
     names = [joint.name for joint in joints]
     for name in given:
         if name not in names:
@@ -248,18 +176,8 @@ def _inertia_rows(model: CompiledModel, joints: Sequence[Joint]) -> Iterator[dic
 
 
 def links_inertia(model: CompiledModel, joints: Sequence[Joint]) -> Numbers:
-    """Return the links' inertia about each joint, in the middle of the model's joint ranges.
-
-    Parameters
-    ----------
-    model, joints
-        The model and its joints.
-
-    Returns
-    -------
-    Numbers
-        [n] (kg·m²), without armature.
-    """
+    """Return the links' inertia about each joint, in the middle of the model's joint ranges."""
+    # returns [n] (kg·m²), without armature
     ranges, _ = joint_ranges(model, joints, {})
     model.place(joints, ranges.mean(axis=1))
     return np.array(np.diag(model.inertia(joints)), dtype=np.float64)

@@ -13,20 +13,8 @@ NONE = 1e-9  # N·m
 
 
 def holding_torques(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Numbers:
-    """Return the torques that hold the links' weight.
-
-    Parameters
-    ----------
-    model, joints
-        The model and its joints.
-    angles
-        Where to evaluate [K, n] (rad).
-
-    Returns
-    -------
-    Numbers
-        [K, n] (N·m).
-    """
+    """Return the torques that hold the links' weight."""
+    # angles: [K, n] (rad); returns [K, n] (N·m)
     rows = []
     for each in angles:
         model.place(joints, each)
@@ -35,25 +23,8 @@ def holding_torques(model: CompiledModel, joints: Sequence[Joint], angles: Numbe
 
 
 def gravity_rows(angles: Numbers, torques: Numbers, axes: Numbers | None) -> tuple[list[dict[str, Any]], float]:
-    """Fit rows `gravity` to torques.
-
-    Parameters
-    ----------
-    angles
-        [K, n] (rad).
-    torques
-        Torques that hold the weight [K, n] (N·m).
-    axes
-        Axes of the joints at angle 0 [n, 3], of length 1, if the description has links. Without links the model takes
-        all axes as parallel.
-
-    Returns
-    -------
-    list of dict
-        One row for each joint whose weight is felt.
-    float
-        Largest torque that the rows miss (N·m).
-    """
+    """Fit rows `gravity` to torques."""
+    # angles: [K, n] (rad); torques: [K, n] (N·m); axes: [n, 3]; returns largest torque that the rows miss (N·m)
     n = angles.shape[1]
     columns = []
     for last in range(n):

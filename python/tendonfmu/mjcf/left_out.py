@@ -22,22 +22,8 @@ def left_out(
     has_gravity: bool,
     has_links: bool,
 ) -> list[str]:
-    """List what an import leaves out.
-
-    Parameters
-    ----------
-    model, joints, tendons
-        The model, and what of it makes the finger.
-    angles
-        Angles that cover the joints' ranges [K, n] (rad).
-    has_gravity, has_links
-        Whether the description has the links' weight and geometry.
-
-    Returns
-    -------
-    list of str
-        Each names joints, tendons, actuators or constraints, and what they have.
-    """
+    """List what an import leaves out."""
+    # angles: [K, n] (rad)
     rows = [
         *_of_joints(model, joints, angles),
         *_of_tendons(model, joints, tendons, angles),

@@ -14,45 +14,15 @@ from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers
 
 @dataclass(frozen=True)
 class LinkGeometry:
-    """Where the joints are.
+    """Where the joints are."""
 
-    Attributes
-    ----------
-    links
-        Rows of the description's `links` [n].
-    tip
-        Place of the fingertip in the frame of the last link [3] (m).
-    axes
-        Axes of the joints at angle 0 [n, 3], of length 1.
-    """
-
-    links: list[dict[str, Any]]
-    tip: list[float]
-    axes: Numbers
+    links: list[dict[str, Any]]  # rows of the description's `links` [n]
+    tip: list[float]  # place of the fingertip in the frame of the last link [3] (m)
+    axes: Numbers  # axes of the joints at angle 0 [n, 3], of length 1
 
 
 def link_geometry(model: CompiledModel, joints: Sequence[Joint], tip: str) -> LinkGeometry:
-    """Read the links' geometry with all joints at angle 0.
-
-    The base frame is that of the body that carries the first joint's body.
-
-    Parameters
-    ----------
-    model, joints
-        The model and its hinges, base first.
-    tip
-        Name of a site, geom or body on the last link.
-
-    Returns
-    -------
-    LinkGeometry
-        For the keys `links` and `tip`.
-
-    Raises
-    ------
-    InputError
-        There is no such site, geom or body, or it is not on the last link.
-    """
+    """Read the links' geometry with all joints at angle 0."""
     model.place(joints, np.zeros(len(joints)))
     body, place = model.point(tip)
     if joints[-1].body not in model.ancestors(body):

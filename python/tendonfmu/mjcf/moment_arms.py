@@ -23,41 +23,19 @@ WORTH = 0.8  # the line must leave no more than this share of the deviation from
 
 @dataclass(frozen=True)
 class MomentArm:
-    """Moment arm of a tendon at a joint.
+    """Moment arm of a tendon at a joint."""
 
-    Attributes
-    ----------
-    arm, slope
-        arm + slope·q_j (m; m/rad). The slope is 0 where a constant is good enough, or a line is no better.
-    low, high
-        Least and largest over all joint ranges (m).
-    varies
-        Largest deviation from the constant, as a share of the largest magnitude.
-    left
-        The same with the slope.
-    """
-
-    arm: float
+    arm: float  # arm + slope·q_j (m; m/rad)
     slope: float
-    low: float
+    low: float  # least and largest over all joint ranges (m)
     high: float
-    varies: float
-    left: float
+    varies: float  # largest deviation from the constant, as a share of the largest magnitude
+    left: float  # the same with the slope
 
 
 def sampled_angles(ranges: Numbers) -> Numbers:
-    """Return angles that cover the ranges of all joints.
-
-    Parameters
-    ----------
-    ranges
-        Least and largest angle of each joint [n, 2] (rad).
-
-    Returns
-    -------
-    Numbers
-        [K, n] (rad): each joint along its range with the others in the middle, then points spread over all ranges.
-    """
+    """Return angles that cover the ranges of all joints."""
+    # ranges: [n, 2] (rad); returns [K, n] (rad)
     low, high = ranges[:, 0], ranges[:, 1]
     rows = [np.tile((low + high) / 2, (STEPS, 1)) for _ in ranges]
     for j, row in enumerate(rows):
@@ -69,22 +47,8 @@ def sampled_angles(ranges: Numbers) -> Numbers:
 def moment_arms(
     model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], angles: Numbers, tolerance: float
 ) -> list[list[MomentArm]]:
-    """Read the moment arms of a model.
-
-    Parameters
-    ----------
-    model, joints, tendons
-        The model, and which of its joints and tendons.
-    angles
-        Where to evaluate [K, n] (rad).
-    tolerance
-        Share of the largest magnitude up to which an arm counts as constant.
-
-    Returns
-    -------
-    list of list of MomentArm
-        [m][n].
-    """
+    """Read the moment arms of a model."""
+    # angles: [K, n] (rad); returns [m][n]
     rows, columns = [tendon.index for tendon in tendons], [joint.velocity for joint in joints]
     found = np.empty((len(angles), len(tendons), len(joints)))
     for k, each in enumerate(angles):

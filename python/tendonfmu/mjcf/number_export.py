@@ -31,22 +31,12 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Change:
-    """A number of the model that differs.
+    """A number of the model that differs."""
 
-    Attributes
-    ----------
-    kind, name
-        "joint" or "tendon", and its name.
-    attribute
-        Attribute of MJCF.
-    before, after
-        In SI units.
-    """
-
-    kind: str
+    kind: str  # "joint" or "tendon", and its name
     name: str
-    attribute: str
-    before: float
+    attribute: str  # attribute of MJCF
+    before: float  # in SI units
     after: float
 
     def line(self) -> str:
@@ -57,18 +47,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Export:
-    """What was written.
+    """What was written."""
 
-    Attributes
-    ----------
-    changes
-        Numbers that differ from the model's.
-    left_out
-        What MJCF cannot express of the description, and numbers that the description does not have.
-    """
-
-    changes: list[Change]
-    left_out: list[str]
+    changes: list[Change]  # numbers that differ from the model's
+    left_out: list[str]  # what MJCF cannot express of the description, and numbers that the description does not have
 
     def report(self, finger: Path, model: Path, output: Path) -> dict[str, Any]:
         """Return what was done, for `--json`. finger, model, output: files of the description, and of both models."""
@@ -83,27 +65,7 @@ class Export:
 
 
 def export_numbers(finger: Path, path: Path, output: Path) -> Export:
-    """Write the numbers of a description into a model.
-
-    Parameters
-    ----------
-    finger
-        File of a description whose joints and tendons have the names of the model's.
-    path
-        An MJCF file.
-    output
-        The file to write. Where the model refers to other files it must be in the folder of the model.
-
-    Returns
-    -------
-    Export
-        What has changed, and what is left out.
-
-    Raises
-    ------
-    InputError
-        The description or the model is refused, or a joint or tendon is not in the model or not in its XML.
-    """
+    """Write the numbers of a description into a model."""
     data = read_finger(finger).data
     model = CompiledModel(path)
     joints = [model.joint_named(name) for name in _names(finger, data, "joints")]

@@ -15,20 +15,8 @@ RIGID = 1e9  # N/m; as of a machine with one joint, whose drive counts as rigid
 
 
 def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> NDArray[np.bool_]:
-    """Return which velocities of the model each tendon moves.
-
-    Parameters
-    ----------
-    model, joints
-        The model and the joints of the finger.
-    angles
-        Where to look [K, n] (rad).
-
-    Returns
-    -------
-    ndarray of bool
-        [tendons, velocities].
-    """
+    """Return which velocities of the model each tendon moves."""
+    # angles: [K, n] (rad); returns [tendons, velocities]
     largest = np.zeros((len(model.tendons), 0))
     for each in angles[:: max(1, len(angles) // 32)]:
         model.place(joints, each)
@@ -40,27 +28,8 @@ def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numb
 def choose_tendons(
     model: CompiledModel, joints: Sequence[Joint], angles: Numbers, names: Sequence[str] | None
 ) -> list[Tendon]:
-    """Return the tendons of a finger.
-
-    Parameters
-    ----------
-    model, joints
-        The model and the joints of the finger.
-    angles
-        Angles that cover the joints' ranges [K, n] (rad).
-    names
-        Names of tendons, or None: all that are driven and move a joint of the finger.
-
-    Returns
-    -------
-    list of Tendon
-        In the order given, or in that of the model.
-
-    Raises
-    ------
-    InputError
-        A tendon is not in the model, is given twice or moves none of the joints; or there is none.
-    """
+    """Return the tendons of a finger."""
+    # angles: [K, n] (rad)
     velocities = [joint.velocity for joint in joints]
     moves = np.array(moved_velocities(model, joints, angles)[:, velocities].any(axis=1), ndmin=1)
     if names is None:
@@ -85,18 +54,7 @@ def choose_tendons(
 
 
 def motors_of(model: CompiledModel, tendon: Tendon) -> list[Joint]:
-    """Return the slides with an actuator that pull a tendon.
-
-    Parameters
-    ----------
-    model, tendon
-        The model and one of its tendons.
-
-    Returns
-    -------
-    list of Joint
-        Those that change its length at the reference.
-    """
+    """Return the slides with an actuator that pull a tendon."""
     model.place([], np.empty(0))
     row = np.abs(model.tendon_jacobian()[tendon.index])
     driven = {actuator.joint for actuator in model.actuators}
@@ -108,38 +66,13 @@ def motors_of(model: CompiledModel, tendon: Tendon) -> list[Joint]:
 
 
 def is_driven(model: CompiledModel, tendon: Tendon) -> bool:
-    """Return whether an actuator acts on a tendon, or on a slide that pulls it.
-
-    Parameters
-    ----------
-    model, tendon
-        The model and one of its tendons.
-
-    Returns
-    -------
-    bool
-        Whether something drives it.
-    """
+    """Return whether an actuator acts on a tendon, or on a slide that pulls it."""
     return any(actuator.tendon == tendon.index for actuator in model.actuators) or bool(motors_of(model, tendon))
 
 
 def stiffness_of(model: CompiledModel, tendon: Tendon, otherwise: float | None) -> tuple[float, str]:
-    """Return the stiffness of a tendon between its drive and the finger.
-
-    Parameters
-    ----------
-    model, tendon
-        The model and one of its tendons.
-    otherwise
-        For a tendon whose stiffness the model does not have (N/m); None: it counts as rigid.
-
-    Returns
-    -------
-    float
-        (N/m).
-    str
-        Where it comes from.
-    """
+    """Return the stiffness of a tendon between its drive and the finger."""
+    # otherwise: (N/m); returns (N/m)
     own = [actuator for actuator in model.actuators if actuator.tendon == tendon.index]
     gains = [actuator.position_gain for actuator in own if actuator.position_gain]
     if gains:
@@ -152,18 +85,7 @@ def stiffness_of(model: CompiledModel, tendon: Tendon, otherwise: float | None) 
 
 
 def drives_of(model: CompiledModel, tendon: Tendon) -> Iterator[str]:
-    """Yield what to record of each drive of a tendon.
-
-    Parameters
-    ----------
-    model, tendon
-        The model and one of its tendons.
-
-    Yields
-    ------
-    str
-        Which signal of the recording is which of the model.
-    """
+    """Yield what to record of each drive of a tendon."""
     for actuator in model.actuators:
         if actuator.tendon == tendon.index:
             yield f"tendon_force is {-actuator.gear:g} times the force of actuator {actuator.name}"

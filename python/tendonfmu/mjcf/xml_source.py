@@ -18,36 +18,15 @@ _SEARCHED = {"joint": ("worldbody", ("joint",)), "tendon": ("tendon", (FIXED, SP
 
 @dataclass(frozen=True)
 class Inclusion:
-    """An <include> whose content stands in its place.
+    """An <include> whose content stands in its place."""
 
-    Attributes
-    ----------
-    element
-        The <include>, taken out of the tree.
-    content
-        The elements that stand in its place.
-    folder
-        Folder of the file.
-    """
-
-    element: Any
-    content: list[Any]
-    folder: Path
+    element: Any  # the <include>, taken out of the tree
+    content: list[Any]  # the elements that stand in its place
+    folder: Path  # folder of the file
 
 
 class XmlSource:
-    """The XML of a model and of the files that it includes.
-
-    Parameters
-    ----------
-    path
-        An MJCF file that MuJoCo accepts.
-
-    Raises
-    ------
-    InputError
-        It, or a file that it includes, is not XML.
-    """
+    """The XML of a model and of the files that it includes."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -73,10 +52,7 @@ class XmlSource:
             parent.remove(include)
 
     def _included_file(self, include: Any) -> Path:
-        """Return the file of an <include>: beside the main file or beside the file that includes it, as in MuJoCo.
-
-        The name is then that from the main file, which will hold the <include> if the file around it is put in place.
-        """
+        """Return the file of an <include>: beside the main file or beside the file that includes it, as in MuJoCo."""
         name, main = include.get("file", ""), self.path.parent
         around = {include, *include.iterancestors()}
         folder = next((each.folder for each in reversed(self._inclusions) if around & set(each.content)), main)
@@ -85,25 +61,7 @@ class XmlSource:
         return main / str(include.get("file", ""))
 
     def element(self, kind: str, name: str) -> Any:
-        """Return the element of a joint or tendon.
-
-        Parameters
-        ----------
-        kind
-            "joint" or "tendon".
-        name
-            Its name.
-
-        Returns
-        -------
-        lxml element
-            The element.
-
-        Raises
-        ------
-        InputError
-            No element has this name, such as that of a joint which <replicate> or <attach> makes.
-        """
+        """Return the element of a joint or tendon."""
         section, tags = _SEARCHED[kind]
         for part in self._tree.getroot().iter(section):
             for element in part.iter(*tags):
@@ -115,22 +73,7 @@ class XmlSource:
         )
 
     def set_number(self, kind: str, name: str, attribute: str, value: float) -> None:
-        """Write a number of a joint or tendon, which then holds whatever its default class says.
-
-        Parameters
-        ----------
-        kind, name
-            As of `element`.
-        attribute
-            Attribute of MJCF.
-        value
-            The number, in the unit of the file.
-
-        Raises
-        ------
-        InputError
-            See `element`.
-        """
+        """Write a number of a joint or tendon, which then holds whatever its default class says."""
         element = self.element(kind, name)
         element.set(attribute, repr(float(value)))
         self._changed.append(element)
@@ -142,13 +85,7 @@ class XmlSource:
         return 1.0 if unit == "radian" else math.pi / 180
 
     def text(self) -> bytes:
-        """Return the XML. Of included files only those with changed numbers stand in the text.
-
-        Returns
-        -------
-        bytes
-            UTF-8.
-        """
+        """Return the XML. Of included files only those with changed numbers stand in the text."""
         for inclusion in reversed(self._inclusions):  # those within others first
             if not self._is_changed(inclusion):
                 _take_back(inclusion)

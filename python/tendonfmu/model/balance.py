@@ -24,43 +24,14 @@ _NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
 def moment_arms(data: Mapping[str, Any]) -> Numbers:
-    """Return the routing matrix R of a description.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    Numbers
-        [m, n] (m).
-    """
+    """Return the routing matrix R of a description."""
+    # returns [m, n] (m)
     return np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
 
 
 def pretension_vector(data: Mapping[str, Any]) -> Numbers:
-    """Return the tendon forces per newton of pretension.
-
-    The forces solve Rᵀ ν = 0, have mean 1, and are as equal as this allows (nearest to ones). Every tendon that only
-    pulls gets at least `LEAST_SHARE` of the mean. Method: Dykstra's alternating projections onto the null space and the
-    allowed shares.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    Numbers
-        ν [m]. All zeros for a finger that has only cable loops and cannot be pretensioned.
-
-    Raises
-    ------
-    InputError
-        The pulling tendons cannot hold each other in balance.
-    """
+    """Return the tendon forces per newton of pretension."""
+    # returns [m]
     arms = moment_arms(data)
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
@@ -83,21 +54,7 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
 
 
 def friction_probe(data: Mapping[str, Any]) -> native.Instance:
-    """Make a finger that computes the friction model only.
-
-    It does not track the bias and detects no contact; q and q̇ are inputs. Its `friction_torque` and `bias_torque`
-    contain the model alone: the bias moves only by the jumps of fig. 5.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    native.Instance
-        With kinematics source 3.
-    """
+    """Make a finger that computes the friction model only."""
     bias = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
     for key in ("noise_std", "noise_std_per_force", "forget_rate", "noise_time"):
         if (data.get("bias") or {}).get(key) is not None:
@@ -108,24 +65,10 @@ def friction_probe(data: Mapping[str, Any]) -> native.Instance:
 
 
 def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
-    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0).
-
-    T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is unknown.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    motion
-        `time` [N] (s), `joint_position` [N, n] (rad) and `joint_velocity` [N, n] (rad/s).
-    pretension
-        Mean tendon force [N] (N), or balanced tensions [N, m] (N) to use instead of pretension·ν.
-
-    Returns
-    -------
-    Numbers
-        Tendon forces [N, m] (N).
-    """
+    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0)."""
+    # T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is
+    # unknown.
+    # motion: [N] (s); pretension: [N] (N); returns tendon forces [N, m] (N)
     finger = friction_probe(data)
     start = finger.save_state()
     spread = np.linalg.pinv(moment_arms(data))

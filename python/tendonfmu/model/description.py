@@ -154,37 +154,24 @@ FingerSource = Finger | Mapping[str, Any] | str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Counts:
-    """What a finger has, in numbers.
-
-    Attributes
-    ----------
-    moment_arms, stiffness
-        Least and largest magnitude (m; N/m), without moment arms of 0.
-    laws
-        Number of laws by kind. Each working point counts; an asymmetric law counts once.
-    extensions
-        Their effects, in order.
-    parameters, tunable_parameters
-        Numbers of parameters of the FMU.
-    estimated_numbers
-        Counts of the numbers that a fit estimates, biases included (see `estimated_numbers()`).
-    """
+    """What a finger has, in numbers."""
 
     name: str
     joint_names: list[str]
     tendon_names: list[str]
     bidirectional_tendons: int
-    moment_arms: tuple[float, float]
+    moment_arms: tuple[float, float]  # least and largest magnitude (m; N/m), without moment arms of 0
     stiffness: tuple[float, float]
     pulleys: int
     edges: int
     working_points: int
-    laws: dict[str, int]
+    laws: dict[str, int]  # number of laws by kind
     asymmetric_laws: int
     covers: int
-    extensions: list[str]
-    parameters: int
+    extensions: list[str]  # their effects, in order
+    parameters: int  # numbers of parameters of the FMU
     tunable_parameters: int
+    # counts of the numbers that a fit estimates, biases included (see `estimated_numbers()`)
     estimated_numbers: dict[str, int]
 
     @property
@@ -232,18 +219,7 @@ def read_finger(source: FingerSource) -> Finger:
 
 
 def finger_file(source: object) -> Path:
-    """Return the file that a source of a finger names.
-
-    Parameters
-    ----------
-    source
-        A path.
-
-    Raises
-    ------
-    InputError
-        It is no path, or it is the text of a description.
-    """
+    """Return the file that a source of a finger names."""
     expected = "expected a path, a dictionary or a Finger"
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"finger: {type(source).__name__}; {expected}")
@@ -255,48 +231,12 @@ def finger_file(source: object) -> Path:
 
 
 def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
-    """Make a finger from parsed JSON.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    path
-        Name of the finger in error messages.
-
-    Returns
-    -------
-    Finger
-        A description that the native reader has accepted.
-
-    Raises
-    ------
-    InputError
-        One line that starts with the path.
-    """
+    """Make a finger from parsed JSON."""
     return finger_from_text(path, description_text(data).encode())
 
 
 def finger_from_text(path: Path, text: bytes) -> Finger:
-    """Read the text of a finger description.
-
-    Parameters
-    ----------
-    path
-        The file that the text is from, for messages.
-    text
-        JSON in UTF-8.
-
-    Returns
-    -------
-    Finger
-        A description that the native reader has accepted.
-
-    Raises
-    ------
-    InputError
-        One line that starts with the path.
-    """
+    """Read the text of a finger description."""
     _check_format(path, text)
     try:
         image = native.image_from_json(text)
@@ -374,11 +314,7 @@ def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
 
 
 def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
-    """Count the numbers that a fit estimates, by kind.
-
-    Absent terms stay absent: viscous 0 means no viscous friction, static equal to coulomb means no Stribeck effect. So
-    a side has up to four numbers. A cover has its stiffness, an extension all its numbers, and every joint a bias.
-    """
+    """Count the numbers that a fit estimates, by kind."""
     counts = dict.fromkeys(("friction", "load_friction", "pulley_friction", "edge_friction"), 0)
     for kind, law in laws(data):
         counts[kind] += sum(_numbers_of_side(side) for side in sides(law))
@@ -389,18 +325,7 @@ def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
 
 
 def sides(law: Law) -> list[Law]:
-    """Return the sides of a law.
-
-    Parameters
-    ----------
-    law
-        A law of a valid description.
-
-    Returns
-    -------
-    list of Law
-        One side that holds for both directions, or the positive and the negative side.
-    """
+    """Return the sides of a law."""
     return [law] if law.get("positive") is None else [law["positive"], law["negative"]]
 
 
@@ -419,18 +344,7 @@ def _range(values: Iterable[float]) -> tuple[float, float]:
 
 
 def count(description: Finger) -> Counts:
-    """Count what a description holds.
-
-    Parameters
-    ----------
-    description
-        A valid description.
-
-    Returns
-    -------
-    Counts
-        Numbers of joints, tendons, laws, extensions and parameters.
-    """
+    """Count what a description holds."""
     data = description.data
     found = list(laws(data))
     parameters = native.Instance(description.image).parameters()

@@ -9,22 +9,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class EffectNumber:
-    """A number of an extension, in SI units.
+    """A number of an extension, in SI units."""
 
-    Attributes
-    ----------
-    least, most
-        Its range.
-    missing
-        Its value where it is left out; None if it is required.
-    scale
-        Its expected magnitude.
-    """
-
-    least: float
+    least: float  # its range
     most: float
-    missing: float | None
-    scale: float
+    missing: float | None  # its value where it is left out; None if it is required
+    scale: float  # its expected magnitude
 
 
 # Default by path: SI units.

@@ -9,20 +9,7 @@ from tendonfmu.model.description_defaults import DEFAULTS
 
 
 def number_of(data: Mapping[str, Any], path: str) -> float:
-    """Return a number of a finger description, or its default where it is left out.
-
-    Parameters
-    ----------
-    data
-        The description as read from JSON.
-    path
-        Path of a number outside lists that has a default, such as "bias.noise_std".
-
-    Returns
-    -------
-    float
-        SI units.
-    """
+    """Return a number of a finger description, or its default where it is left out."""
     node: Any = data
     for key in path.split("."):
         node = (node or {}).get(key)

@@ -19,45 +19,12 @@ _PADDED = ("pulley_friction", "edge_friction")  # short lists stand for lists wi
 
 
 def steps_of(path: str) -> list[Step]:
-    """Split a path into keys and indices.
-
-    Parameters
-    ----------
-    path
-        Path of a number of a description.
-
-    Returns
-    -------
-    list of str or int
-        Keys, and indices from 0.
-    """
+    """Split a path into keys and indices."""
     return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]
 
 
 def with_values_at(data: dict[str, Any], values: Mapping[str, Any], instance: Instance) -> dict[str, Any]:
-    """Write values into a description, in place, and return it.
-
-    Objects and lists that are absent are made. A list gets the numbers that the model assumes without it.
-
-    Parameters
-    ----------
-    data
-        Parsed description, which may be changed.
-    values
-        JSON values by path.
-    instance
-        The model of `data`.
-
-    Returns
-    -------
-    dict
-        `data`. It may be no valid description.
-
-    Raises
-    ------
-    InputError
-        A path is malformed, or leads to no place.
-    """
+    """Write values into a description, in place, and return it."""
     for path, value in values.items():
         if not isinstance(path, str) or not _PATH.fullmatch(path):
             raise InputError(f"{path!r}: expected a path such as tendons[1].stiffness or contact.threshold[1]")

@@ -10,13 +10,7 @@ _WIDTH = 160  # longest line of JSON that is not broken: a law with all digits f
 
 
 def description_text(data: Mapping[str, Any]) -> str:
-    """Return a description as JSON with each law, or list of numbers, on one line.
-
-    Parameters
-    ----------
-    data
-        Parsed description.
-    """
+    """Return a description as JSON with each law, or list of numbers, on one line."""
     return _laid_out(data, "") + "\n"
 
 

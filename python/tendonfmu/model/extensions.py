@@ -21,58 +21,22 @@ LEFT_OUT: Mapping[str, float] = {
 
 @dataclass(frozen=True)
 class ExtensionNumber:
-    """A number of an extension.
+    """A number of an extension."""
 
-    Attributes
-    ----------
-    effect
-        Effect of the extension.
-    path
-        Path as in the description.
-    value
-        In SI units.
-    magnitude
-        Expected size of such a number.
-    left_out
-        Whether the description leaves it out, or has the value that stands for leaving it out.
-    """
-
-    effect: str
-    path: str
-    value: float
-    magnitude: float
-    left_out: bool = False
+    effect: str  # effect of the extension
+    path: str  # path as in the description
+    value: float  # in SI units
+    magnitude: float  # expected size of such a number
+    left_out: bool = False  # whether the description leaves it out, or has the value that stands for leaving it out
 
 
 def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the extensions of a description.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    list of dict
-        The rows, [] if the key is missing.
-    """
+    """Return the extensions of a description."""
     return list(data.get("extensions") or [])
 
 
 def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
-    """Yield all numbers of the extensions of a description.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Yields
-    ------
-    ExtensionNumber
-        In the order of the FMU's parameters.
-    """
+    """Yield all numbers of the extensions of a description."""
     for k, row in enumerate(extension_rows(data), start=1):
         for name, magnitude in MAGNITUDES[row["effect"]].items():
             missing = LEFT_OUT.get(name, 0.0)
@@ -82,39 +46,13 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
 
 
 def place_of(row: Mapping[str, Any]) -> str:
-    """Describe an extension as an appendix to a text.
-
-    Parameters
-    ----------
-    row
-        A row of `extensions`.
-
-    Returns
-    -------
-    str
-        Such as `, of load_friction at joint 2, tendon 1`.
-    """
+    """Describe an extension as an appendix to a text."""
     where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
     return f", of {row['effect']}" + (f" at {where}" if where else "")
 
 
 def extended_row(data: Mapping[str, Any], effect: str, place: Any) -> Mapping[str, Any] | None:
-    """Return the last extension of an effect at a place.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    effect
-        Effect of the extension.
-    place
-        Has `joint` and `tendon`, each from 1 or None.
-
-    Returns
-    -------
-    dict or None
-        The row, or None if there is none.
-    """
+    """Return the last extension of an effect at a place."""
     own = [row for row in extension_rows(data) if row["effect"] == effect]
     at = [row for row in own if (row.get("joint"), row.get("tendon")) == (place.joint, place.tendon)]
     return at[-1] if at else None

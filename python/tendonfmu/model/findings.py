@@ -9,48 +9,24 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong, or probably is.
+    """Something that is wrong, or probably is."""
 
-    Attributes
-    ----------
-    severity
-        "error" (no fit of it is sound) or "warning".
-    kind
-        Of a recording: "sign", "exchange", "scale", "clock", "unfit", "columns", "pushing", "against", "held",
-        "clipped", "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover",
-        "friction", "angles" or "threshold".
-    path
-        The recording or description.
-    columns
-        Columns of the recording, or keys of the description.
-    seen
-        The observation, with numbers.
-    probably
-        Its probable cause.
-    write
-        What to do about it.
-    entries
-        For each column, what to write into its entry of the map of columns: "sign", "scale", or "exchange" with the
-        name of another column.
-    """
-
-    severity: str
+    severity: str  # "error" (no fit of it is sound) or "warning"
+    # of a recording: "sign", "exchange", "scale", "clock", "unfit", "columns", "pushing", "against", "held", "clipped",
+    # "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover", "friction", "angles"
+    # or "threshold"
     kind: str
-    path: Path
-    columns: tuple[str, ...]
-    seen: str
-    probably: str
-    write: str
+    path: Path  # the recording or description
+    columns: tuple[str, ...]  # columns of the recording, or keys of the description
+    seen: str  # the observation, with numbers
+    probably: str  # its probable cause
+    write: str  # what to do about it
+    # for each column, what to write into its entry of the map of columns: "sign", "scale", or "exchange" with the name
+    # of another column
     entries: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
 
     def line(self) -> str:
-        """Return the whole finding in one line.
-
-        Returns
-        -------
-        str
-            Starts with the file.
-        """
+        """Return the whole finding in one line."""
         where = f"{self.path}: {_listed(self.columns)}: " if self.columns else f"{self.path}: "
         return f"{where}{self.seen}; probably {self.probably}; {self.write}"
 

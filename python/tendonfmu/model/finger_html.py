@@ -15,20 +15,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#5A5A5A", "#
 
 
 def finger_html(lines: Sequence[str], drawing: FingerDrawing) -> str:
-    """Return a finger as an HTML element.
-
-    Parameters
-    ----------
-    lines
-        Lines of `Finger.summary`: a title, then names and values in two columns.
-    drawing
-        Geometry of its routing.
-
-    Returns
-    -------
-    str
-        HTML with all texts escaped.
-    """
+    """Return a finger as an HTML element."""
     rows = [(name.rstrip(), value) for name, _, value in (line.partition("  ") for line in lines[1:])]
     tendons = [
         {

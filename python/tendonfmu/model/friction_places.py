@@ -18,31 +18,15 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effect:
-    """One friction effect: an F_A, F_B, T_jv0 or T_jvf.
+    """One friction effect: an F_A, F_B, T_jv0 or T_jvf."""
 
-    Attributes
-    ----------
-    path
-        Path as in the description, such as "tendons[1].edge_friction[2]".
-    kind
-        Its key there.
-    joint, tendon
-        Place, from 1. Tendon 0: friction in a joint.
-    drive
-        The joint whose ẋ_ij or q̇_j slides it.
-    angles
-        Working points [k] (rad) over the angle of joint `joint` − 1. Empty for a single law.
-    laws
-        One law for each working point, or a single one.
-    """
-
-    path: str
-    kind: str
-    joint: int
+    path: str  # path as in the description, such as "tendons[1].edge_friction[2]"
+    kind: str  # its key there
+    joint: int  # place, from 1
     tendon: int
-    drive: int
-    angles: tuple[float, ...]
-    laws: tuple[Law, ...]
+    drive: int  # the joint whose ẋ_ij or q̇_j slides it
+    angles: tuple[float, ...]  # working points [k] (rad) over the angle of joint `joint` − 1
+    laws: tuple[Law, ...]  # one law for each working point, or a single one
 
     @property
     def law_paths(self) -> list[str]:
@@ -51,18 +35,7 @@ class Effect:
 
 
 def effects(data: Mapping[str, Any]) -> list[Effect]:
-    """Return all friction effects of a description that can slide.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    list of Effect
-        First those in joints, then those at tendons.
-    """
+    """Return all friction effects of a description that can slide."""
     return [*_in_joints(data), *_at_tendons(data)]
 
 
@@ -86,40 +59,13 @@ def _at_tendons(data: Mapping[str, Any]) -> Iterator[Effect]:
 
 
 def velocity_threshold(data: Mapping[str, Any], effect: Effect) -> float:
-    """Return v_min of an effect.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    effect
-        One of its effects.
-
-    Returns
-    -------
-    float
-        m/s for a tendon's effect, rad/s for a joint's.
-    """
+    """Return v_min of an effect."""
     return number_of(data, f"velocity_threshold.{'tendon' if effect.tendon else 'joint'}")
 
 
 def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Numbers) -> Numbers:
-    """Return the velocity that slides an effect.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    effect
-        One of its effects.
-    joint_velocity
-        [N, n] (rad/s).
-
-    Returns
-    -------
-    Numbers
-        [N]: ẋ_ij (m/s, eq. 5) of a tendon's effect, q̇_j (rad/s) of a joint's.
-    """
+    """Return the velocity that slides an effect."""
+    # joint_velocity: [N, n] (rad/s); returns [N] (rad/s)
     if not effect.tendon:
         return joint_velocity[:, effect.drive - 1]
     arms = moment_arms(data)[effect.tendon - 1]
@@ -127,20 +73,8 @@ def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Nu
 
 
 def working_point_weights(effect: Effect, joint_position: Numbers) -> Numbers:
-    """Return the weight of each law of an effect in its value, by linear interpolation.
-
-    Parameters
-    ----------
-    effect
-        A friction effect.
-    joint_position
-        [N, n] (rad). q_0 = 0.
-
-    Returns
-    -------
-    Numbers
-        [N, k]. Ones for a single law.
-    """
+    """Return the weight of each law of an effect in its value, by linear interpolation."""
+    # joint_position: [N, n] (rad); returns [N, k]. Ones for a single law
     if not effect.angles:
         return np.ones((len(joint_position), 1))
     angle = joint_position[:, effect.joint - 2] if effect.joint > 1 else np.zeros(len(joint_position))

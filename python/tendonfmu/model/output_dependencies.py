@@ -41,21 +41,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Structure:
-    """The part of a description that decides on dependencies.
+    """The part of a description that decides on dependencies."""
 
-    Attributes
-    ----------
-    data
-        The description.
-    passes
-        [m, n], true where a tendon has a moment arm.
-    inverse
-        [n, m], true where R⁺ has an entry.
-    """
-
-    data: Mapping[str, Any]
-    passes: np.ndarray[Any, np.dtype[np.bool_]]
-    inverse: np.ndarray[Any, np.dtype[np.bool_]]
+    data: Mapping[str, Any]  # the description
+    passes: np.ndarray[Any, np.dtype[np.bool_]]  # [m, n], true where a tendon has a moment arm
+    inverse: np.ndarray[Any, np.dtype[np.bool_]]  # [n, m], true where R⁺ has an entry
 
     @property
     def tendons(self) -> int:
@@ -67,18 +57,7 @@ class Structure:
 
 
 def structure_of(description: Finger) -> Structure:
-    """Return the structure of a finger.
-
-    Parameters
-    ----------
-    description
-        A valid description.
-
-    Returns
-    -------
-    Structure
-        With R⁺ as the runtime computes it.
-    """
+    """Return the structure of a finger."""
     passes = np.array(description.moment_arms) != 0.0
     inverse = _inverse_routing(description.image, *passes.shape) != 0.0
     if description.data.get("sensor_fault") is not None:  # when a sensor is left out, R⁺ changes everywhere
@@ -95,18 +74,7 @@ def _inverse_routing(image: bytes, tendons: int, joints: int) -> np.ndarray[Any,
 
 
 def dependencies(structure: Structure) -> Dependencies:
-    """Return the inputs that can affect each output.
-
-    Parameters
-    ----------
-    structure
-        Structure of the finger.
-
-    Returns
-    -------
-    Dependencies
-        For each output and element (0-based), the elements of each input, 0-based and ascending.
-    """
+    """Return the inputs that can affect each output."""
     n, m = structure.joints, structure.tendons
     torques = [_torque(structure, j) for j in range(n)]
     by_joint = [_inputs(structure, motion, set(range(m))) for motion in torques]
@@ -157,10 +125,7 @@ def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:
-    """Return the inputs that determine joint angles and velocities, and forces that have a direct effect.
-
-    Source 1 takes both from forces and positions by R⁺, source 2 velocities from positions, source 3 both as measured.
-    """
+    """Return the inputs that determine joint angles and velocities, and forces that have a direct effect."""
     moving = motion.angles | motion.velocities
     tendons = {i for j in moving for i in range(structure.tendons) if structure.inverse[j, i]}
     return {
@@ -172,10 +137,7 @@ def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str,
 
 
 def _torque(structure: Structure, j: int) -> Motion:
-    """Return the motion that friction and bias of joint j depend on, besides the forces.
-
-    All forces affect them at every joint: the noise in the Kalman gain depends on the mean of |f0|.
-    """
+    """Return the motion that friction and bias of joint j depend on, besides the forces."""
     joint = structure.data["joints"][j]
     motion = Motion()
     if joint.get("cover") is not None:
@@ -194,11 +156,7 @@ def _torque(structure: Structure, j: int) -> Motion:
 
 
 def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Motion:
-    """Return the motion that the torque of an extension at joint j depends on, besides the forces and numbers.
-
-    Effects that are not named here change signals or friction, and their result depends on the same inputs as before. A
-    delay depends on those of earlier samples, and on the present ones as soon as its number is 0.
-    """
+    """Return the motion that the torque of an extension at joint j depends on, besides the forces and numbers."""
     effect, place, tendon = extension["effect"], (extension.get("joint") or 0) - 1, (extension.get("tendon") or 0) - 1
     if effect == "gravity":
         return _weight(structure, place, j)
@@ -220,10 +178,7 @@ def _weight(structure: Structure, link: int, j: int) -> Motion:
 
 
 def _axis_cosine(structure: Structure, joint: int, other: int) -> float:
-    """Return the cosine of the angle between two axes, 1 without links.
-
-    It is rounded as in the runtime, where a cosine of 0 means no dependency.
-    """
+    """Return the cosine of the angle between two axes, 1 without links."""
     links = structure.data.get("links")
     if links is None:
         return 1.0

@@ -29,18 +29,7 @@ UNREACHED = 1e-6  # of the torque that the tendons should make
 
 
 def description_findings(finger: Finger) -> list[Finding]:
-    """Find implausible values of a valid description.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-
-    Returns
-    -------
-    list of Finding
-        Warnings, in the order of the description's keys.
-    """
+    """Find implausible values of a valid description."""
     data = finger.data
     arms = np.asarray(finger.moment_arms, dtype=float)
     rows = [
@@ -59,20 +48,8 @@ def description_findings(finger: Finger) -> list[Finding]:
 
 
 def is_direct_drive(arms: Numbers) -> bool:
-    """Return whether all moment arms are 1 m.
-
-    This is a machine without tendons, whose radians, or metres, may be large.
-
-    Parameters
-    ----------
-    arms
-        Routing matrix R [m, n] (m).
-
-    Returns
-    -------
-    bool
-        True if every arm that is not 0 is 1 m or −1 m.
-    """
+    """Return whether all moment arms are 1 m."""
+    # arms: [m, n] (m)
     return bool(np.all(np.abs(arms[arms != 0.0]) == 1.0))
 
 

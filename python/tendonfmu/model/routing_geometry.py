@@ -54,72 +54,33 @@ class DrawnJoint:
 
 @dataclass(frozen=True)
 class DrawnTendon:
-    """A tendon from its spring to its end.
+    """A tendon from its spring to its end."""
 
-    Attributes
-    ----------
-    name
-        Name of the tendon.
-    line, spring
-        Points [k, 2].
-    pulleys
-        Points [k, 2] with pulley friction.
-    edges, varying_edges
-        Points [k, 2] with friction before a joint, without and with working points.
-    bidirectional
-        Whether it is a cable loop.
-    """
-
-    name: str
-    line: Points
+    name: str  # name of the tendon
+    line: Points  # points [k, 2]
     spring: Points
-    pulleys: Points
-    edges: Points
+    pulleys: Points  # points [k, 2] with pulley friction
+    edges: Points  # points [k, 2] with friction before a joint, without and with working points
     varying_edges: Points
-    bidirectional: bool
+    bidirectional: bool  # whether it is a cable loop
 
 
 @dataclass(frozen=True)
 class FingerDrawing:
-    """Geometry of a whole finger.
+    """Geometry of a whole finger."""
 
-    Attributes
-    ----------
-    name
-        Name of the finger.
-    joints, tendons
-        What is drawn of them.
-    links
-        [n, 2] x of begin and end of the link behind each joint.
-    outline
-        [k, 3] x, lower and upper side of the finger around its tendons.
-    left, right, height
-        Bounds; y reaches from −height to height.
-    """
-
-    name: str
-    joints: list[DrawnJoint]
-    links: Points
-    outline: Points
+    name: str  # name of the finger
+    joints: list[DrawnJoint]  # what is drawn of them
+    links: Points  # [n, 2] x of begin and end of the link behind each joint
+    outline: Points  # [k, 3] x, lower and upper side of the finger around its tendons
     tendons: list[DrawnTendon]
-    left: float
+    left: float  # bounds; y reaches from −height to height
     right: float
     height: float
 
 
 def finger_drawing(description: Described) -> FingerDrawing:
-    """Compute the geometry of a finger.
-
-    Parameters
-    ----------
-    description
-        A valid description, up to 16 joints and 64 tendons.
-
-    Returns
-    -------
-    FingerDrawing
-        In units of the drawing.
-    """
+    """Compute the geometry of a finger."""
     R: Points = np.array(description.moment_arms)
     heights = _heights(R)
     x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))

@@ -42,35 +42,11 @@ INPUTS_OF_SOURCE = {
 
 
 def inputs_used(source: int, watches_motors: bool) -> tuple[str, ...]:
-    """Return the inputs that a finger needs.
-
-    Parameters
-    ----------
-    source
-        Kinematics, 1 to 3.
-    watches_motors
-        Whether the finger has contact.rest or sensor_fault, which need tendon positions.
-
-    Returns
-    -------
-    tuple of str
-        Names of the groups.
-    """
+    """Return the inputs that a finger needs."""
     used = INPUTS_OF_SOURCE[source]
     return used if "tendon_position" in used or not watches_motors else (*used, "tendon_position")
 
 
 def watches_motors(data: Mapping[str, Any]) -> bool:
-    """Return whether a finger needs tendon positions with every kinematics source.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    bool
-        True if it has contact.rest or sensor_fault.
-    """
+    """Return whether a finger needs tendon positions with every kinematics source."""
     return (data.get("contact") or {}).get("rest") is not None or data.get("sensor_fault") is not None

@@ -41,103 +41,49 @@ COARSE = {"tendon_force": 0.05, "tendon_position": 2e-5, "joint_position": 2e-3}
 
 @dataclass(frozen=True)
 class Clock:
-    """The time steps of a recording.
+    """The time steps of a recording."""
 
-    Attributes
-    ----------
-    step
-        Median step (s).
-    unit
-        Factor to seconds and name of the unit in which the times seem to be given, or None.
-    senseless
-        Whether no control loop has such a sample rate.
-    lost
-        Number of missing samples.
-    gaps
-        Indices of the first sample after each gap.
-    jitter
-        Standard deviation of the other steps over the median step.
-    """
-
-    step: float
+    step: float  # median step (s)
+    # factor to seconds and name of the unit in which the times seem to be given, or None
     unit: tuple[float, str] | None
-    senseless: bool
-    lost: int
-    gaps: tuple[int, ...]
-    jitter: float
+    senseless: bool  # whether no control loop has such a sample rate
+    lost: int  # number of missing samples
+    gaps: tuple[int, ...]  # indices of the first sample after each gap
+    jitter: float  # standard deviation of the other steps over the median step
 
 
 @dataclass(frozen=True)
 class Clipped:
-    """A channel that repeats its largest or smallest value and reaches it at speed.
+    """A channel that repeats its largest or smallest value and reaches it at speed."""
 
-    Attributes
-    ----------
-    column
-        Name of the column.
-    value
-        The repeated value, in the unit of the column.
-    share
-        Share of the samples that have it.
-    runs
-        Number of times that the channel reaches it.
-    is_top
-        Whether it is the largest value, not the smallest.
-    """
-
-    column: str
-    value: float
-    share: float
-    runs: int
-    is_top: bool
+    column: str  # name of the column
+    value: float  # the repeated value, in the unit of the column
+    share: float  # share of the samples that have it
+    runs: int  # number of times that the channel reaches it
+    is_top: bool  # whether it is the largest value, not the smallest
 
 
 @dataclass(frozen=True)
 class Coarse:
-    """A channel whose steps are coarse compared with its motion.
+    """A channel whose steps are coarse compared with its motion."""
 
-    Attributes
-    ----------
-    column
-        Name of the column.
-    step
-        Width of its steps, in its unit.
-    range
-        Range of its values, in its unit.
-    """
-
-    column: str
-    step: float
-    range: float
+    column: str  # name of the column
+    step: float  # width of its steps, in its unit
+    range: float  # range of its values, in its unit
 
 
 @dataclass(frozen=True)
 class Held:
-    """A channel that holds a value although other channels show that it should change.
+    """A channel that holds a value although other channels show that it should change."""
 
-    Attributes
-    ----------
-    column
-        Name of the column.
-    value
-        The value that it holds.
-    share
-        Share of the samples in which it does.
-    first
-        Begin and end of the first such time (s).
-    """
-
-    column: str
-    value: float
-    share: float
-    first: tuple[float, float]
+    column: str  # name of the column
+    value: float  # the value that it holds
+    share: float  # share of the samples in which it does
+    first: tuple[float, float]  # begin and end of the first such time (s)
 
 
 def read_clock(time: Numbers) -> Clock | None:
-    """Return the time steps of a recording, or None for too few samples.
-
-    time: [N] s, strictly increasing.
-    """
+    """Return the time steps of a recording, or None for too few samples."""
     if len(time) <= FEWEST_STEPS:
         return None
     steps = np.diff(time)
@@ -161,11 +107,7 @@ def read_clock(time: Numbers) -> Clock | None:
 
 
 def clipped_channels(recording: Recording, finger: Finger) -> Iterator[Clipped]:
-    """Find forces, positions and angles that saturate.
-
-    A turning point of a smooth signal also repeats its extreme value, but the signal approaches it slowly. A motor or a
-    joint that rests at its extreme is not a fault: the other channels rest there as well.
-    """
+    """Find forces, positions and angles that saturate."""
     for name in COARSE:
         for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
             for is_top in (True, False):
@@ -204,11 +146,7 @@ def _resolution(column: Numbers) -> float:
 
 
 def _bulges(expected: Numbers, run: tuple[int, int], resolution: float) -> bool:
-    """Return whether the other channels show that the channel rises and falls within a run, by more than noise.
-
-    The test compares the middle half of the run with its ends. A joint that sticks and then slips jumps behind the run,
-    not within it.
-    """
+    """Return whether the other channels show that the channel rises and falls within a run, by more than noise."""
     inside = expected[run[0] : run[1]]
     eighth = len(inside) // 8
     if not eighth:
@@ -229,10 +167,8 @@ def coarse_channels(recording: Recording) -> Iterator[Coarse]:
 
 
 def held_channels(recording: Recording, finger: Finger) -> list[Held]:
-    """Find channels that hold a value while others change.
-
-    These are stuck sensors, and channels that never change while most of their group do.
-    """
+    """Find channels that hold a value while others change."""
+    # These are stuck sensors, and channels that never change while most of their group do.
     by_column: dict[str, list[StuckSensor]] = {}
     for sensor in stuck_sensors(recording, finger):
         by_column.setdefault(sensor.column, []).append(sensor)

@@ -18,26 +18,7 @@ FORMAT = "tendonfmu-check-1"
 def check_report(
     file: Path, kind: str, lines: Sequence[str], findings: Sequence[Finding], recordings: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Return the report on a sound finger description or rig.
-
-    Parameters
-    ----------
-    file
-        The description or rig.
-    kind
-        "finger" or "rig".
-    lines
-        What it is, in words.
-    findings
-        What looks wrong in the description.
-    recordings
-        From `recording_report`, in order.
-
-    Returns
-    -------
-    dict
-        Ready for JSON.
-    """
+    """Return the report on a sound finger description or rig."""
     return {
         "format": FORMAT,
         "file": str(file),

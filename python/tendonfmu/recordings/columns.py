@@ -34,34 +34,7 @@ def element_of(column: str) -> tuple[str, int] | None:
 
 
 def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> list[str]:
-    """Return the columns of a table that a recording has.
-
-    Warns once of all the others.
-
-    Parameters
-    ----------
-    file
-        Name of the table in messages.
-    names
-        All columns.
-    known
-        Columns that are read in addition to `time` and the groups.
-
-    Returns
-    -------
-    list of str
-        Columns to read, in the order of the table.
-
-    Raises
-    ------
-    InputError
-        A column is missing, or one of ours in another spelling.
-
-    Warns
-    -----
-    InputWarning
-        Columns are ignored.
-    """
+    """Return the columns of a table that a recording has."""
     for separator in ";\t":
         if len(names) == 1 and separator in names[0]:
             raise InputError(
@@ -88,18 +61,8 @@ def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> li
 
 
 def right_spelling(column: str) -> str | None:
-    """Return the right name of a column that is one of ours in another spelling.
-
-    Parameters
-    ----------
-    column
-        A name that is none of ours, such as `Tendon_Force_01`.
-
-    Returns
-    -------
-    str or None
-        The right name, such as `tendon_force[1]`; None if it is not like one of ours.
-    """
+    """Return the right name of a column that is one of ours in another spelling."""
+    # returns [1]
     match = _ONE_OF_OURS.fullmatch(re.sub(r"[\s_.\-()\[\]{}]", "", column).lower())
     if match is None:
         return None
@@ -128,20 +91,7 @@ def _check_groups(file: Path, elements: Sequence[tuple[str, int]]) -> None:
 
 
 def check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
-    """Refuse groups of tendons that differ in their number of columns, and groups of joints likewise.
-
-    Parameters
-    ----------
-    file
-        Name of the table in messages.
-    sizes
-        Number of columns by group.
-
-    Raises
-    ------
-    InputError
-        Two groups differ.
-    """
+    """Refuse groups of tendons that differ in their number of columns, and groups of joints likewise."""
     first: dict[str, str] = {}
     for name, size in sizes.items():
         other = first.setdefault(GROUP_PER[name], name)

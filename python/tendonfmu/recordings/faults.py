@@ -32,24 +32,12 @@ _OF_RANGE = 0.05  # of the range in the whole recording; a channel is stuck only
 
 @dataclass(frozen=True)
 class StuckSensor:
-    """A channel that holds one value although it should change.
+    """A channel that holds one value although it should change."""
 
-    Attributes
-    ----------
-    group
-        Name of the group, as in `recording.GROUPS`.
-    element
-        Index in the group, from 1.
-    value
-        The value that it holds, in the unit of the group.
-    begin, end
-        First sample, and the one after the last.
-    """
-
-    group: str
-    element: int
-    value: float
-    begin: int
+    group: str  # name of the group, as in `recording.GROUPS`
+    element: int  # index in the group, from 1
+    value: float  # the value that it holds, in the unit of the group
+    begin: int  # first sample, and the one after the last
     end: int
 
     @property
@@ -59,18 +47,8 @@ class StuckSensor:
 
 
 def gaps(time: Numbers) -> list[int]:
-    """Return the first samples after gaps or jumps of the clock.
-
-    Parameters
-    ----------
-    time
-        Times [N] (s).
-
-    Returns
-    -------
-    list of int
-        Index of the first sample after each gap, in order. A gap is a step of more than 10 median steps and 0.1 s.
-    """
+    """Return the first samples after gaps or jumps of the clock."""
+    # time: [N] (s)
     if len(time) < 3:
         return []
     step = np.diff(time)
@@ -138,25 +116,8 @@ def stuck_sensors(recording: Recording, finger: Finger) -> list[StuckSensor]:
 
 
 def expected_values(recording: Recording, finger: Finger, group: str, k: int) -> Numbers | None:
-    """Return what a channel should read according to the other channels, up to a constant.
-
-    Parameters
-    ----------
-    recording
-        The recording.
-    finger
-        A valid description.
-    group
-        `tendon_position`, `joint_position` or `joint_velocity`. For a velocity, the angle that it does not account for
-        (rad) is returned.
-    k
-        Element, from 0.
-
-    Returns
-    -------
-    Numbers or None
-        [N] in the unit of the group (`joint_velocity`: rad). None if the other channels do not determine it.
-    """
+    """Return what a channel should read according to the other channels, up to a constant."""
+    # group: (rad); returns [N]
     groups = recording.groups
     if group == "tendon_position":
         return _position_by_others(groups, np.asarray(finger.moment_arms, dtype=float), _stretch(recording, finger), k)

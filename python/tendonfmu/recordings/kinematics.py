@@ -47,27 +47,13 @@ UNITS: dict[str, tuple[tuple[float, str], ...]] = {
 
 @dataclass(frozen=True)
 class Correction:
-    """A correction that a map of columns would have to contain.
+    """A correction that a map of columns would have to contain."""
 
-    Attributes
-    ----------
-    kind
-        "sign", "scale" or "exchange".
-    columns
-        Names of the columns.
-    factor
-        Of a sign or scale.
-    unit
-        The unit that explains the scale.
-    sources
-        Of an exchange, the column from which each of the columns has to be read.
-    """
-
-    kind: str
-    columns: tuple[str, ...]
-    factor: float = 1.0
-    unit: str = ""
-    sources: tuple[str, ...] = ()
+    kind: str  # "sign", "scale" or "exchange"
+    columns: tuple[str, ...]  # names of the columns
+    factor: float = 1.0  # of a sign or scale
+    unit: str = ""  # the unit that explains the scale
+    sources: tuple[str, ...] = ()  # of an exchange, the column from which each of the columns has to be read
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -77,55 +63,21 @@ class Correction:
 
 @dataclass(frozen=True)
 class Repair:
-    """A correction that makes the equations fit, and others that do as well.
+    """A correction that makes the equations fit, and others that do as well."""
 
-    Attributes
-    ----------
-    correction
-        The most plausible correction.
-    alternatives
-        Corrections that fit as well.
-    misfit, left
-        Mean share of variance that the changed equations leave, before and after the correction.
-    """
-
-    correction: Correction
-    alternatives: tuple[Correction, ...]
-    misfit: float
+    correction: Correction  # the most plausible correction
+    alternatives: tuple[Correction, ...]  # corrections that fit as well
+    misfit: float  # mean share of variance that the changed equations leave, before and after the correction
     left: float
 
 
 class Balance:
-    """Second moments of a recording's columns, and the equations that they have to satisfy.
-
-    Attributes
-    ----------
-    columns
-        Names of the c columns.
-    rows
-        Equations [e, c] (m), 0 when satisfied.
-    covariance
-        Covariance of the columns [c, c].
-    largest
-        Largest magnitude of each column [c].
-    tendons
-        Indices of the tendons that have any force. The others are left out.
-    """
+    """Second moments of a recording's columns, and the equations that they have to satisfy."""
 
     def __init__(
         self, finger: Finger, groups: Mapping[str, Numbers], noise: Mapping[str, Numbers] | None = None
     ) -> None:
-        """Compute the moments.
-
-        Parameters
-        ----------
-        finger
-            A valid description.
-        groups
-            `tendon_force`, `tendon_position`, and `joint_position` if it is measured; samples without faults only.
-        noise
-            Standard deviation of each column's noise, by group. None: no noise.
-        """
+        """Compute the moments."""
         used = [name for name in EQUATED if name in groups]
         self.columns = [f"{name}[{k + 1}]" for name in used for k in range(groups[name].shape[1])]
         values = np.concatenate([groups[name] for name in used], axis=1)
@@ -140,10 +92,7 @@ class Balance:
         self.rows, self._angle = _equations(finger, self.tendons, "joint_position" in groups)
 
     def misfits(self, transform: Numbers) -> Numbers:
-        """Return the share of variance [e], without noise, that each equation leaves. NaN: the equation is not used.
-
-        transform: [c, c], from the columns as they are to what they should be.
-        """
+        """Return the share of variance [e], without noise, that each equation leaves. NaN: the equation is not used."""
         rows = self.rows @ transform
         squares = rows**2
         terms = squares @ np.diag(self.covariance)
@@ -246,11 +195,7 @@ def tells(finger: Finger, groups: Mapping[str, Numbers]) -> bool:
 
 
 def repairs(balance: Balance) -> tuple[list[Repair], float]:
-    """Find the corrections that make the equations fit, and the misfit that they leave.
-
-    The search is greedy: each correction is the best one in addition to those before. It must lower the misfit of the
-    equations that it changes by a factor of at least `GAIN`.
-    """
+    """Find the corrections that make the equations fit, and the misfit that they leave."""
     done: list[Repair] = []
     transform = np.eye(len(balance.columns))
     misfit = balance.misfit(transform)
@@ -274,10 +219,7 @@ def repairs(balance: Balance) -> tuple[list[Repair], float]:
 
 
 def _scores(balance: Balance, tried: Sequence[Correction], transform: Numbers) -> Numbers:
-    """Return the misfit [tried] with each correction.
-
-    It is infinite if the correction gains too little, is implausible or makes a tendon push.
-    """
+    """Return the misfit [tried] with each correction."""
     was, pushing = balance.is_plausible(transform), balance.pushing(transform)
     before, whole = balance.misfits(transform), balance.misfit(transform)
     scores = np.full(len(tried), np.inf)

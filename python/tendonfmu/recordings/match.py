@@ -73,30 +73,7 @@ def belongs(finger: Finger, recordings: Sequence[Recording], *, unfit: float = U
 
 
 def admit(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
-    """Check recordings before a fit, and refuse those that do not belong to the finger.
-
-    Gaps and stuck sensors are left to `recordings.prepared.prepare`. It knows which columns are used, and reports which
-    samples are left out.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-    recordings
-        As `read_recording` returns them, or made in memory.
-    unfit
-        As of `belongs`.
-
-    Returns
-    -------
-    list of str
-        One line for each warning.
-
-    Raises
-    ------
-    InputError
-        A recording does not belong to the finger, or has values that `read_recording` refuses.
-    """
+    """Check recordings before a fit, and refuse those that do not belong to the finger."""
     for recording in recordings:
         check_numbers(recording)
     return refuse_errors(
@@ -326,11 +303,8 @@ def _turning(finger: Finger, recording: Recording) -> list[Correction]:
 
 
 def power_shares(finger: Finger, recording: Recording) -> Numbers | None:
-    """Return the net work of the tendons on each joint as a share [n] of all work that they exchange with it.
-
-    Over closed motions, friction alone gives 1 and springs give 0. Joints that do not move get 0. The result is None
-    for a recording that is too short.
-    """
+    """Return the net work of the tendons on each joint as a share [n] of all work that they exchange with it."""
+    # The result is None for a recording that is too short.
     external, angle = (recording.groups.get(name) for name in ("external_torque", "joint_position"))
     torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
     if external is not None:

@@ -14,18 +14,7 @@ Entry = Mapping[str, float | str]
 
 
 def map_keys(entries: Mapping[str, Entry]) -> dict[str, dict[str, float | str]]:
-    """Return the keys of a map whose log is the recording itself, with its columns in SI.
-
-    Parameters
-    ----------
-    entries
-        As `Finding.entries`.
-
-    Returns
-    -------
-    dict
-        By column: `sign`, `unit` or `scale`, or `column`.
-    """
+    """Return the keys of a map whose log is the recording itself, with its columns in SI."""
     return {column: _keys(column.split("[")[0], entry) for column, entry in entries.items()}
 
 

@@ -33,20 +33,7 @@ def element(column: str) -> tuple[str, int]:
 
 
 def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
-    """Say in one line whether a recording belongs to the finger.
-
-    Parameters
-    ----------
-    recording
-        The recording.
-    findings
-        Its findings, from `belongs`.
-
-    Returns
-    -------
-    str
-        The file, the verdict, the number of samples, the duration, and how many errors and warnings there are.
-    """
+    """Say in one line whether a recording belongs to the finger."""
     severities = [finding.severity for finding in findings]
     errors, warnings = severities.count("error"), severities.count("warning")
     words = "does not belong to this finger as it is" if errors else "belongs to this finger"
@@ -74,10 +61,7 @@ def repair(path: Path, found: Repair) -> Finding:
 
 
 def velocity(path: Path, correction: Correction, slope: float) -> Finding:
-    """Describe a joint velocity that does not belong to its angle.
-
-    slope: change of the angle over the integral of the velocity.
-    """
+    """Describe a joint velocity that does not belong to its angle."""
     seen = f"the angle changes by {slope:.4g} times the integral of the velocity; expected 1"
     if correction.kind == "exchange":
         seen = "the angle of each joint changes with the velocity of the other joint"
@@ -170,11 +154,7 @@ def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
 
 
 def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence[Correction]) -> Finding:
-    """Describe joints that move against the pull of their tendons.
-
-    share: [n] of their power, negative for these joints. turning: corrections that would make all joints follow, the
-    likeliest first.
-    """
+    """Describe joints that move against the pull of their tendons."""
     names = " and ".join(name for name, part in zip(joints, share, strict=True) if part < 0.0)
     seen = f"{names} moves against the pull of its tendons ({_percent(-float(share.min()))} of its power)"
     by_hand = "a finger that was moved by hand"
@@ -186,10 +166,7 @@ def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence
 
 
 def reference(path: Path, column: str, left: float, opposed: float) -> Finding:
-    """Describe an external torque with the wrong sign.
-
-    left, opposed: N·m rms of the difference, with the sign as it is and with the other.
-    """
+    """Describe an external torque with the wrong sign."""
     correction = Correction("sign", (column,), -1.0)
     seen = f"joint torque minus this column leaves {left:.4g} N.m rms, and {opposed:.4g} N.m with sign -1"
     return _of_correction(path, correction, seen, _cause(correction))

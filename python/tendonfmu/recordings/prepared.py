@@ -43,57 +43,28 @@ SHORTEST_BLOCK = 1.0  # s; of a held-out block
 
 @dataclass(frozen=True)
 class Held:
-    """The share of time that is held out, and in which blocks.
+    """The share of time that is held out, and in which blocks."""
 
-    Attributes
-    ----------
-    share
-        Share of time that is held out, 0 to below 1.
-    block
-        Longest block (s).
-    strict
-        Whether to refuse a recording that is too short for blocks of `SHORTEST_BLOCK`. Otherwise its blocks are
-        shorter.
-    """
-
-    share: float = 0.0
-    block: float = 10.0
+    share: float = 0.0  # share of time that is held out, 0 to below 1
+    block: float = 10.0  # longest block (s)
+    # whether to refuse a recording that is too short for blocks of `SHORTEST_BLOCK`. Otherwise its blocks are shorter
     strict: bool = False
 
 
 @dataclass(frozen=True)
 class FitRecording:
-    """A recording that is ready for a fit.
+    """A recording that is ready for a fit."""
 
-    Attributes
-    ----------
-    recording
-        The recording itself.
-    kinematics
-        Source of angles and speeds, 1 to 3.
-    target
-        Torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque (eq. 9).
-    train, held_out, contact_out, faulty
-        Flags [N]; each sample has at most one of them. In this order: trained on; held out; labelled contact without a
-        reference; left out because of a stuck sensor or a part that is too short.
-    parts
-        Slices without a gap. Each has its own bias path.
-    model
-        T, angles and speeds of the given finger.
-    warnings
-        Sentences about what was left out and what is poor.
-    """
-
-    recording: Recording
-    kinematics: int
-    target: Numbers
-    train: Flags
+    recording: Recording  # the recording itself
+    kinematics: int  # source of angles and speeds, 1 to 3
+    target: Numbers  # torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque (eq
+    train: Flags  # flags [N]; each sample has at most one of them
     held_out: Flags
     contact_out: Flags
     faulty: Flags
-    parts: list[slice]
-    model: Model
-    warnings: list[str]
+    parts: list[slice]  # slices without a gap
+    model: Model  # T, angles and speeds of the given finger
+    warnings: list[str]  # sentences about what was left out and what is poor
 
     @property
     def path(self) -> Path:
@@ -126,28 +97,12 @@ class FitRecording:
         return float(np.abs(self.recording.groups["tendon_force"]).mean())
 
     def arrays(self, part: slice) -> dict[str, Numbers]:
-        """Return the signals of one part.
-
-        Parameters
-        ----------
-        part
-            One of `parts`.
-
-        Returns
-        -------
-        dict of Numbers
-            Contiguous arrays by name, as `native.Instance.run` takes them.
-        """
+        """Return the signals of one part."""
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
 
     def entry(self) -> dict[str, Any]:
-        """Return what a report says about the recording.
-
-        Returns
-        -------
-        dict
-            Path, counts of samples, parts, duration (s), mean force (N), kinematics and whether there is a reference.
-        """
+        """Return what a report says about the recording."""
+        # returns (s)
         return {
             "path": str(self.path),
             "samples": len(self.time),
@@ -164,32 +119,7 @@ class FitRecording:
 
 
 def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -> FitRecording:
-    """Prepare a recording for a fit, and collect what is left out of it.
-
-    Call `recordings.match.admit` first: it checks whether the recording belongs to the finger.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-    recording
-        A recording of this finger.
-    kinematics
-        Source of angles and speeds, 1 to 3.
-    held
-        Share that is held out.
-
-    Returns
-    -------
-    FitRecording
-        The recording with its parts, flags and warnings.
-
-    Raises
-    ------
-    InputError
-        A column is missing or has invalid values, a sensor is stuck in more than half of the samples, or too few
-        samples are left.
-    """
+    """Prepare a recording for a fit, and collect what is left out of it."""
     joints, tendons = len(finger.joint_names), len(finger.tendon_names)
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(finger.data)))
     check_numbers(recording)
@@ -262,20 +192,8 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
 
 
 def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
-    """Describe tendons whose modelled force falls below zero.
-
-    Parameters
-    ----------
-    slack
-        Flags [N, m].
-    finger
-        A valid description.
-
-    Returns
-    -------
-    list of str
-        One sentence for each such tendon.
-    """
+    """Describe tendons whose modelled force falls below zero."""
+    # slack: [N, m]
     share = slack.mean(axis=0)
     return [
         f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {_percent(part)} % of the samples: its modelled force "
@@ -358,24 +276,8 @@ def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
 
 
 def motion_of(recordings: list[FitRecording]) -> tuple[Numbers, Numbers, Numbers]:
-    """Return where and how fast the joints moved in the samples that are trained on.
-
-    Only every k-th sample of very long recordings is returned, which shows the motion well enough.
-
-    Parameters
-    ----------
-    recordings
-        Recordings of one finger.
-
-    Returns
-    -------
-    angle
-        Joint angles [K, n] (rad).
-    speed
-        Joint speeds [K, n] (rad/s).
-    share
-        Time that each sample stands for [K] (s).
-    """
+    """Return where and how fast the joints moved in the samples that are trained on."""
+    # returns joint angles [K, n] (rad), joint speeds [K, n] (rad/s), time that each sample stands for [K] (s)
     every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
     angle, speed, share = [], [], []
     for each in recordings:
@@ -394,27 +296,7 @@ def _sample_time(recording: FitRecording) -> Numbers:
 
 
 def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapping[str, bool]) -> list[str]:
-    """Refuse recordings without any motion, and describe joints that never move.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-    recordings
-        Recordings of this finger.
-    moves
-        Whether each friction effect, by its path, ever slides in the samples that are trained on.
-
-    Returns
-    -------
-    list of str
-        One sentence for each joint that never moves.
-
-    Raises
-    ------
-    InputError
-        Nothing moves in any of the recordings.
-    """
+    """Refuse recordings without any motion, and describe joints that never move."""
     if not moves:
         return []
     if not any(moves.values()):
@@ -432,20 +314,7 @@ def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapp
 
 
 def require_noise(finger: Finger, recordings: list[FitRecording]) -> None:
-    """Refuse a finger whose residuals would get an infinite weight.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-    recordings
-        Recordings of this finger.
-
-    Raises
-    ------
-    InputError
-        `bias.noise_std` is 0, and either `bias.noise_std_per_force` is 0 too or a sample has no tendon force.
-    """
+    """Refuse a finger whose residuals would get an infinite weight."""
     base, per_force = (number_of(finger.data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     if base > 0:
         return

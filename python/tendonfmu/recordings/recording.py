@@ -314,27 +314,7 @@ def _type_of(source: object) -> str:
 def read_recordings(
     sources: Sequence[RecordingSource], role: str = "recordings", *, label: str = LABEL, others: Collection[str] = ()
 ) -> list[Recording]:
-    """Read and check several recordings; messages name a DataFrame by its place in the list.
-
-    Parameters
-    ----------
-    sources
-        From `listed_sources`.
-    role
-        Name of the list in messages.
-    label, others
-        As of `read_recording`.
-
-    Returns
-    -------
-    list of Recording
-        One per source.
-
-    Raises
-    ------
-    InputError
-        The source, column or row that is wrong, and what was expected.
-    """
+    """Read and check several recordings; messages name a DataFrame by its place in the list."""
     found = []
     for place, source in enumerate(sources, start=1):
         if is_frame(source):
@@ -349,18 +329,7 @@ def read_recordings(
 
 
 def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list[RecordingSource]:
-    """Return sources of recordings as a list; a single one may be given without a list.
-
-    Parameters
-    ----------
-    sources
-        A recording, DataFrame or path, or several of them.
-
-    Returns
-    -------
-    list
-        The same, at least as many as given.
-    """
+    """Return sources of recordings as a list; a single one may be given without a list."""
     alone = isinstance(sources, Recording | str | os.PathLike) or is_frame(sources)
     if isinstance(sources, Mapping):
         raise InputError(f"recording: {_type_of(sources)}")
@@ -371,20 +340,8 @@ def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list
 
 
 def flagged_stretches(time: NDArray[np.float64], flags: NDArray[Any]) -> list[tuple[float, float]]:
-    """Return the stretches of flagged samples.
-
-    Parameters
-    ----------
-    time
-        Times [N] (s).
-    flags
-        [N].
-
-    Returns
-    -------
-    list of tuple
-        Begin and end of each stretch (s); it lasts until the next sample.
-    """
+    """Return the stretches of flagged samples."""
+    # time: [N] (s); flags: [N]; returns begin and end of each stretch (s); it lasts until the next sample
     steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
     begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
     return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]

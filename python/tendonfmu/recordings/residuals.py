@@ -29,50 +29,19 @@ _NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 @dataclass(frozen=True)
 class Model:
-    """A finger without its bias filter over a recording; NaN (False) outside the parts.
+    """A finger without its bias filter over a recording; NaN (False) outside the parts."""
 
-    Attributes
-    ----------
-    torque
-        T of eq. (10) [N, n] (N·m), less `delayed_torque`, so that measured τ − torque is what the bias filter sees.
-    jump
-        Δb [N, n] (N·m).
-    joint_angle, joint_speed
-        Angles (rad) and speeds (rad/s) as used [N, n].
-    slack
-        Slack tendons [N, m].
-    """
-
-    torque: Numbers
-    jump: Numbers
-    joint_angle: Numbers
+    torque: Numbers  # T of eq
+    jump: Numbers  # δb [N, n] (N·m)
+    joint_angle: Numbers  # angles (rad) and speeds (rad/s) as used [N, n]
     joint_speed: Numbers
-    slack: Flags
+    slack: Flags  # slack tendons [N, m]
 
 
 def model_alone(
     data: Mapping[str, Any], arrays: Sequence[Mapping[str, Numbers]], parts: Sequence[slice], samples: int, source: int
 ) -> Model:
-    """Run a finger without its bias filter over the parts of a recording.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    arrays
-        Signals of `native.Instance.run`, one dict for each part.
-    parts
-        Slices of the recording. The finger starts anew in each.
-    samples
-        Number of samples of the whole recording.
-    source
-        Kinematics, 1 to 3.
-
-    Returns
-    -------
-    Model
-        Arrays over the whole recording.
-    """
+    """Run a finger without its bias filter over the parts of a recording."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
     probe = native.Instance(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
     start = probe.save_state()
@@ -90,22 +59,8 @@ def model_alone(
 
 
 def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
-    """Return τ of the forces in use less τ of the measured forces.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    arrays
-        Signals of one part, with `tendon_force`.
-    torque
-        τ in use [N, n] (N·m).
-
-    Returns
-    -------
-    Numbers or float
-        [N, n] (N·m). 0 unless a `time_delay` below 0 delays the forces.
-    """
+    """Return τ of the forces in use less τ of the measured forces."""
+    # torque: [N, n] (N·m); returns [N, n] (N·m). 0 unless a `time_delay` below 0 delays the forces
     rows = data.get("extensions") or []
     if not any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows):
         return 0.0
@@ -126,21 +81,11 @@ def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the bias filter leaves; NaN outside the parts.
+    """What the bias filter leaves; NaN outside the parts."""
 
-    Attributes
-    ----------
-    residual
-        r before the bias update [N, n] (N·m). NaN also for the first sample of each part.
-    variance
-        S of the residual [N] ((N·m)²).
-    bias
-        b before the update [N, n] (N·m).
-    """
-
-    residual: Numbers
-    variance: Numbers
-    bias: Numbers
+    residual: Numbers  # r before the bias update [N, n] (N·m)
+    variance: Numbers  # S of the residual [N] ((N·m)²)
+    bias: Numbers  # b before the update [N, n] (N·m)
 
     @property
     def standardised(self) -> Numbers:
@@ -150,45 +95,18 @@ class Residuals:
 
 @dataclass(frozen=True)
 class BiasSettings:
-    """Settings of the bias filter.
+    """Settings of the bias filter."""
 
-    Attributes
-    ----------
-    drift
-        `drift_variance`.
-    noise
-        `noise_std` (N·m).
-    per_force
-        `noise_std_per_force` (N·m/N).
-    noise_time
-        `noise_time` (s), or None.
-    initial_variance
-        `initial_variance` ((N·m)²), or None.
-    initial_torque
-        `initial_torque` [n] (N·m), or None.
-    """
-
-    drift: float
-    noise: float
-    per_force: float
-    noise_time: float | None
-    initial_variance: float | None
-    initial_torque: Numbers | None
+    drift: float  # `drift_variance`
+    noise: float  # `noise_std` (N·m)
+    per_force: float  # `noise_std_per_force` (N·m/N)
+    noise_time: float | None  # `noise_time` (s), or None
+    initial_variance: float | None  # `initial_variance` ((N·m)²), or None
+    initial_torque: Numbers | None  # `initial_torque` [n] (N·m), or None
 
 
 def bias_settings(data: Mapping[str, Any]) -> BiasSettings:
-    """Return the bias settings of a description.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    BiasSettings
-        With the defaults of docs/reference/finger_description.md where the description gives none.
-    """
+    """Return the bias settings of a description."""
     given = data.get("bias") or {}
     optional = {
         key: None if given.get(key) is None else float(given[key]) for key in ("noise_time", "initial_variance")
@@ -212,30 +130,8 @@ def track(
     learns: Flags,
     parts: Sequence[slice],
 ) -> Residuals:
-    """Run the bias filter over y − T.
-
-    Parameters
-    ----------
-    settings
-        Settings of the filter.
-    time
-        Times [N] (s).
-    mean_force
-        Mean tendon force [N] (N).
-    remainder
-        y − T [N, n] (N·m).
-    jump
-        Δb [N, n] (N·m). None: no jumps.
-    learns
-        Samples [N] that update the bias.
-    parts
-        Slices of the recording. The filter starts anew in each.
-
-    Returns
-    -------
-    Residuals
-        NaN in parts that have no sample to start from.
-    """
+    """Run the bias filter over y − T."""
+    # time: [N] (s); mean_force: [N] (N); remainder: [N, n] (N·m); jump: [N, n] (N·m); learns: [N]
     residual, bias = np.full_like(remainder, np.nan), np.full_like(remainder, np.nan)
     variance = np.full(len(time), np.nan)
     for whole in parts:
@@ -272,14 +168,11 @@ def _gains(settings: BiasSettings, time: Numbers, mean_force: Numbers, learns: F
 
 
 def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) -> Numbers:
-    """Return b before each update [N, n] (N·m).
-
-    s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
-
-    Computed in blocks as s = A (s_before + Σ c/A), with A the running product of 1 − K. This is exact except for
-    rounding while A is far from underflow. Where A is too small, because the filter learns fast, the block is computed
-    step by step.
-    """
+    """Return b before each update [N, n] (N·m)."""
+    # s_k = (1 − K_k)(s_k−1 + Δb_k) + K_k (y − T)_k, b_k = s_k−1 + Δb_k, s_0 = first.
+    # Computed in blocks as s = A (s_before + Σ c/A), with A the running product of 1 − K. This is exact except for
+    # rounding while A is far from underflow. Where A is too small, because the filter learns fast, the block is
+    # computed step by step.
     after = np.empty_like(remainder)
     keep = 1 - gain[:, None]
     forced = keep * jump + gain[:, None] * remainder
@@ -302,20 +195,8 @@ def _filter(remainder: Numbers, jump: Numbers, gain: Numbers, first: Numbers) ->
 
 
 def rms(values: Numbers, chosen: Flags) -> list[float]:
-    """Return the root mean square of the chosen rows.
-
-    Parameters
-    ----------
-    values
-        [N, n].
-    chosen
-        Rows [N].
-
-    Returns
-    -------
-    list of float
-        [n], in the unit of the values. Rows with NaN are left out; NaN if no row remains.
-    """
+    """Return the root mean square of the chosen rows."""
+    # values: [N, n]; chosen: [N]; returns [n]
     picked = values[chosen]
     picked = picked[~np.isnan(picked).any(axis=1)]
     if not len(picked):
@@ -324,23 +205,10 @@ def rms(values: Numbers, chosen: Flags) -> list[float]:
 
 
 def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:
-    """Return the NIS, the mean of the squared standardised innovations, and its chi-square interval.
-
-    The quantiles of χ²_k follow Wilson and Hilferty (1931). From 30 innovations on they are within 1e-3 of the
-    interval's width.
-
-    Parameters
-    ----------
-    standardised
-        Arrays [N, n], NaN where not used.
-    share
-        Share of independent innovations, above 0, at most 1.
-
-    Returns
-    -------
-    dict
-        `mean`: 1 for a consistent filter. `interval`: [low, high] at 95 %. `consistent`: whether the mean is in it.
-    """
+    """Return the NIS, the mean of the squared standardised innovations, and its chi-square interval."""
+    # The quantiles of χ²_k follow Wilson and Hilferty (1931). From 30 innovations on they are within 1e-3 of the
+    # interval's width.
+    # standardised: [N, n]; returns [low, high]
     values = np.concatenate([each[~np.isnan(each)] for each in standardised])
     if not len(values):
         return {"mean": math.nan, "interval": [math.nan, math.nan], "consistent": False}
@@ -357,19 +225,8 @@ def _mean_chi_square(count: float, probability: float) -> float:
 
 
 def whiteness(standardised: Sequence[Numbers]) -> dict[str, list[float]]:
-    """Return how far the standardised residuals of each joint are from white noise.
-
-    Parameters
-    ----------
-    standardised
-        Arrays [N, n], NaN where not used. Pairs with a NaN do not count.
-
-    Returns
-    -------
-    dict
-        `lag_one` [n]: autocorrelation at lag one. `ljung_box_p` [n]: p of the Ljung-Box test over `LAGS` lags. Both are
-        NaN for too few samples.
-    """
+    """Return how far the standardised residuals of each joint are from white noise."""
+    # standardised: [N, n]; returns [n] [n]
     joints = standardised[0].shape[1]
     lag_one, p_value = [], []
     for j in range(joints):

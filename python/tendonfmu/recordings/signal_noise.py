@@ -74,25 +74,8 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
 
 
 def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
-    """Estimate the standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample.
-
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    recording
-        `Recording` or `FitRecording`.
-
-    Returns
-    -------
-    Numbers
-        [n] (N·m).
-
-    Raises
-    ------
-    InputError
-        The recording does not fit the finger, or has fewer than 60 samples without a gap.
-    """
+    """Estimate the standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample."""
+    # returns [n] (N·m)
     if isinstance(recording, FitRecording):
         recording = recording.recording
     recording.require(len(data["joints"]), len(data["tendons"]), ("tendon_force",))
@@ -102,25 +85,8 @@ def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecord
 
 
 def white_noise(time: Numbers, values: Numbers) -> Numbers:
-    """Estimate the standard deviation of each column around the smooth curve through its neighbours.
-
-    Parameters
-    ----------
-    time
-        Times [N] (s), strictly increasing. Steps may vary.
-    values
-        [N, c].
-
-    Returns
-    -------
-    Numbers
-        [c], in the unit of the values.
-
-    Raises
-    ------
-    InputError
-        Fewer than 60 samples without a gap.
-    """
+    """Estimate the standard deviation of each column around the smooth curve through its neighbours."""
+    # time: [N] (s); values: [N, c]; returns [c], in the unit of the values
     reach = max(NEIGHBOURS)
     if len(time) < FEWEST:
         raise InputError(

@@ -35,18 +35,10 @@ FEWEST = 64  # samples of a piece that can be smoothed
 
 @dataclass(frozen=True)
 class Signals:
-    """Which signals are estimated from.
+    """Which signals are estimated from."""
 
-    Attributes
-    ----------
-    cutoff
-        Cut-off of the smoothing (Hz). None: raw signals.
-    every
-        One of this many samples is kept.
-    """
-
-    cutoff: float | None = None
-    every: int = 1
+    cutoff: float | None = None  # cut-off of the smoothing (Hz)
+    every: int = 1  # one of this many samples is kept
 
     @property
     def words(self) -> str:
@@ -54,18 +46,7 @@ class Signals:
         return "raw signals" if self.cutoff is None else f"signals smoothed at {self.cutoff:.3g} Hz, without lag"
 
     def recording(self, recording: Recording) -> Recording:
-        """Return the recording from which is estimated.
-
-        Parameters
-        ----------
-        recording
-            The raw recording.
-
-        Returns
-        -------
-        Recording
-            Smoothed and decimated, or the same if the signals are raw.
-        """
+        """Return the recording from which is estimated."""
         if self.cutoff is None:
             return recording
         groups = {name: self._smoothed(recording.time, values) for name, values in recording.groups.items()}
@@ -87,21 +68,7 @@ class Signals:
         return found
 
     def description(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the description for estimating.
-
-        It has no velocity filter, whose lag would be estimated as friction. Its bias drifts as fast in time as at the
-        recording's own sample rate.
-
-        Parameters
-        ----------
-        data
-            A valid finger description.
-
-        Returns
-        -------
-        dict
-            A changed copy.
-        """
+        """Return the description for estimating."""
         if self.cutoff is None:
             return dict(data)
         bias = dict(data.get("bias") or {})
@@ -112,20 +79,7 @@ class Signals:
         return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return an estimated description with the filter and bias settings of the given one, as it runs online.
-
-        Parameters
-        ----------
-        data
-            The estimated description.
-        given
-            The description that the settings come from.
-
-        Returns
-        -------
-        dict
-            A changed copy of `data`. It keeps its own `bias.initial_torque`.
-        """
+        """Return an estimated description with the filter and bias settings of the given one, as it runs online."""
         found = dict(data)
         for key in ("velocity_filter_cutoff", "position_filter", "bias"):
             found.pop(key, None)
@@ -138,23 +92,7 @@ class Signals:
 
 
 def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Signals | None:
-    """Choose the smoothing of recordings.
-
-    The cut-off is a share of the frequency at which the spectrum of the joint torque falls to its noise, the median
-    over all recordings.
-
-    Parameters
-    ----------
-    recordings
-        Recordings of one finger.
-    data
-        A valid finger description.
-
-    Returns
-    -------
-    Signals or None
-        None if the recordings are too short or sampled too slowly.
-    """
+    """Choose the smoothing of recordings."""
     arms = moment_arms(data)
     found, rates = [], []
     for recording in recordings:
@@ -182,20 +120,8 @@ def _crossing(torque: Numbers, rate: float) -> float:
 
 
 def zero_phase(values: Numbers, cutoff: float, rate: float) -> Numbers:
-    """Low-pass signals forwards and backwards.
-
-    Parameters
-    ----------
-    values
-        [N, ...].
-    cutoff, rate
-        Cut-off and sample rate (Hz).
-
-    Returns
-    -------
-    Numbers
-        [N, ...], without phase lag.
-    """
+    """Low-pass signals forwards and backwards."""
+    # values: [N, ...]; cutoff, rate: (Hz); returns [N, ...], without phase lag
     sections = butter(ORDER, min(cutoff, 0.45 * rate), fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, int(3 * rate / cutoff))))
 

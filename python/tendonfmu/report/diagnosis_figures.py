@@ -41,18 +41,7 @@ _ROOM = 3.0  # times the largest mean: the y axis shows no more of the scatter, 
 
 
 def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
-    """Make the sheets of a diagnosis: the evidence for each cause, then the residual at each joint.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis. Causes without evidence get no sheet.
-
-    Returns
-    -------
-    list of Sheet
-        Sections `cause_1`, `cause_2`, ... in the order of the causes, then `views`, one sheet per joint.
-    """
+    """Make the sheets of a diagnosis: the evidence for each cause, then the residual at each joint."""
     names = names_of(found)
     return [
         *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),

@@ -24,20 +24,7 @@ _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
-    """Check before a long computation that the results can be written to a folder.
-
-    Parameters
-    ----------
-    folder
-        Output folder; it need not exist.
-    inputs
-        Files that the command reads.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made or written, or a result would replace an input.
-    """
+    """Check before a long computation that the results can be written to a folder."""
     check_output_folder(folder)
     if folder.is_dir():
         for name in _NAMED:
@@ -45,28 +32,7 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 
 def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Write the report, both descriptions, the FMU and the page.
-
-    The files are made in a temporary folder beside the output folder and moved in one step, which Ctrl-C does not
-    interrupt. Files that an earlier diagnosis wrote to the folder are removed.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-    folder
-        Output folder; it is made if missing.
-
-    Returns
-    -------
-    dict of Path to str
-        What each file contains, the first to read first.
-
-    Raises
-    ------
-    InputError
-        The files cannot be written. The folder is then as before.
-    """
+    """Write the report, both descriptions, the FMU and the page."""
     beside = folder.absolute().parent
     try:
         beside.mkdir(parents=True, exist_ok=True)
@@ -105,10 +71,7 @@ def _folder_beside(folder: Path) -> Iterator[Path]:
 
 
 def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
-    """Move files into a folder, the report last, and move those of an earlier diagnosis to `old`; undo all on an error.
-
-    `old` must not exist; it is made here.
-    """
+    """Move files into a folder, the report last, and move those of an earlier diagnosis to `old`; undo all on error."""
     is_new = not folder.exists()
     folder.mkdir(exist_ok=True)
     old.mkdir()

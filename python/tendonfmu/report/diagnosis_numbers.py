@@ -65,29 +65,13 @@ def magnitude(value: float, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Left:
-    """What is left on unseen data, in the unit of `unit_of`.
+    """What is left on unseen data, in the unit of `unit_of`."""
 
-    The parts add up to the whole as they are shown, rounding included.
-
-    Attributes
-    ----------
-    whole
-        rms over all joints.
-    noise
-        The part that nothing recorded predicts.
-    nameless
-        The rest.
-    digits
-        Decimals shown.
-    memory
-        How long what is left stays correlated, in words; empty for white noise, or where it is unknown.
-    """
-
-    whole: float
-    noise: float
-    nameless: float
-    digits: int
-    memory: str
+    whole: float  # rms over all joints
+    noise: float  # the part that nothing recorded predicts
+    nameless: float  # the rest
+    digits: int  # decimals shown
+    memory: str  # how long what is left stays correlated, in words; empty for white noise, or where it is unknown
 
     def told(self, value: float) -> str:
         return f"{value:.{self.digits}f}"

@@ -50,25 +50,7 @@ _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unex
 
 
 def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Write `diagnosis.html` to an existing folder, whole or not at all.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-    folder
-        Output folder.
-
-    Returns
-    -------
-    dict of Path to str
-        What the file contains.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write `diagnosis.html` to an existing folder, whole or not at all."""
     page = folder / PAGE
     text = diagnosis_page(found)
     with whole_file(page) as partial:
@@ -169,29 +151,12 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
 
 
 def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """Return what a page shows of each cause.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-    names
-        Names of its joints and tendons.
-
-    Returns
-    -------
-    list of dict
-        What the macro `card` in templates/parts.html.jinja reads, in the order of the causes. Contact and unknown
-        come last, since they have no term in the model.
-    """
+    """Return what a page shows of each cause."""
     return [_card(found, cause, names) for cause in reported_causes(found)]
 
 
 def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
-    """Return what a page shows of one cause.
-
-    `certainty` is printed small. `places` has (joint, tendon, size) where the cause has numbers.
-    """
+    """Return what a page shows of one cause."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
     # the tiles and the waterfall show r itself
     numbers = thresholds(found.extended_data)

@@ -34,20 +34,7 @@ DIGITS = 6  # significant digits of the curves
 
 
 def build_report(found: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
-    """Make the report of a diagnosis.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-    files
-        Names of the other files in the folder.
-
-    Returns
-    -------
-    dict
-        The keys of docs/reference/semantics.md#diagnosis-report first.
-    """
+    """Make the report of a diagnosis."""
     report = {
         "format": FORMAT,
         "kind": found.kind,

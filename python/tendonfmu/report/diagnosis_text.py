@@ -41,15 +41,9 @@ Row = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Names:
-    """Names of joints and tendons.
+    """Names of joints and tendons."""
 
-    Attributes
-    ----------
-    joints, tendons
-        As in the description; empty where it has none.
-    """
-
-    joints: tuple[str, ...]
+    joints: tuple[str, ...]  # as in the description; empty where it has none
     tendons: tuple[str, ...]
 
     def place(self, where: Where) -> str:
@@ -118,18 +112,7 @@ def headline(found: Diagnosis) -> str:
 
 
 def error_sentence(found: Diagnosis) -> str:
-    """Return a sentence on the error on unseen data.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-
-    Returns
-    -------
-    str
-        Error before and after with the interval of the gain, and the error that the bias alone would leave.
-    """
+    """Return a sentence on the error on unseen data."""
     factor, unit = unit_of(found)
     nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
     where = unseen(found)
@@ -148,19 +131,7 @@ def error_sentence(found: Diagnosis) -> str:
 
 
 def left_sentence(found: Diagnosis) -> str:
-    """Return a sentence on what is left on unseen data.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-
-    Returns
-    -------
-    str
-        How much is left, over which time it is correlated, and how much of it could be predicted; empty where that is
-        unknown. It is called noise only where it is white.
-    """
+    """Return a sentence on what is left on unseen data."""
     left, (_, unit) = left_of(found), unit_of(found)
     if left is None:
         return ""
@@ -214,29 +185,16 @@ def confusion_sentence(cause: Cause, names: Names) -> str:
 
 @dataclass(frozen=True)
 class Hidden:
-    """One effect that these data cannot show, at all its places.
+    """One effect that these data cannot show, at all its places."""
 
-    Attributes
-    ----------
-    title, places
-        The effect and its places, in plain words.
-    why
-        Sentence: what hides it where it comes nearest to being visible.
-    share, gain
-        There: the share that survives the refit, and what an ordinary size would raise the error by; None for a change.
-    absorbed
-        Whether refitting absorbs it everywhere.
-    experiment
-        Experiment that would show it.
-    """
-
-    title: str
+    title: str  # the effect and its places, in plain words
     places: str
-    why: str
+    why: str  # sentence: what hides it where it comes nearest to being visible
+    # there: the share that survives the refit, and what an ordinary size would raise the error by; None for a change
     share: float
     gain: float | None
-    absorbed: bool
-    experiment: str
+    absorbed: bool  # whether refitting absorbs it everywhere
+    experiment: str  # experiment that would show it
 
 
 def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
@@ -336,18 +294,7 @@ def own_gain_sentences(found: Diagnosis) -> Iterator[str]:
 
 
 def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
-    """List the tables to print: the causes, and the errors by joint.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-
-    Yields
-    ------
-    tuple
-        Title, headings, rows.
-    """
+    """List the tables to print: the causes, and the errors by joint."""
     names, causes = names_of(found), reported_causes(found)
     if causes:
         headings: Row = (words_of(found.kind).one, "place", "size", "own gain", "may also be")
@@ -370,10 +317,7 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
 
 
 def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
-    """List the errors by joint, then for all joints if there are several.
-
-    Columns: bias alone; nominal and extended model on training and test data; noise floor.
-    """
+    """List the errors by joint, then for all joints if there are several."""
     columns = [
         found.bias_only_rms,
         found.nominal.train_rms,

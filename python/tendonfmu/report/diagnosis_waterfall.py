@@ -15,80 +15,35 @@ from tendonfmu.report.fit_summary import rounded
 
 @dataclass(frozen=True)
 class Part:
-    """Part of a bar.
+    """Part of a bar."""
 
-    Attributes
-    ----------
-    tone
-        "nominal", "cause", "more", "noise" or "nameless".
-    start, width
-        Per cent of the widest bar.
-    """
-
-    tone: str
-    start: float
+    tone: str  # "nominal", "cause", "more", "noise" or "nameless"
+    start: float  # per cent of the widest bar
     width: float
 
 
 @dataclass(frozen=True)
 class Row:
-    """Row of a waterfall.
+    """Row of a waterfall."""
 
-    Attributes
-    ----------
-    label
-        What the row shows, in plain words, with its place.
-    value
-        Length of the bar as text, with a sign where it is taken away.
-    parts
-        Parts of the bar.
-    """
-
-    label: str
-    value: str
-    parts: tuple[Part, ...]
+    label: str  # what the row shows, in plain words, with its place
+    value: str  # length of the bar as text, with a sign where it is taken away
+    parts: tuple[Part, ...]  # parts of the bar
 
 
 @dataclass(frozen=True)
 class Waterfall:
-    """What each cause takes away from the error.
+    """What each cause takes away from the error."""
 
-    Attributes
-    ----------
-    unit
-        Unit of the values.
-    rows
-        From the error of the nominal model to what is left.
-    floor
-        Position of the noise floor, per cent of the widest bar; None if unknown.
-    nameless
-        Legend of the parts with the tone "nameless".
-    taken
-        Legend of the parts with the tone "cause".
-    """
-
-    unit: str
-    rows: tuple[Row, ...]
-    floor: float | None
-    nameless: str
-    taken: str
+    unit: str  # unit of the values
+    rows: tuple[Row, ...]  # from the error of the nominal model to what is left
+    floor: float | None  # position of the noise floor, per cent of the widest bar; None if unknown
+    nameless: str  # legend of the parts with the tone "nameless"
+    taken: str  # legend of the parts with the tone "cause"
 
 
 def waterfall_of(found: Diagnosis, names: Names) -> Waterfall:
-    """Return the waterfall of a diagnosis.
-
-    Parameters
-    ----------
-    found
-        Result of a diagnosis.
-    names
-        Names of its joints and tendons.
-
-    Returns
-    -------
-    Waterfall
-        Rows in the order of the causes. The values add up as they are shown, rounding included.
-    """
+    """Return the waterfall of a diagnosis."""
     factor, unit = unit_of(found)
     steps = [factor * each for each in found.steps]
     widest = max([each for each in steps if math.isfinite(each)], default=0.0) or 1.0

@@ -9,57 +9,29 @@ Three = tuple[str, str, str]  # with no cause, one, several
 
 @dataclass(frozen=True)
 class Words:
-    """Words of a report.
+    """Words of a report."""
 
-    Attributes
-    ----------
-    one
-        What is looked for: "cause" or "change".
-    nominal, extended
-        Names of the two models.
-    nominal_column, extended_column
-        Their headings in tables.
-    headlines
-        Verdict -> headline with no cause, with one, with several.
-    error
-        Follows "error": of which model.
-    no_name, left
-        The part of the remaining error that is not noise: in a sentence, and in a legend.
-    source, cause, causes
-        Headings.
-    small, method, residual, floor, views
-        Sentences.
-    hidden
-        Sentence used when every effect would be visible.
-    own_gain
-        What the gain of a cause is less of.
-    taken
-        Legend of what a cause takes away.
-    refitted
-        The nominal model in a legend.
-    """
-
-    one: str
-    nominal: str
+    one: str  # what is looked for: "cause" or "change"
+    nominal: str  # names of the two models
     extended: str
-    nominal_column: str
+    nominal_column: str  # their headings in tables
     extended_column: str
-    headlines: dict[str, Three]
-    error: str
-    no_name: str
+    headlines: dict[str, Three]  # verdict -> headline with no cause, with one, with several
+    error: str  # follows "error": of which model
+    no_name: str  # the part of the remaining error that is not noise: in a sentence, and in a legend
     left: str
-    small: str
-    source: str
+    small: str  # sentences
+    source: str  # headings
     cause: str
     causes: str
     method: str
     residual: str
     floor: str
     views: str
-    hidden: str
-    own_gain: str
-    taken: str
-    refitted: str
+    hidden: str  # sentence used when every effect would be visible
+    own_gain: str  # what the gain of a cause is less of
+    taken: str  # legend of what a cause takes away
+    refitted: str  # the nominal model in a legend
 
 
 MODEL = Words(

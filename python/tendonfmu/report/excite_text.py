@@ -15,18 +15,7 @@ NEVER = ("side", "working_point", "slow")  # causes that another motion removes
 
 
 def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
-    """List the tables to print: joints, friction effects, kinds of numbers.
-
-    Parameters
-    ----------
-    result
-        Result of `excite`.
-
-    Yields
-    ------
-    tuple
-        Title, headings, rows.
-    """
+    """List the tables to print: joints, friction effects, kinds of numbers."""
     motion = result.motion
     yield (
         f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, {_load(result)}",
@@ -98,18 +87,7 @@ def _runs(numbers: list[int]) -> str:
 
 
 def lines(result: ExciteResult) -> Iterator[str]:
-    """List the lines to print: a summary, the assumptions, and which numbers another motion would identify.
-
-    Parameters
-    ----------
-    result
-        Result of `excite`.
-
-    Yields
-    ------
-    str
-        One line.
-    """
+    """List the lines to print: a summary, the assumptions, and which numbers another motion would identify."""
     judgement, noise = result.judgement, result.noise
     verdicts = judgement.verdicts
     known = sum(verdict.identifiable for verdict in verdicts)

@@ -19,19 +19,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class JointCurves:
-    """Torques of one joint over time.
+    """Torques of one joint over time."""
 
-    Attributes
-    ----------
-    name
-        Name of the joint.
-    measured, predicted, compensated : [N] N·m
-    external : [N] N·m
-        Reference sensor; None without one.
-    """
-
-    name: str
-    measured: Array
+    name: str  # name of the joint
+    measured: Array  #
     predicted: Array
     compensated: Array
     external: Array | None
@@ -39,26 +30,11 @@ class JointCurves:
 
 @dataclass(frozen=True)
 class CompensationFigure:
-    """What a figure of one compensated recording shows.
+    """What a figure of one compensated recording shows."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    time : [N] s
-    joints
-        Curves of each joint drawn.
-    found : (begin, end) s
-        Contacts found, without false alarms.
-    false : (begin, end) s
-        False alarms, as `score_detection` counts them.
-    labelled : (begin, end) s
-        Contacts as labelled; None without labels.
-    """
-
-    title: str
+    title: str  # heading
     time: Array
-    joints: list[JointCurves]
+    joints: list[JointCurves]  # curves of each joint drawn
     found: list[Interval]
     false: list[Interval]
     labelled: list[Interval] | None
@@ -66,64 +42,32 @@ class CompensationFigure:
 
 @dataclass(frozen=True)
 class StoryFigure:
-    """What the figure of the demo shows.
+    """What the figure of the demo shows."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    free
-        Recordings of free motion, one joint each, side by side.
-    pushed
-        A recording with contact, below them.
-    """
-
-    title: str
-    free: list[CompensationFigure]
-    pushed: CompensationFigure
+    title: str  # heading
+    free: list[CompensationFigure]  # recordings of free motion, one joint each, side by side
+    pushed: CompensationFigure  # A recording with contact, below them
 
 
 @dataclass(frozen=True)
 class ReferenceCurves:
-    """One joint of a recording against its reference sensor.
+    """One joint of a recording against its reference sensor."""
 
-    Attributes
-    ----------
-    title
-        Name of the recording.
-    time : [N] s
-    measured, compensated, external : [N] N·m
-    """
-
-    title: str
+    title: str  # name of the recording
     time: Array
-    measured: Array
+    measured: Array  #
     compensated: Array
     external: Array
 
 
 @dataclass(frozen=True)
 class ReferenceFigure:
-    """Recordings against their reference sensor.
+    """Recordings against their reference sensor."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    drawn
-        The recordings whose curves are drawn.
-    names : [r]
-        All recordings.
-    error, error_without : [r] N·m
-        rms error of each, with and without the friction model.
-    limit : N·m
-        Limit of the error, drawn as a line.
-    """
-
-    title: str
-    drawn: list[ReferenceCurves]
+    title: str  # heading
+    drawn: list[ReferenceCurves]  # the recordings whose curves are drawn
     names: list[str]
-    error: Array
+    error: Array  # rms error of each, with and without the friction model
     error_without: Array
     limit: float
 
@@ -136,25 +80,8 @@ def compensation_figure(
     title: str,
     joints: Sequence[int],
 ) -> CompensationFigure:
-    """Compute the curves and contacts of one recording.
-
-    Parameters
-    ----------
-    description
-        The finger.
-    recording
-        `time` [N]; `external_torque` [N, n] and `contact` [N] if there are labels.
-    outputs
-        Outputs of `native.Instance.run`, [N, n] and [N].
-    title
-        Heading.
-    joints
-        Joints drawn, indices from 0.
-
-    Returns
-    -------
-    CompensationFigure
-    """
+    """Compute the curves and contacts of one recording."""
+    # recording: [N]; outputs: [N, n]
     time = recording["time"]
     labels, external = recording.get("contact"), recording.get("external_torque")
     found = outputs["contact"].ravel().astype(bool)

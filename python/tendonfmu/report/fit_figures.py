@@ -64,19 +64,7 @@ def torque_unit(series: Sequence[FitSeries]) -> tuple[float, str]:
 
 
 def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
-    """Show the torque over time, ten seconds of each set of data.
-
-    Parameters
-    ----------
-    picture
-        A fit and its data.
-
-    Yields
-    ------
-    Sheet
-        The first training recording, what was held out of it, and each comparison. A comparison shows the same seconds
-        as the training if it has them, since it may be the same motion.
-    """
+    """Show the torque over time, ten seconds of each set of data."""
     first = BEGIN
     explanation = (
         " The residual is taken before the bias has seen the sample. Its share is that of the rms in the time shown."
@@ -248,10 +236,8 @@ def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
 
 
 def _binned(x: Numbers, y: Numbers, even: bool) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """Return the middle of each bin, and there the 10, 50 and 90 % quantiles of y.
-
-    Bins have the same width if `even`, the same number of samples otherwise.
-    """
+    """Return the middle of each bin, and there the 10, 50 and 90 % quantiles of y."""
+    # Bins have the same width if `even`, the same number of samples otherwise.
     if not x.size:
         return np.empty(0), np.empty(0), np.empty(0), np.empty(0)
     edges = (

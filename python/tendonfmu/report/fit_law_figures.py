@@ -26,18 +26,7 @@ _LAW_KEYS = (
 
 
 def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
-    """Show the friction laws of a fit.
-
-    Parameters
-    ----------
-    picture
-        A fit and its data.
-
-    Yields
-    ------
-    Sheet
-        One for the friction in the joints, then one for each tendon; at most `LAWS_DRAWN` laws in all.
-    """
+    """Show the friction laws of a fit."""
     desk = _Desk(picture)
     pairs = list(zip(effects(picture.start), effects(picture.fitted), strict=True))
     drawn = pairs[:LAWS_DRAWN]

@@ -31,25 +31,7 @@ Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
-    """Write `report.html` and one PNG file per sheet to a folder. Files appear whole or not at all.
-
-    Parameters
-    ----------
-    picture
-        A fit and its data.
-    folder
-        Output folder; it is made if missing.
-
-    Returns
-    -------
-    dict of Path to str
-        What each file contains.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made, or a file cannot be written.
-    """
+    """Write `report.html` and one PNG file per sheet to a folder. Files appear whole or not at all."""
     from tendonfmu.drawing import draw_panel, write_sheet
 
     try:

@@ -26,123 +26,62 @@ _GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
 @dataclass(frozen=True)
 class ResidualRow:
-    """Residuals of one joint, or of all together.
+    """Residuals of one joint, or of all together."""
 
-    Attributes
-    ----------
-    name
-        Name of the joint, or of the set of data.
-    torque, start, bias_only, model_only, fitted
-        rms in `ResidualTable.unit`; None where unknown.
-    left
-        Residual over torque.
-    """
-
-    name: str
-    torque: float | None
+    name: str  # name of the joint, or of the set of data
+    torque: float | None  # rms in `ResidualTable.unit`; None where unknown
     start: float | None
     bias_only: float | None
     model_only: float | None
     fitted: float | None
-    left: float | None
+    left: float | None  # residual over torque
 
 
 @dataclass(frozen=True)
 class ResidualTable:
-    """Residuals of one set of data, a row per joint; or of all sets if the finger has one joint.
+    """Residuals of one set of data, a row per joint; or of all sets if the finger has one joint."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    unit
-        Unit of the torques.
-    rows
-        Residuals by joint (or by set of data).
-    all
-        All joints together.
-    """
-
-    title: str
-    unit: str
-    rows: list[ResidualRow]
-    all: ResidualRow
+    title: str  # heading
+    unit: str  # unit of the torques
+    rows: list[ResidualRow]  # residuals by joint (or by set of data)
+    all: ResidualRow  # all joints together
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """Numbers that the data do not identify for one reason.
+    """Numbers that the data do not identify for one reason."""
 
-    Attributes
-    ----------
-    reason
-        Why not.
-    numbers
-        Entries of the report.
-    """
-
-    reason: str
-    numbers: list[Mapping[str, Any]]
+    reason: str  # why not
+    numbers: list[Mapping[str, Any]]  # entries of the report
 
 
 @dataclass(frozen=True)
 class Told:
-    """Standard deviation of a friction torque, and how well `contact.uncertainty` reproduces it.
-
-    Attributes
-    ----------
-    std : mN·m
-    error, worst
-        rms and 99 % quantile of the error as shares; None where the standard deviation is 0.
-    """
+    """Standard deviation of a friction torque, and how well `contact.uncertainty` reproduces it."""
 
     std: float
-    error: float | None
+    error: float | None  # rms and 99 % quantile of the error as shares; None where the standard deviation is 0
     worst: float | None
 
 
 @dataclass(frozen=True)
 class UncertaintyRow:
-    """What is unknown of a joint's modelled friction torque.
+    """What is unknown of a joint's modelled friction torque."""
 
-    Attributes
-    ----------
-    joint
-        Name of the joint.
-    inflation
-        The residuals count as this many times the noise that the description states.
-    directions
-        How many directions are kept.
-    captured
-        Their share of the variance, before the variance that they leave out is added back.
-    sets
-        Training data, held-out data, more load; None without data.
-    """
-
-    joint: str
-    inflation: float
-    directions: int
-    captured: float
-    sets: list[Told | None]
+    joint: str  # name of the joint
+    inflation: float  # the residuals count as this many times the noise that the description states
+    directions: int  # how many directions are kept
+    captured: float  # their share of the variance, before the variance that they leave out is added back
+    sets: list[Told | None]  # training data, held-out data, more load; None without data
 
 
 @dataclass(frozen=True)
 class NumberGroup:
-    """All estimated numbers of one joint or tendon.
+    """All estimated numbers of one joint or tendon."""
 
-    Attributes
-    ----------
-    name
-        Name of the joint or tendon.
-    identified
-        How many of its numbers are identified.
-    numbers
-        (path without the joint or tendon, entry of the report).
-    """
-
-    name: str
-    identified: int
-    numbers: list[tuple[str, Mapping[str, Any]]]
+    name: str  # name of the joint or tendon
+    identified: int  # how many of its numbers are identified
+    numbers: list[tuple[str, Mapping[str, Any]]]  # (path without the joint or tendon, entry of the report)
 
 
 @dataclass(frozen=True)
@@ -186,18 +125,7 @@ def _state(report: Mapping[str, Any]) -> str:
 
 
 def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
-    """List the residuals of a fit by set of data.
-
-    Parameters
-    ----------
-    picture
-        A fit and its data.
-
-    Yields
-    ------
-    ResidualTable
-        Training data, held-out data, then each comparison.
-    """
+    """List the residuals of a fit by set of data."""
     residual = picture.report["residual"]
     sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
     sets += [(f"{_COMPARED}{each['label']}", each) for each in residual.get("comparisons") or []]
@@ -304,20 +232,7 @@ def _range(tables: Sequence[ResidualTable]) -> str:
 
 
 def rounded(value: float | None, digits: int = 3) -> str:
-    """Format a number for a column of numbers to compare.
-
-    Parameters
-    ----------
-    value
-        Number; None where unknown.
-    digits
-        Significant digits.
-
-    Returns
-    -------
-    str
-        With trailing zeros and without an exponent; a dash for None.
-    """
+    """Format a number for a column of numbers to compare."""
     if value is None or not math.isfinite(value):
         return "–"
     whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0

@@ -14,18 +14,7 @@ EXAMPLES = 3  # paths listed for each reason
 
 
 def tables(fit: FrictionFit) -> Iterator[tuple[str, Row, list[Row]]]:
-    """List the tables to print: what is left of the torque, and the numbers by kind.
-
-    Parameters
-    ----------
-    fit
-        A finished fit.
-
-    Yields
-    ------
-    tuple
-        Title, headings, rows.
-    """
+    """List the tables to print: what is left of the torque, and the numbers by kind."""
     report, numbers, joints = fit.report_, fit.numbers_, fit.description_.joint_names
     known = report["identified"]
     yield _residuals(report, joints)
@@ -78,18 +67,7 @@ def _kind(number: Fitted) -> str:
 
 
 def lines(fit: FrictionFit) -> Iterator[str]:
-    """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers.
-
-    Parameters
-    ----------
-    fit
-        A finished fit.
-
-    Yields
-    ------
-    str
-        One line.
-    """
+    """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers."""
     report, numbers = fit.report_, fit.numbers_
     used = sum(each["used"] for each in report["recordings"])
     held = sum(each["held_out"] for each in report["recordings"])

@@ -21,27 +21,7 @@ TABLE, PICTURE, PAGE = "history.csv", "history.png", "history.html"
 
 
 def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]:
-    """Write the table, the picture and the page of a history.
-
-    Parameters
-    ----------
-    found
-        Sizes of causes over several recordings.
-    names
-        Names of joints and tendons.
-    folder
-        Output folder, which exists.
-
-    Returns
-    -------
-    dict of Path to str
-        What each file contains, the page first.
-
-    Raises
-    ------
-    InputError
-        A file cannot be written.
-    """
+    """Write the table, the picture and the page of a history."""
     sheet = history_sheet(found, names)
     written: dict[Path, str] = {}
     with whole_file(folder / PAGE) as file:
@@ -60,20 +40,7 @@ def write_history(found: History, names: Names, folder: Path) -> dict[Path, str]
 
 
 def history_report(found: History, written: Iterable[Path] = ()) -> dict[str, Any]:
-    """Return what `tendonfmu diagnose --history --json` prints.
-
-    Parameters
-    ----------
-    found
-        Sizes of causes over several recordings.
-    written
-        Files of the history.
-
-    Returns
-    -------
-    dict
-        Ready for JSON.
-    """
+    """Return what `tendonfmu diagnose --history --json` prints."""
     return {
         "format": FORMAT,
         "finger": found.finger,

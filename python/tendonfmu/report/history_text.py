@@ -21,22 +21,7 @@ def headline(found: History) -> str:
 
 
 def trend_sentence(line: Line, found: History, names: Names) -> str:
-    """Describe the trend of one cause.
-
-    Parameters
-    ----------
-    line
-        Size of one cause over the recordings.
-    found
-        The history with its unit of time.
-    names
-        Names of joints and tendons.
-
-    Returns
-    -------
-    str
-        Such as "friction at edges, at joint 2: grows 4 % a week (3 to 5 %), off the reference since march_8.parquet".
-    """
+    """Describe the trend of one cause."""
     what = at_place(line.title, line.where, names)
     since = f", off the reference since {Path(line.since).name}" if line.since else ""
     if line.trend is None:

@@ -24,83 +24,37 @@ from tendonfmu.files import html_template
 
 
 class Tile(NamedTuple):
-    """An important number and what it is.
+    """An important number and what it is."""
 
-    Attributes
-    ----------
-    value
-        The number as text.
-    unit
-        Its unit; may be empty.
-    meaning
-        What it is.
-    """
-
-    value: str
-    unit: str
-    meaning: str
+    value: str  # the number as text
+    unit: str  # its unit; may be empty
+    meaning: str  # what it is
 
 
 @dataclass(frozen=True)
 class PagePanel:
-    """A panel as a page shows it.
+    """A panel as a page shows it."""
 
-    Attributes
-    ----------
-    number
-        Index of its figure in the page.
-    title, note, alt
-        Texts of the panel.
-    width, height : CSS pixels
-    """
-
-    number: int
-    title: str
+    number: int  # index of its figure in the page
+    title: str  # texts of the panel
     note: str
     alt: str
-    width: int
+    width: int  #
     height: int
 
 
 @dataclass(frozen=True)
 class PageSheet:
-    """A sheet as a page shows it.
+    """A sheet as a page shows it."""
 
-    Attributes
-    ----------
-    sheet
-        The sheet.
-    size
-        Size of its panels.
-    keys
-        (CSS class, CSS colour, opacity, meaning).
-    panels
-        Its panels.
-    """
-
-    sheet: Sheet
-    size: str
-    keys: list[tuple[str, str, float, str]]
-    panels: list[PagePanel]
+    sheet: Sheet  # the sheet
+    size: str  # size of its panels
+    keys: list[tuple[str, str, float, str]]  # (CSS class, CSS colour, opacity, meaning)
+    panels: list[PagePanel]  # its panels
 
 
 def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
-    """Return the HTML text of a page.
-
-    Parameters
-    ----------
-    template
-        Name of a file in python/tendonfmu/templates.
-    sheets
-        Figures of the page. The template finds them by section in `figures`.
-    **content
-        Variables of the template.
-
-    Returns
-    -------
-    str
-        A whole HTML file.
-    """
+    """Return the HTML text of a page."""
     figures: dict[str, list[PageSheet]] = {}
     panels: list[Panel | MatrixPanel] = []
     names: list[dict[str, str]] = []
@@ -129,9 +83,7 @@ def _placed(sheet: Sheet, first: int) -> PageSheet:
 
 
 def _keys(sheet: Sheet) -> list[tuple[str, str, float, str]]:
-    """List the keys of a sheet.
-
-    Keys of the correlation also have their style's name as a class, since a dark page inverts its colours.
-    """
+    """List the keys of a sheet."""
+    # Keys of the correlation also have their style's name as a class, since a dark page inverts its colours.
     styles = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
     return [(f"{style.shape} {name}", style.colour, style.alpha, meaning) for name, style, meaning in styles]

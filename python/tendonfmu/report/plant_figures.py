@@ -35,106 +35,49 @@ SMALL: WAYS = (
 
 @dataclass(frozen=True)
 class Loop:
-    """Friction of one joint over its angle.
+    """Friction of one joint over its angle."""
 
-    Attributes
-    ----------
-    label
-        Name in the legend.
-    angle : [N] rad
-    rig, model : [N] N·m
-        Friction torque of the rig and of the friction model.
-    model_line : [K, 2] rad, N·m
-        Angle and model torque where the joint moves, without standstill, so that each jump is drawn once.
-    """
-
-    label: str
+    label: str  # name in the legend
     angle: Array
-    rig: Array
+    rig: Array  # friction torque of the rig and of the friction model
     model: Array
     model_line: Array
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A bristle over the joint angle.
+    """A bristle over the joint angle."""
 
-    Attributes
-    ----------
-    label
-        Name in the legend.
-    angle : [N] rad
-    bristle : [N]
-        w; 1 is break-away.
-    """
-
-    label: str
+    label: str  # name in the legend
     angle: Array
     bristle: Array
 
 
 @dataclass(frozen=True)
 class LoopFigure:
-    """Friction loops of one joint.
+    """Friction loops of one joint."""
 
-    Attributes
-    ----------
-    joint
-        Its name.
-    loops
-        One per pretension.
-    """
-
-    joint: str
-    loops: list[Loop]
+    joint: str  # its name
+    loops: list[Loop]  # one per pretension
 
 
 @dataclass(frozen=True)
 class PreslidingFigure:
-    """Friction before sliding.
+    """Friction before sliding."""
 
-    Attributes
-    ----------
-    joint, tendon
-        Their names.
-    reversals
-        Torque after a reversal over the angle back from there, one per pretension.
-    contacts
-        Bristles in the same motion at the first pretension.
-    small
-        Small moves to and fro; the angle counts from where they begin.
-    turns
-        Indices in `small` at the end of each small move. After the last one the joint is led away.
-    """
-
-    joint: str
+    joint: str  # their names
     tendon: str
-    reversals: list[Loop]
-    contacts: list[Contact]
-    small: Loop
-    turns: list[int]
+    reversals: list[Loop]  # torque after a reversal over the angle back from there, one per pretension
+    contacts: list[Contact]  # bristles in the same motion at the first pretension
+    small: Loop  # small moves to and fro; the angle counts from where they begin
+    turns: list[int]  # indices in `small` at the end of each small move
 
 
 @dataclass(frozen=True)
 class TruthFigure:
-    """Part of a recording with its truth.
+    """Part of a recording with its truth."""
 
-    Attributes
-    ----------
-    joint
-        Its name.
-    time : [N] s
-    forces : [N, m] N
-        Measured tendon forces.
-    flexors : [m]
-        Which tendons are flexors.
-    angle : [N] rad
-    torques : [N] N·m
-        Torques of the joint by label.
-    contacts : (begin, end) s
-    """
-
-    joint: str
+    joint: str  # its name
     time: Array
     forces: Array
     flexors: list[bool]
@@ -144,23 +87,8 @@ class TruthFigure:
 
 
 def led(rig: Rig, joint: int, ways: WAYS, pretension: float) -> dict[str, Array]:
-    """Return the true signals of a rig whose motors lead one joint from rest to rest while the others stay.
-
-    Parameters
-    ----------
-    rig
-        Simulated finger.
-    joint
-        Index of the joint, from 0.
-    ways
-        (time s, angle rad) of each rest.
-    pretension : N
-
-    Returns
-    -------
-    dict of str to ndarray
-        Signals without sensors; also `bristle` [N, k] and `time` [N].
-    """
+    """Return the true signals of a rig whose motors lead one joint from rest to rest while the others stay."""
+    # returns signals without sensors; also `bristle` [N, k] and `time` [N]
     expanded = copy.deepcopy(dict(rig.expanded))
     first = [knots["position"][0] for knots in expanded["motion"]["joints"]]
     joints = [_knots([(0.0, angle)]) for angle in first]
@@ -187,10 +115,8 @@ def _knots(ways: Sequence[tuple[float, float]]) -> dict[str, list[float]]:
 
 
 def model_friction(rig: Rig, joint: int, signals: Signals) -> NDArray[np.float64]:
-    """Return the friction torque [N] N·m of one joint as the friction model has it, eq. (10).
-
-    It uses the rig's own static numbers, v_min = 0, and the true velocity of that joint alone, without the bias.
-    """
+    """Return the friction torque [N] N·m of one joint as the friction model has it, eq. (10)."""
+    # It uses the rig's own static numbers, v_min = 0, and the true velocity of that joint alone, without the bias.
     description = dict(rig.finger.data) | {"velocity_threshold": {"tendon": 0.0, "joint": 0.0}}
     alone = np.zeros_like(signals["joint_velocity"])
     alone[:, joint] = signals["joint_velocity"][:, joint]
@@ -250,11 +176,7 @@ def _loop(rig: Rig, joint: int, signals: Signals, shown: Array | slice, label: s
 
 
 def moving_on(angle: Array, apart: float) -> NDArray[np.intp]:
-    """Return indices of points at least `apart` (rad) from the one before.
-
-    At standstill the velocity trembles about 0 and the model's torque jumps from row to row. A dashed line must not
-    follow these jumps.
-    """
+    """Return indices of points at least `apart` (rad) from the one before."""
     kept, last = [], angle[0]
     for k, value in enumerate(angle):
         if abs(value - last) >= apart:
@@ -295,11 +217,7 @@ def truth_figure(rig: Rig, joint: int, begin: float, end: float) -> TruthFigure:
 
 
 def bristle_numbers(rig: Rig, joint: int, tendon: int) -> dict[str, int]:
-    """Return the indices of three bristles: the edge before a joint, the pulley there, and the joint's own friction.
-
-    Bristles are ordered as in tendonfmu_plant_derivative: along each tendon edge and pulley of joint 1, of joint 2, and
-    so on, then the joints.
-    """
+    """Return the indices of three bristles: the edge before a joint, the pulley there, and the joint's own friction."""
     found: dict[str, int] = {}
     wrist = 1 if rig.expanded["physics"].get("wrist") else 0  # comes first along each tendon
     number = 0

@@ -32,15 +32,7 @@ from tendonfmu.report.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
 
 
 def draw_story(data: StoryFigure, target: Target) -> None:
-    """Draw free motions side by side and a recording with pushes below them, as PNG (the paper's figs. 6 to 8).
-
-    Parameters
-    ----------
-    data
-        What to draw.
-    target
-        File name or binary stream.
-    """
+    """Draw free motions side by side and a recording with pushes below them, as PNG (the paper's figs. 6 to 8)."""
     pushed = data.pushed
     figure = Figure(figsize=(15.0, 6.4 + 4.4 * len(pushed.joints)), layout="constrained")
     heights = [1.0, 0.8] + [1.0, 0.9] * len(pushed.joints) + [0.42]

@@ -31,90 +31,46 @@ BEYOND = 7.0  # mm, from a tendon's last joint to its end
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A link as a solid cylinder with its mass and its moment of inertia along the finger.
+    """A link as a solid cylinder with its mass and its moment of inertia along the finger."""
 
-    Attributes
-    ----------
-    begin, end : mm
-        Along x.
-    radius : mm
-    """
-
-    begin: float
+    begin: float  # along x
     end: float
     radius: float
 
 
 @dataclass(frozen=True)
 class DrawnRoute:
-    """A tendon in one view.
+    """A tendon in one view."""
 
-    Attributes
-    ----------
-    name
-        Its name.
-    flexor
-        Whether it bends the finger.
-    colour
-        Index among the tendons of its kind.
-    line, spring : [k, 2] mm
-    pulleys, edges, varying_edges : [k, 2] mm
-        Marks of friction; `varying_edges` where it varies with an angle. Empty in the view from above.
-    """
-
-    name: str
-    flexor: bool
-    colour: int
-    line: Points
+    name: str  # its name
+    flexor: bool  # whether it bends the finger
+    colour: int  # index among the tendons of its kind
+    line: Points  #
     spring: Points
-    pulleys: Points
+    pulleys: Points  # marks of friction; `varying_edges` where it varies with an angle
     edges: Points
     varying_edges: Points
 
 
 @dataclass(frozen=True)
 class View:
-    """The finger seen along one axis.
+    """The finger seen along one axis."""
 
-    Attributes
-    ----------
-    title
-        "from the side" or "from above".
-    joints : (name, x mm)
-        Joints whose axis one looks along.
-    routes
-        Its tendons.
-    stations : (label, x mm)
-        Where friction acts.
-    """
-
-    title: str
+    title: str  # "from the side" or "from above"
     joints: list[tuple[str, float]]
-    routes: list[DrawnRoute]
+    routes: list[DrawnRoute]  # its tendons
     stations: list[tuple[str, float]]
 
 
 @dataclass(frozen=True)
 class RigDrawing:
-    """A finger in two views.
+    """A finger in two views."""
 
-    Attributes
-    ----------
-    name
-        Name of the rig.
-    bodies
-        Links, the base first; links without length are left out.
-    side, top
-        The views.
-    left, right : mm
-        Ends of the drawing along x.
-    """
-
-    name: str
-    bodies: list[DrawnBody]
-    side: View
+    name: str  # name of the rig
+    bodies: list[DrawnBody]  # links, the base first; links without length are left out
+    side: View  # the views
     top: View
-    left: float
+    left: float  # ends of the drawing along x
     right: float
 
 

@@ -28,22 +28,8 @@ _KEYS = (
 def run_sheets(
     table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None = None
 ) -> Iterator[Sheet]:
-    """Yield the figures of a run.
-
-    Parameters
-    ----------
-    table
-        Outputs by column [N], from `run_model`.
-    joints, tendons
-        Their names.
-    label : [N]
-        Labelled contact; None without labels.
-
-    Yields
-    ------
-    Sheet
-        A sheet per joint, contact and slack, joint angles and speeds.
-    """
+    """Yield the figures of a run."""
+    # table: [N]
     factor, unit = _torque_unit(table, len(joints))
     for j, name in enumerate(joints, start=1):
         yield Sheet(

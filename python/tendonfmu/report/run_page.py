@@ -21,20 +21,7 @@ def page_of(report: Path) -> Path:
 
 
 def check_page(report: Path, *inputs: Path) -> None:
-    """Check that the page of a run can be written.
-
-    Parameters
-    ----------
-    report
-        A file that ends in .html, or a folder.
-    *inputs
-        Files that it must not replace.
-
-    Raises
-    ------
-    InputError
-        It cannot be written, or is an input.
-    """
+    """Check that the page of a run can be written."""
     page = page_of(report)
     if page != report:
         check_output_folder(report)
@@ -45,29 +32,8 @@ def check_page(report: Path, *inputs: Path) -> None:
 def write_run_page(
     report: Path, numbers: Mapping[str, Any], table: Mapping[str, NDArray[Any]], label: NDArray[Any] | None = None
 ) -> Path:
-    """Write the page of a run, whole or not at all.
-
-    Parameters
-    ----------
-    report
-        A file that ends in .html, or a folder, which is made if missing.
-    numbers
-        From `run_report`.
-    table
-        Outputs by column [N], from `run_model`.
-    label : [N]
-        Labelled contact; None without labels.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    InputError
-        It cannot be written.
-    """
+    """Write the page of a run, whole or not at all."""
+    # table: [N]
     page = page_of(report)
     if page != report:
         report.mkdir(parents=True, exist_ok=True)

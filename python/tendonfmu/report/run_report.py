@@ -20,27 +20,8 @@ Table = Mapping[str, NDArray[Any]]
 def run_report(
     model: Path, recording: Path, table: Table, finger: Finger | None, *, kinematics: int, output: str
 ) -> dict[str, Any]:
-    """Return the results of a run in numbers.
-
-    Parameters
-    ----------
-    model, recording
-        Files of the run.
-    table
-        Outputs by column [N], from `run_model`.
-    finger
-        From `finger_of`; names the joints and tendons.
-    kinematics
-        1, 2 or 3.
-    output
-        Where the table is written to.
-
-    Returns
-    -------
-    dict
-        Ready for JSON. Torques in N·m, angles in rad, times in s; shares from 0 to 1 are of the samples. `free_` is
-        without the samples in which contact was detected; None if there are no others.
-    """
+    """Return the results of a run in numbers."""
+    # table: [N]
     time = table["time"]
     joints, tendons = _count(table, "joint_torque"), _count(table, "slack")
     joint_names = [f"joint {j}" for j in range(1, joints + 1)] if finger is None else finger.joint_names

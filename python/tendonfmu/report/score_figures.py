@@ -30,156 +30,75 @@ _COLUMNS, _POINTS = 560, 5000
 
 @dataclass(frozen=True)
 class JointTorques:
-    """Torques of one joint.
+    """Torques of one joint."""
 
-    Attributes
-    ----------
-    name
-        Its name.
-    measured, compensated : [N] N·m
-    external : [N] N·m
-        Of the reference sensor; None without one.
-    """
-
-    name: str
-    measured: Numbers
+    name: str  # its name
+    measured: Numbers  #
     compensated: Numbers
     external: Numbers | None
 
 
 @dataclass(frozen=True)
 class ContactFigure:
-    """Torques and detection over time.
+    """Torques and detection over time."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    time : [N] s
-    joints
-        Torques of the joints drawn.
-    force : [N] N
-        Sensed force; None without a sensor.
-    labelled : (begin, end) s
-        Contact as labelled.
-    found, masked : (begin, end) s
-        Alarm during an event that is found, or missed.
-    outside : (begin, end) s
-        Alarm outside events, including what outlasts them.
-    """
-
-    title: str
+    title: str  # heading
     time: Numbers
-    joints: list[JointTorques]
+    joints: list[JointTorques]  # torques of the joints drawn
     force: Numbers | None
     labelled: list[Interval]
-    found: list[Interval]
+    found: list[Interval]  # alarm during an event that is found, or missed
     masked: list[Interval]
     outside: list[Interval]
 
 
 @dataclass(frozen=True)
 class EventFigure:
-    """Every event as a row, found ones in order of delay, then missed ones, last those that began in an alarm.
+    """Every event as a row, found ones in order of delay, then missed ones, last those that began in an alarm."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    begin, end : s
-        Time drawn, from the onset.
-    torque : [e, t] N·m
-        Magnitude of the compensated torque over all joints; NaN beyond the recording.
-    most : N·m
-        Upper end of the colours; few rows exceed it.
-    groups
-        (what, how many rows).
-    delay, length : [e] s
-        The delay is NaN for missed events.
-    """
-
-    title: str
-    begin: float
+    title: str  # heading
+    begin: float  # time drawn, from the onset
     end: float
     torque: Numbers
     most: float
-    groups: list[tuple[str, int]]
-    delay: Numbers
+    groups: list[tuple[str, int]]  # (what, how many rows)
+    delay: Numbers  # the delay is NaN for missed events
     length: Numbers
 
 
 @dataclass(frozen=True)
 class RocFigure:
-    """Found events against false alarms, over factors on the thresholds.
+    """Found events against false alarms, over factors on the thresholds."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    factors : [f]
-    found, found_low, found_high : [f]
-        Share of the events, with its 95 % interval.
-    rate, rate_low, rate_high : [f] 1/h
-        False alarms.
-    in_alarm : [f]
-        Share of the free time in alarm.
-    masked : [f]
-        Share of the events that began in an alarm.
-    own
-        Index of the description's own thresholds.
-    named
-        Indices of points whose factor is written beside them.
-    least : 1/h
-        Rate of one false alarm in all the free time.
-    """
-
-    title: str
+    title: str  # heading
     factors: Numbers
-    found: Numbers
+    found: Numbers  # share of the events, with its 95 % interval
     found_low: Numbers
     found_high: Numbers
-    rate: Numbers
+    rate: Numbers  # false alarms
     rate_low: Numbers
     rate_high: Numbers
     in_alarm: Numbers
     masked: Numbers
-    own: int
-    named: list[int]
+    own: int  # index of the description's own thresholds
+    named: list[int]  # indices of points whose factor is written beside them
     least: float
 
 
 @dataclass(frozen=True)
 class DelayFigure:
-    """How soon events are found.
+    """How soon events are found."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    delays : [k] s
-        Increasing.
-    share, low, high : [k]
-        Share of all events found within that time, with its 95 % interval.
-    median, ninety : s
-        Delays within which 50 % and 90 % are found.
-    end : s
-        Time drawn.
-    later
-        How many delays are beyond `end`.
-    bins
-        Bins of the histogram.
-    """
-
-    title: str
+    title: str  # heading
     delays: Numbers
-    share: Numbers
+    share: Numbers  # share of all events found within that time, with its 95 % interval
     low: Numbers
     high: Numbers
-    median: float
+    median: float  # delays within which 50 % and 90 % are found
     ninety: float
     end: float
-    later: int
-    bins: int
+    later: int  # how many delays are beyond `end`
+    bins: int  # bins of the histogram
 
 
 def contact_figure(scored: Scored) -> ContactFigure:
@@ -214,10 +133,7 @@ def contact_figure(scored: Scored) -> ContactFigure:
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
-    """Find the earliest window of `SHOWN` seconds with most events: (events, those found, begin in s).
-
-    For a recording without events: (0, false alarms, begin).
-    """
+    """Find the earliest window of `SHOWN` seconds with most events: (events, those found, begin in s)."""
     time = track.recording.time
     onsets = np.array([event.onset for event in score.events])
     found = np.array([event.onset for event in score.events if event.found])

@@ -11,25 +11,7 @@ from tendonfmu.report.score_plots import draw_contacts, draw_delays, draw_events
 
 
 def write_figures(scored: Scored, folder: Path) -> dict[Path, str]:
-    """Draw the figures of a score as PNG files.
-
-    Parameters
-    ----------
-    scored
-        A scored detection. Figures without data are left out.
-    folder
-        Output folder; it is made if missing.
-
-    Returns
-    -------
-    dict of Path to str
-        What each file shows.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made, or a file cannot be written.
-    """
+    """Draw the figures of a score as PNG files."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -13,18 +13,7 @@ SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are printed
 
 
 def tables(scored: Scored) -> Iterator[tuple[str, Row, list[Row]]]:
-    """List the tables to print: torque by joint, with 95 % intervals in brackets.
-
-    Parameters
-    ----------
-    scored
-        A scored detection.
-
-    Yields
-    ------
-    tuple
-        Title, headings, rows.
-    """
+    """List the tables to print: torque by joint, with 95 % intervals in brackets."""
     found = scored.summary
     headings = ["joint", "free residual\nrms, mN·m"]
     columns = [[_estimate(each, 1e3) for each in found.free_rms]]

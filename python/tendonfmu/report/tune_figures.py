@@ -23,63 +23,25 @@ _FACTORS = np.geomspace(0.4, 2.5, 60)
 
 @dataclass(frozen=True)
 class TailFigure:
-    """Alarms per hour over the factor on the chosen thresholds.
+    """Alarms per hour over the factor on the chosen thresholds."""
 
-    Attributes
-    ----------
-    title
-        Heading.
-    factors : [f]
-    in_sample, held_out : [f] 1/h
-        Rates with bounds chosen on the same blocks, and on other blocks.
-    low, high : [f] 1/h
-        95 % interval of `held_out`.
-    wished : 1/h
-        Rate that was asked for.
-    limit : 1/h
-        Upper limit of the rate at factor 1.
-    confidence
-        Probability of that limit.
-    least : 1/h
-        Rate of one alarm in all the time.
-    """
-
-    title: str
+    title: str  # heading
     factors: Numbers
-    in_sample: Numbers
+    in_sample: Numbers  # rates with bounds chosen on the same blocks, and on other blocks
     held_out: Numbers
-    low: Numbers
+    low: Numbers  # 95 % interval of `held_out`
     high: Numbers
     wished: float
     limit: float
-    confidence: float
+    confidence: float  # probability of that limit
     least: float
 
 
 @dataclass(frozen=True)
 class BoundPanel:
-    """Bounds of one joint over the force.
+    """Bounds of one joint over the force."""
 
-    Attributes
-    ----------
-    joint
-        Its name.
-    force : [k] N
-    own : [k] N·m
-        base + per_force·f.
-    others : [k] N·m
-        Bounds of the residual and of slow loads by name, without friction.
-    at : [g] N
-        Mean forces of the groups.
-    friction : [g] N·m
-        Bound with what stiction and jumps add on average.
-    points : [g] N·m
-        What the joint's innovation alone exceeds at the rate, with the friction subtracted.
-    rms : [g] N·m
-        Of the residual.
-    """
-
-    joint: str
+    joint: str  # its name
     force: Numbers
     own: Numbers
     others: Mapping[str, Numbers]
@@ -98,20 +60,11 @@ class BoundFigure:
 
 @dataclass(frozen=True)
 class Moment:
-    """Signal and bound around one of the highest peaks.
+    """Signal and bound around one of the highest peaks."""
 
-    Attributes
-    ----------
-    title
-        Where and when.
-    time : [t] s
-        From the peak.
-    signal, bound, own : [t] N·m
-    """
-
-    title: str
+    title: str  # where and when
     time: Numbers
-    signal: Numbers
+    signal: Numbers  #
     bound: Numbers
     own: Numbers
 

@@ -11,25 +11,7 @@ from tendonfmu.report.tune_plots import draw_bounds, draw_tail, draw_worst
 
 
 def write_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
-    """Draw the figures of a tuning as PNG files.
-
-    Parameters
-    ----------
-    tuning
-        Thresholds tuned on free motion.
-    folder
-        Output folder; it is made if missing.
-
-    Returns
-    -------
-    dict of Path to str
-        What each file shows.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made, or a file cannot be written.
-    """
+    """Draw the figures of a tuning as PNG files."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -13,18 +13,7 @@ Row = tuple[str, ...]
 
 
 def tables(tuning: ContactTuning) -> Iterator[tuple[str, Row, list[Row]]]:
-    """List the tables to print: bounds by joint, then results by pretension.
-
-    Parameters
-    ----------
-    tuning
-        Thresholds tuned on free motion.
-
-    Yields
-    ------
-    tuple
-        Title, headings, rows.
-    """
+    """List the tables to print: bounds by joint, then results by pretension."""
     yield _bounds(tuning)
     yield _pretensions(tuning)
 

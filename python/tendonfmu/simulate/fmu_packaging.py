@@ -33,27 +33,7 @@ LARGEST_SEED = 2**31 - 1
 
 
 def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
-    """Package the FMU of a rig's simulated finger.
-
-    Parameters
-    ----------
-    rig_path
-        The rig file.
-    output_path
-        The FMU. It is written whole or not at all.
-    binaries
-        A folder of <FMI platform>/tendonfmu_plant.<so, dll or dylib>, used instead of the installed ones.
-
-    Returns
-    -------
-    Path
-        `output_path`.
-
-    Raises
-    ------
-    InputError
-        The rig is refused, binaries are missing, or the output cannot be written.
-    """
+    """Package the FMU of a rig's simulated finger."""
     rig = read_rig(rig_path)
     archive = pack(plant_members(rig, binaries=binaries))
     with whole_file(output_path) as file:
@@ -62,10 +42,7 @@ def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None 
 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
-    """Return content by path in the archive, for all files of the FMU.
-
-    Raise InputError if the plant refuses the rig.
-    """
+    """Return content by path in the archive, for all files of the FMU."""
     from tendonfmu.fmu import render_documentation
 
     text = rig.json().encode()

@@ -14,10 +14,7 @@ DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 
 def describe_plant(rig: Rig, settings: Settings, table: VariableTable) -> dict[str, Any]:
-    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources.
-
-    settings: those of the rig; they are the start values of the parameters. See modelDescription/README.md.
-    """
+    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources."""
     sizes = group_sizes(rig.joints, rig.tendons)
     variables = [variable for group in table.data["groups"] for variable in elements(group, sizes)]
     starts = _starts(settings)

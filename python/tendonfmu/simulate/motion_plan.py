@@ -42,24 +42,13 @@ STILL = 1e-9  # rad/s, rad/s2; a joint with less stands still at the ends of a m
 
 @dataclass(frozen=True)
 class Motion:
-    """An expanded motion.
+    """An expanded motion."""
 
-    Attributes
-    ----------
-    joints
-        Knots of each joint: time (s), position (rad), velocity (rad/s), acceleration (rad/s2).
-    pretension
-        Knots: time (s), value (N).
-    says
-        The motion in words.
-    file
-        The file that was read for it, or None.
-    """
-
+    # knots of each joint: time (s), position (rad), velocity (rad/s), acceleration (rad/s2)
     joints: list[dict[str, list[float]]]
-    pretension: dict[str, list[float]]
-    says: str
-    file: Path | None = None
+    pretension: dict[str, list[float]]  # knots: time (s), value (N)
+    says: str  # the motion in words
+    file: Path | None = None  # the file that was read for it, or None
 
     def expanded(self) -> dict[str, Any]:
         """Return the motion as the C++ reader takes it."""
@@ -78,10 +67,8 @@ class Joints:
 
 
 def expand_motion(motion: Node, joints: Joints, seed: int, duration: float | None) -> Motion:
-    """Return the rig's `motion` as knots. Raise Refusal with the key path, or InputError with the file.
-
-    seed: used if the motion has none. duration: of the recording (s), used if the motion has none; or None.
-    """
+    """Return the rig's `motion` as knots. Raise Refusal with the key path, or InputError with the file."""
+    # seed: used if the motion has none. duration: of the recording (s), used if the motion has none; or None.
     if not isinstance(motion.value, dict):
         motion.refuse('an object with the key kind: "still", "strokes" or "file"')
     kind = motion.member("kind").choice("still", "strokes", "file")
@@ -185,10 +172,7 @@ def _standing(angle: float) -> dict[str, list[float]]:
 
 
 def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list[float]:
-    """Return the first posture [n] (rad), within the limits.
-
-    The default is the middle of the range, or 0 without limits.
-    """
+    """Return the first posture [n] (rad), within the limits."""
     if node.absent:
         middle = [0.5 * (low + high) for low, high in zip(lower, upper, strict=True)]
         return [angle if math.isfinite(angle) else 0.0 for angle in middle]

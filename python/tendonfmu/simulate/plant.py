@@ -63,35 +63,17 @@ class SolverError(PlantError):
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a plant; see tendonfmu_plant_settings.
+    """Settings of a plant; see tendonfmu_plant_settings."""
 
-    Attributes
-    ----------
-    integrator
-        A key of `INTEGRATORS`.
-    relative_tolerance
-        Of CVODE.
-    step
-        Of the fixed-step integrator (s).
-    scheduled_motion, scheduled_pushes, sensors
-        Whether the plant runs the rig's motion, pushes and sensors.
-    seed
-        Of the sensors' noise.
-    push_point
-        Point of the pushes [3] (m), in the frame of push_link.
-    push_link
-        From 1.
-    """
-
-    integrator: str
-    relative_tolerance: float
-    step: float
-    scheduled_motion: bool
+    integrator: str  # A key of `INTEGRATORS`
+    relative_tolerance: float  # of CVODE
+    step: float  # of the fixed-step integrator (s)
+    scheduled_motion: bool  # whether the plant runs the rig's motion, pushes and sensors
     scheduled_pushes: bool
     sensors: bool
-    seed: int
-    push_point: tuple[float, float, float]
-    push_link: int
+    seed: int  # of the sensors' noise
+    push_point: tuple[float, float, float]  # point of the pushes [3] (m), in the frame of push_link
+    push_link: int  # from 1
 
 
 @dataclass(frozen=True)
@@ -125,27 +107,13 @@ def refused_by(rig: Path) -> Iterator[None]:
 
 
 def require_plant() -> None:
-    """Check that this installation has a simulated finger.
-
-    Raises
-    ------
-    InputError
-        It was built without SUNDIALS.
-    """
+    """Check that this installation has a simulated finger."""
     if not HAS_PLANT:
         raise InputError(PLANT_MISSING)
 
 
 class Plant:
-    """A simulated finger: created from the text of an expanded rig, initialised, then run forward in time.
-
-    Not to be used by two threads at a time. Methods raise PlantError for invalid arguments and calls out of order.
-
-    Parameters
-    ----------
-    rig_json
-        As `Rig.json()` returns it. PlantError gives key path, value and expectation.
-    """
+    """A simulated finger: created from the text of an expanded rig, initialised, then run forward in time."""
 
     def __init__(self, rig_json: str | bytes) -> None:
         require_plant()
@@ -187,18 +155,7 @@ class Plant:
         return Settings(names[integrator], tolerance, step, motion, pushes, sensors, seed, (x, y, z), link)
 
     def configure(self, **changes: Any) -> None:
-        """Change settings, before the initialisation only.
-
-        Parameters
-        ----------
-        **changes
-            New values by the names of `Settings`.
-
-        Raises
-        ------
-        PlantError
-            A setting is invalid, or the plant is initialised already.
-        """
+        """Change settings, before the initialisation only."""
         wanted = replace(self.settings, **changes)
         if wanted.integrator not in INTEGRATORS:
             raise PlantError(f"integrator = {wanted.integrator!r}: expected {' or '.join(INTEGRATORS)}")
@@ -221,50 +178,20 @@ class Plant:
         pretension: float = 0.0,
         push_force: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Set the inputs. They are held until they are set again.
-
-        Parameters
-        ----------
-        tendon_position_command
-            [m] (m). None: leave as it is.
-        pretension
-            N.
-        push_force
-            [3] (N), base frame.
-
-        Raises
-        ------
-        PlantError
-            An input is invalid.
-        """
+        """Set the inputs. They are held until they are set again."""
+        # tendon_position_command: [m] (m); push_force: [3] (N)
         command = None if tendon_position_command is None else [float(value) for value in tendon_position_command]
         with _refusals():
             self._plant.set_inputs(command, float(pretension), [float(value) for value in push_force])
 
     def initialise(self) -> None:
-        """Settle the finger. It is then at time 0.
-
-        Raises
-        ------
-        SolverError
-            The integrator failed.
-        """
+        """Settle the finger. It is then at time 0."""
         with _refusals():
             self._plant.initialise()
 
     def advance(self, time: float) -> None:
-        """Integrate up to a time.
-
-        Parameters
-        ----------
-        time
-            End of the integration (s).
-
-        Raises
-        ------
-        SolverError
-            The integrator failed. The plant then has its state from before the call.
-        """
+        """Integrate up to a time."""
+        # time: (s)
         with _refusals():
             self._plant.advance(time)
 
@@ -274,37 +201,14 @@ class Plant:
             self._plant.reset()
 
     def hold_command(self) -> NDArray[np.float64]:
-        """Return the motor positions that hold the rig's first posture with its pretension.
-
-        Returns
-        -------
-        ndarray
-            [m] (m).
-        """
+        """Return the motor positions that hold the rig's first posture with its pretension."""
+        # returns [m] (m)
         with _refusals():
             return np.array(self._plant.hold_command())
 
     def run(self, time: Array, signals: Sequence[str] = SIGNALS) -> dict[str, Array]:
-        """Advance through increasing times, and return one row of each signal wanted.
-
-        Parameters
-        ----------
-        time
-            [N] (s).
-        signals
-            Names from `SIGNALS`.
-
-        Returns
-        -------
-        dict of arrays
-            [N, size] by name, sizes and units as in tendonfmu_plant_signals. `contact` and `friction_level` are [N];
-            flags are bool.
-
-        Raises
-        ------
-        SolverError
-            The integrator failed.
-        """
+        """Advance through increasing times, and return one row of each signal wanted."""
+        # time: [N] (s); returns [N, size] [N]
         with _refusals():
             found = self._plant.run(np.ascontiguousarray(time, dtype=np.float64), list(signals))
         for name in FLAGS:
@@ -313,30 +217,12 @@ class Plant:
         return {name: array[:, 0] if name in SCALARS else array for name, array in found.items()}
 
     def save_state(self) -> bytes:
-        """Return a copy of the state.
-
-        Returns
-        -------
-        bytes
-            For `restore_state`.
-        """
+        """Return a copy of the state."""
         with _refusals():
             return self._plant.save_state()
 
     def restore_state(self, state: bytes) -> None:
-        """Return to a saved state.
-
-        Parameters
-        ----------
-        state
-            From `save_state` of an initialised plant of the same rig and settings. This plant must be initialised as
-            well.
-
-        Raises
-        ------
-        PlantError
-            The state does not belong to this plant.
-        """
+        """Return to a saved state."""
         with _refusals():
             self._plant.restore_state(state)
 
@@ -347,49 +233,20 @@ class Plant:
             return Statistics(*self._plant.statistics())
 
     def continuous_state(self) -> NDArray[np.float64]:
-        """Return the state at the present time.
-
-        Returns
-        -------
-        ndarray
-            [order], in the order of tendonfmu_plant_derivative.
-        """
+        """Return the state at the present time."""
+        # returns [order], in the order of tendonfmu_plant_derivative
         with _refusals():
             return self._plant.continuous_state().reshape(-1)
 
     def derivative(self, time: float, state: Array) -> NDArray[np.float64]:
-        """Return the right-hand side of the differential equations.
-
-        Parameters
-        ----------
-        time
-            s.
-        state
-            [order].
-
-        Returns
-        -------
-        ndarray
-            [order].
-        """
+        """Return the right-hand side of the differential equations."""
+        # state: [order]; returns [order]
         with _refusals():
             slope, _ = self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), False)
         return slope.reshape(-1)
 
     def jacobian(self, time: float, state: Array) -> NDArray[np.float64]:
-        """Return the derivative of the right-hand side by the state.
-
-        Parameters
-        ----------
-        time
-            s.
-        state
-            [order].
-
-        Returns
-        -------
-        ndarray
-            [order, order].
-        """
+        """Return the derivative of the right-hand side by the state."""
+        # state: [order]; returns [order, order]
         with _refusals():
             return self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), True)[1]

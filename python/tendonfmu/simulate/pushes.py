@@ -19,21 +19,11 @@ STRONGEST = 1e4  # N
 
 @dataclass(frozen=True)
 class Segment:
-    """The part of a link that can be pushed: from its joint to the next joint, or to the tip.
+    """The part of a link that can be pushed: from its joint to the next joint, or to the tip."""
 
-    Attributes
-    ----------
-    link
-        Number of the link, from 1.
-    end
-        End [3] (m) in the link's frame; the part starts at the origin.
-    axis
-        The link's joint axis [3].
-    """
-
-    link: int
-    end: Vector
-    axis: Vector
+    link: int  # number of the link, from 1
+    end: Vector  # end [3] (m) in the link's frame; the part starts at the origin
+    axis: Vector  # the link's joint axis [3]
 
     @property
     def length(self) -> float:
@@ -42,11 +32,7 @@ class Segment:
 
 
 def expand_pushes(pushes: Node, segments: Sequence[Segment], seed: int, duration: float) -> list[Any]:
-    """Return the rig's `pushes` as a list in order of time. Raise Refusal.
-
-    The plant alone checks the pushes of a given list. segments: base first. seed: used if the recipe has none.
-    duration: of the recording (s).
-    """
+    """Return the rig's `pushes` as a list in order of time. Raise Refusal."""
     if pushes.absent:
         return []
     if isinstance(pushes.value, list):

@@ -127,25 +127,8 @@ class Rig:
 
 
 def description_files(path: Path) -> list[Path]:
-    """Return the files that describe a rig: itself, its bases and its finger.
-
-    A motion file is not included, since it is a result that may be made again.
-
-    Parameters
-    ----------
-    path
-        The rig file.
-
-    Returns
-    -------
-    list of Path
-        The rig first.
-
-    Raises
-    ------
-    InputError
-        A rig file cannot be read.
-    """
+    """Return the files that describe a rig: itself, its bases and its finger."""
+    # A motion file is not included, since it is a result that may be made again.
     files: list[Path] = []
     finger = _with_base(path, files, []).get("finger")
     return [*files, Path(finger)] if isinstance(finger, str) else files
@@ -217,11 +200,8 @@ def _place_paths(data: dict[str, Any], folder: Path) -> None:
 
 
 def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Merge the keys of `own` into those of `base`: objects key by key, all other values whole.
-
-    null removes a key. A motion of another kind replaces the base's, since kinds have different keys; one of the same
-    kind changes it.
-    """
+    """Merge the keys of `own` into those of `base`: objects key by key, all other values whole."""
+    # A motion of another kind replaces the base's, since kinds have different keys; one of the same kind changes it.
     result = dict(base)
     for key, value in own.items():
         before = base.get(key)

@@ -7,18 +7,7 @@ from pathlib import Path
 
 
 def is_rig(path: Path) -> bool:
-    """Return whether a file claims to be a rig, even an invalid one.
-
-    Parameters
-    ----------
-    path
-        Any file.
-
-    Returns
-    -------
-    bool
-        False for a file that is no JSON object or cannot be read.
-    """
+    """Return whether a file claims to be a rig, even an invalid one."""
     try:
         with path.open(encoding="utf-8") as file:
             data = json.load(file)

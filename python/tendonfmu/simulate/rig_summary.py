@@ -16,23 +16,7 @@ Data = Mapping[str, Any]
 
 
 def describe_rig(path: Path) -> list[str]:
-    """Read a rig, let the plant check it, and describe it.
-
-    Parameters
-    ----------
-    path
-        The rig file.
-
-    Returns
-    -------
-    list of str
-        Lines of text.
-
-    Raises
-    ------
-    InputError
-        The rig is refused: file, key path, value and what was expected.
-    """
+    """Read a rig, let the plant check it, and describe it."""
     rig = read_rig(path)
     return _lines(rig, plant_of(rig))
 

@@ -26,27 +26,13 @@ ENERGIES = ("kinetic_energy", "potential_energy", "motor_work", "friction_work",
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated recording.
+    """A simulated recording."""
 
-    Attributes
-    ----------
-    recording
-        Columns of docs/reference/recordings.md.
-    truth
-        True signals at the same times, or None if they were not asked for.
-    contact_seconds
-        Time with a force above the rig's `contact_force` (s).
-    integrator
-        The integrator that was used.
-    work
-        Work of the integrator.
-    """
-
-    recording: Table
-    truth: Table | None
-    contact_seconds: float
-    integrator: str
-    work: Statistics
+    recording: Table  # columns of docs/reference/recordings.md
+    truth: Table | None  # true signals at the same times, or None if they were not asked for
+    contact_seconds: float  # time with a force above the rig's `contact_force` (s)
+    integrator: str  # the integrator that was used
+    work: Statistics  # work of the integrator
 
     def summary(self, rig: Rig) -> list[str]:
         """Describe what was simulated, in lines of text."""

@@ -125,10 +125,7 @@ def _relative_tolerance(rig: Rig) -> float:
 
 
 def _master_of_omsimulator(tolerance: float) -> Any:
-    """Return OMSimulator's annotation of a system that it couples with a fixed step.
-
-    It hands the tolerance to both FMUs; without the annotation, its own stands above that of the rig.
-    """
+    """Return OMSimulator's annotation of a system that it couples with a fixed step."""
     master = _OMS.FixedStepMaster(
         description="oms-ma", stepSize=repr(STEP), absoluteTolerance=repr(tolerance), relativeTolerance=repr(tolerance)
     )

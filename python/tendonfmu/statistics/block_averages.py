@@ -19,29 +19,15 @@ NO_BLOCK = -1
 
 @dataclass(frozen=True)
 class SampleBlocks:
-    """Which samples each block averages.
+    """Which samples each block averages."""
 
-    The samples of a block are consecutive and belong to one part without a gap.
-
-    Attributes
-    ----------
-    of
-        For each recording the block of each sample [N], from 0 over all recordings; −1: in no block.
-    count
-        Number of all blocks.
-    """
-
+    # for each recording the block of each sample [N], from 0 over all recordings; −1: in no block
     of: tuple[Indices, ...]
-    count: int
+    count: int  # number of all blocks
 
     def sizes(self) -> Indices:
-        """Count the samples in each block.
-
-        Returns
-        -------
-        Indices
-            [B].
-        """
+        """Count the samples in each block."""
+        # returns [B]
         total = np.zeros(self.count, dtype=np.int64)
         for block in self.of:
             total += np.bincount(block[block >= 0], minlength=self.count)
@@ -49,29 +35,8 @@ class SampleBlocks:
 
 
 def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], length: float) -> SampleBlocks:
-    """Make blocks of the same length.
-
-    A block that would contain no sample does not exist.
-
-    Parameters
-    ----------
-    times
-        Times of each recording [N] (s).
-    parts
-        Its stretches without a gap. Blocks count from the start of each.
-    length
-        Length of a block (s).
-
-    Returns
-    -------
-    SampleBlocks
-        The block of each sample.
-
-    Raises
-    ------
-    InputError
-        The length is 0 or less.
-    """
+    """Make blocks of the same length."""
+    # times: [N] (s); length: (s)
     if not length > 0:
         raise InputError(f"length of a block = {length:g} s: expected above 0")
     found, count = [], 0
@@ -88,17 +53,7 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
 
 
 class BlockSums:
-    """Sums over blocks, filled stretch by stretch.
-
-    The stretches are those of one part, in order. Jumps accumulate from its start.
-
-    Parameters
-    ----------
-    sums
-        Array to add to [B, n, c], float32 or float64.
-    mix
-        Sparse or dense matrix [u, c] from the given values to the summed ones. None: the same.
-    """
+    """Sums over blocks, filled stretch by stretch."""
 
     def __init__(self, sums: NDArray[Any], mix: Any = None) -> None:
         """Start at the beginning of a part."""
@@ -106,15 +61,8 @@ class BlockSums:
         self._carried: Numbers | None = None
 
     def add(self, block: Indices, values: Numbers, jumps: Numbers) -> None:
-        """Add a stretch of samples.
-
-        Parameters
-        ----------
-        block
-            Block of each sample [K].
-        values, jumps
-            [K, n, u].
-        """
+        """Add a stretch of samples."""
+        # block: [K]; values, jumps: [K, n, u]
         starts = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
         runs = np.add.reduceat(values, starts, axis=0)
         self._add_jumps(runs, jumps, starts, np.diff(starts, append=len(block)))

@@ -27,42 +27,18 @@ _SMALLEST = 1e-100  # of a scale; its square does not underflow
 
 @dataclass(frozen=True)
 class _Fold:
-    """One fold left out.
+    """One fold left out."""
 
-    Attributes
-    ----------
-    refit
-        Numbers of the nominal model for each candidate, and for the target [u, c + 1].
-    energy, score
-        [c, c] and [c] of the other folds, nominal numbers refitted.
-    own_energy, own_score, own_square
-        The same on the fold itself: [c, c], [c] and a number.
-    """
-
-    refit: Numbers
-    energy: Numbers
+    refit: Numbers  # numbers of the nominal model for each candidate, and for the target [u, c + 1]
+    energy: Numbers  # [c, c] and [c] of the other folds, nominal numbers refitted
     score: Numbers
-    own_energy: Numbers
+    own_energy: Numbers  # the same on the fold itself: [c, c], [c] and a number
     own_score: Numbers
     own_square: float
 
 
 class Grams:
-    """Products of a target, of the nominal model's columns and of candidates, by fold.
-
-    The nominal numbers are refitted without each fold.
-
-    Parameters
-    ----------
-    products
-        Products of the columns.
-    target
-        [B, n] (N·m).
-    scale
-        How far each nominal number is expected to move [u]. This ridge decides if the data do not.
-    judged
-        Folds [f] whose errors count, by default all. The others are only learned from.
-    """
+    """Products of a target, of the nominal model's columns and of candidates, by fold."""
 
     def __init__(
         self, products: Products, target: Numbers, scale: Numbers, judged: NDArray[np.bool_] | None = None
@@ -128,18 +104,8 @@ class Grams:
         return float(sum(each.own_square for each, counts in zip(self._by_fold, self._judged, strict=True) if counts))
 
     def surviving(self, mix: Numbers) -> float:
-        """Return how much of a combination of candidates the refit leaves.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d].
-
-        Returns
-        -------
-        float
-            Share of the variance of its best direction, 0 to 1.
-        """
+        """Return how much of a combination of candidates the refit leaves."""
+        # mix: [c, d]
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
         before = part.T @ self._raw_energy()[inner] @ part
@@ -154,20 +120,8 @@ class Grams:
         return float(np.clip(np.linalg.eigvalsh(left)[-1], 0.0, 1.0))
 
     def ordinary_gain(self, mix: Numbers, expected: Numbers) -> float:
-        """Return how far an effect of ordinary size would raise the error, or correcting it lower it again.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d].
-        expected
-            Ordinary magnitudes [d]. The effect has one of them, any of them as likely.
-
-        Returns
-        -------
-        float
-            1 − rms without the effect / rms with it, as seen after the refit of the nominal model.
-        """
+        """Return how far an effect of ordinary size would raise the error, or correcting it lower it again."""
+        # mix: [c, d]; expected: [d]
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used] * expected
         energy = np.diagonal(part.T @ self._whole.energy[np.ix_(used, used)] @ part)
@@ -184,39 +138,13 @@ class Grams:
         return self._raw
 
     def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
-        """Return the magnitudes of a combination of candidates, learned from all folds.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d].
-        low, high
-            Bounds [d].
-
-        Returns
-        -------
-        Numbers
-            [d].
-        """
+        """Return the magnitudes of a combination of candidates, learned from all folds."""
+        # mix: [c, d]; low, high: [d]; returns [d]
         return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
-        """Return the held-out error with a combination of candidates.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d].
-        low, high
-            Bounds of its magnitudes [d].
-
-        Returns
-        -------
-        error
-            Σ e² on held-out folds ((N·m)²).
-        magnitudes
-            Learned without each fold [f, d].
-        """
+        """Return the held-out error with a combination of candidates."""
+        # mix: [c, d]; low, high: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
         left, found = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
@@ -229,20 +157,8 @@ class Grams:
         return left, np.array(found)
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
-        """Return the error of each stretch on unseen samples.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d]. None: no candidates.
-        magnitudes
-            [f, d], as `error` returns them.
-
-        Returns
-        -------
-        Numbers
-            Σ e² [stretches that count] ((N·m)²).
-        """
+        """Return the error of each stretch on unseen samples."""
+        # mix: [c, d]; magnitudes: [f, d]; returns Σ e² [stretches that count] ((N·m)²)
         found = np.zeros(self.folds.stretches)
         for number, counts in enumerate(self._judged):
             if counts:
@@ -251,18 +167,8 @@ class Grams:
         return np.asarray(found[self._counted])
 
     def unseen_residual(self, mix: Numbers | None = None, magnitudes: Numbers | None = None) -> Numbers:
-        """Return the residual on the unseen rows that count.
-
-        Parameters
-        ----------
-        mix, magnitudes
-            As for `by_stretch`.
-
-        Returns
-        -------
-        Numbers
-            [r, n] (N·m), in the order of `counted_stretch`.
-        """
+        """Return the residual on the unseen rows that count."""
+        # returns [r, n] (N·m), in the order of `counted_stretch`
         return np.concatenate([self._unseen(int(k), mix, magnitudes)[1] for k in np.flatnonzero(self._judged)])
 
     @property
@@ -287,22 +193,8 @@ class Grams:
         return rows, np.asarray(self._target[rows] - self._table[rows][:, :, used] @ change[used])
 
     def scores(self, mix: Numbers, magnitudes: Numbers) -> tuple[Numbers, Numbers]:
-        """Return the parts of a sandwich (cluster-robust) covariance of a combination of candidates.
-
-        Parameters
-        ----------
-        mix
-            Combination [c, d].
-        magnitudes
-            [f, d], as `error` returns them.
-
-        Returns
-        -------
-        energy
-            [d, d], after the refit.
-        scores
-            [stretches, d]: products of the combination, after the refit, with the unseen residual of each stretch.
-        """
+        """Return the parts of a sandwich (cluster-robust) covariance of a combination of candidates."""
+        # mix: [c, d]; magnitudes: [f, d]; returns [d, d], after the refit, [stretches, d]
         u, used = self.nominal_count, np.flatnonzero(mix.any(axis=1))
         part = mix[used]
         nominal = self._whole.refit[:, used] @ part
@@ -315,15 +207,8 @@ class Grams:
         return part.T @ self._whole.energy[np.ix_(used, used)] @ part, found
 
     def left(self) -> tuple[Numbers, Numbers]:
-        """Return the errors on unseen samples without any candidate, whether the stretches count or not.
-
-        Returns
-        -------
-        squares
-            Σ e² of each stretch and joint [stretches, n] ((N·m)²).
-        rows
-            Rows of each stretch [stretches].
-        """
+        """Return the errors on unseen samples without any candidate, whether the stretches count or not."""
+        # returns Σ e² of each stretch and joint [stretches, n] ((N·m)²), rows of each stretch [stretches]
         found = np.zeros((self.folds.stretches, self._target.shape[1]))
         for number in range(self.folds.folds):
             rows, left = self._unseen(number, None, None)
@@ -336,18 +221,8 @@ class Grams:
         return np.asarray(self._whole.refit[:, -1])
 
     def errors_of(self, targets: Numbers) -> Numbers:
-        """Return the held-out errors of other targets, the nominal numbers refitted to each.
-
-        Parameters
-        ----------
-        targets
-            [B, n, K] (N·m).
-
-        Returns
-        -------
-        Numbers
-            Σ e² on held-out folds [K] ((N·m)²).
-        """
+        """Return the held-out errors of other targets, the nominal numbers refitted to each."""
+        # targets: [B, n, K] (N·m); returns Σ e² on held-out folds [K] ((N·m)²)
         u, rows = self.nominal_count, self.folds.rows
         flat = self._table[:, :, :u].astype(np.float64)
         left = np.stack([self._span.without(targets[rows, j]) for j in range(targets.shape[1])], axis=1)
@@ -365,22 +240,14 @@ class Grams:
         return [self.folds.fold == number for number in range(self.folds.folds)]
 
     def residual(self) -> Numbers:
-        """Return what the nominal model, refitted to all folds, leaves of the target.
-
-        Returns
-        -------
-        Numbers
-            [R, n] (N·m).
-        """
+        """Return what the nominal model, refitted to all folds, leaves of the target."""
+        # returns [R, n] (N·m)
         change = self._whole.refit[:, -1]
         return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
 
 
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
-    """Return a least-squares solution [d] between bounds.
-
-    The value farthest beyond a bound is fixed there, and the others are solved again, until none is beyond.
-    """
+    """Return a least-squares solution [d] between bounds."""
     count = len(score)
     length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
     scaled = energy / (length[:, None] * length)
@@ -411,17 +278,7 @@ def _solved(matrix: Numbers, right: Numbers) -> Numbers:
 
 
 def standard_error(gains: Sequence[float] | Numbers) -> float:
-    """Return the standard error of a sum of gains.
-
-    Parameters
-    ----------
-    gains
-        Gain of each stretch [K].
-
-    Returns
-    -------
-    float
-        Infinite for a single stretch.
-    """
+    """Return the standard error of a sum of gains."""
+    # gains: [K]
     values = np.asarray(gains)
     return float(np.sqrt(len(values)) * np.std(values, ddof=1)) if len(values) > 1 else np.inf

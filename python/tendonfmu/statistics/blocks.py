@@ -12,27 +12,11 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockSeries:
-    """Block means of recordings, one after another: B blocks of n series each.
+    """Block means of recordings, one after another: B blocks of n series each."""
 
-    Attributes
-    ----------
-    time
-        Centre of each block [B] (s).
-    recording
-        Recording of each block [B], from 0.
-    segment
-        Stretch without a gap of each block [B], from 0.
-    target
-        What has to be explained [B, n].
-    used
-        Whether all samples of the block may be learned from [B].
-    step
-        Length of a block (s).
-    """
-
-    time: Numbers
-    recording: NDArray[np.int64]
-    segment: NDArray[np.int64]
-    target: Numbers
-    used: NDArray[np.bool_]
-    step: float
+    time: Numbers  # centre of each block [B] (s)
+    recording: NDArray[np.int64]  # recording of each block [B], from 0
+    segment: NDArray[np.int64]  # stretch without a gap of each block [B], from 0
+    target: Numbers  # what has to be explained [B, n]
+    used: NDArray[np.bool_]  # whether all samples of the block may be learned from [B]
+    step: float  # length of a block (s)

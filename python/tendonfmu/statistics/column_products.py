@@ -19,19 +19,7 @@ PIECE = 4096  # rows at a time
 
 
 class Products:
-    """Columns without a slow bias, and their products by fold: the part that does not depend on a target.
-
-    Parameters
-    ----------
-    folds
-        Folds of the blocks.
-    nominal
-        Derivatives by the nominal numbers [B, n, u].
-    values
-        Derivatives by the candidates [B, n, c].
-    splines
-        Splines of the slow bias [B, s].
-    """
+    """Columns without a slow bias, and their products by fold: the part that does not depend on a target."""
 
     def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
         """Project the bias out, and multiply."""
@@ -55,20 +43,8 @@ class Products:
         return total
 
     def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
-        """Return the products with other columns.
-
-        Parameters
-        ----------
-        shared
-            Combinations [c, k] of the candidates that become nominal columns as well. None: none.
-        candidates
-            Indices of the candidates that remain. None: all.
-
-        Returns
-        -------
-        Products
-            A copy, or this one if nothing changes.
-        """
+        """Return the products with other columns."""
+        # shared: [c, k]
         u = self.nominal_count
         mixed = np.zeros((self.count, 0)) if shared is None else shared
         kept = np.arange(self.count) if candidates is None else candidates
@@ -96,18 +72,8 @@ class Products:
         return found
 
     def with_own(self, values: Array) -> Products:
-        """Return the products with other candidates.
-
-        Parameters
-        ----------
-        values
-            Candidates [r, n, k] without the slow bias; r: rows of the folds.
-
-        Returns
-        -------
-        Products
-            A copy.
-        """
+        """Return the products with other candidates."""
+        # values: [r, n, k]
         u = self.nominal_count
         found = copy(self)
         found.count = values.shape[2]

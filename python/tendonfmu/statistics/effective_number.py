@@ -20,10 +20,7 @@ FEWEST = 20  # pairs of a lag; lags with fewer are not used
 
 
 def correlation_time(values: Numbers) -> float:
-    """Return τ of a series in samples, at least 1.
-
-    values: [N] standardised residuals about 0, NaN where not used. Pairs with a NaN do not count.
-    """
+    """Return τ of a series in samples, at least 1."""
     known = ~np.isnan(values)
     count = int(known.sum())
     filled = np.where(known, values, 0.0)
@@ -46,38 +43,14 @@ def _autocovariance(values: Numbers) -> Numbers:
 
 
 def sample_weights(standardised: Numbers) -> Numbers:
-    """Return the share of an independent sample that each sample of a stretch counts for.
-
-    Parameters
-    ----------
-    standardised
-        Residuals of one stretch without a gap [N, n], NaN where not used.
-
-    Returns
-    -------
-    Numbers
-        1/τ of each joint [n].
-    """
+    """Return the share of an independent sample that each sample of a stretch counts for."""
+    # standardised: [N, n]; returns 1/τ of each joint [n]
     return np.array([1.0 / correlation_time(column) for column in standardised.T])
 
 
 def effective_samples(standardised: Sequence[Numbers], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
-    """Count samples, and the independent samples that they are worth.
-
-    Parameters
-    ----------
-    standardised
-        Residuals of each recording [N, n], NaN where not used.
-    weights
-        Weight of each sample [N, n], for each recording.
-
-    Returns
-    -------
-    count
-        Samples of each joint [n].
-    worth
-        Independent samples of each joint [n].
-    """
+    """Count samples, and the independent samples that they are worth."""
+    # standardised: [N, n]; weights: [N, n]; returns samples of each joint [n], independent samples of each joint [n]
     used = [~np.isnan(each) for each in standardised]
     count = sum(flags.sum(axis=0) for flags in used)
     worth = sum((flags * each).sum(axis=0) for flags, each in zip(used, weights, strict=True))

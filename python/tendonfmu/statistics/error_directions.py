@@ -19,20 +19,8 @@ _ROUNDS = 40  # of the least squares
 
 
 def predicted(parts: Numbers, directions: Numbers) -> Numbers:
-    """Return the standard deviation of torques.
-
-    Parameters
-    ----------
-    parts
-        Parts of the torques [K, q] (N·m).
-    directions
-        [d, q].
-
-    Returns
-    -------
-    Numbers
-        [K] (N·m).
-    """
+    """Return the standard deviation of torques."""
+    # parts: [K, q] (N·m); directions: [d, q]; returns [K] (N·m)
     return np.asarray(np.sqrt(squares(parts @ directions.T)))
 
 
@@ -42,29 +30,10 @@ def squares(rows: Numbers) -> Numbers:
 
 
 def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[Numbers, float]:
-    """Find a few directions that give the standard deviation of torques.
-
-    `slopes` is regressed on the parts (slopes ≈ parts·A). The leading eigenvectors of A Aᵀ, in the metric of the parts'
-    second moment, are the directions with most of the mean variance. They leave out later eigenvectors, and whatever is
-    no combination of parts, such as working points. To make up for this, they are scaled to the mean variance and then
-    adjusted by least squares, so that their prediction is as near as possible to the standard deviation of each sample.
-
-    Parameters
-    ----------
-    parts
-        [K, q] (N·m).
-    slopes
-        Derivatives of the torques by independent unknowns of variance 1 [K, u] (N·m). The variance is Σ_u slopes².
-    most
-        Largest number of directions.
-
-    Returns
-    -------
-    directions
-        [d, q], d at most `most`.
-    share
-        Share of the mean variance in the leading eigenvectors.
-    """
+    """Find a few directions that give the standard deviation of torques."""
+    # To make up for this, they are scaled to the mean variance and then adjusted by least squares, so that their
+    # prediction is as near as possible to the standard deviation of each sample.
+    # parts: [K, q] (N·m); slopes: [K, u] (N·m); returns [d, q], d at most `most`
     std = np.sqrt(squares(slopes))
     variance = float(np.mean(std**2))
     moment, axes = np.linalg.eigh(parts.T @ parts / len(parts))

@@ -18,23 +18,13 @@ FEWEST_STRETCHES = 4  # two halves of two; with fewer there is no held-out error
 
 @dataclass(frozen=True)
 class Folds:
-    """Folds and stretches of the blocks of a series.
+    """Folds and stretches of the blocks of a series."""
 
-    Attributes
-    ----------
-    rows
-        Blocks of the series that are used [R], in runs without a gap.
-    run, stretch, fold
-        Of each row [R], from 0.
-    stretches, folds
-        Their numbers.
-    """
-
-    rows: Indices
-    run: Indices
+    rows: Indices  # blocks of the series that are used [R], in runs without a gap
+    run: Indices  # of each row [R], from 0
     stretch: Indices
     fold: Indices
-    stretches: int
+    stretches: int  # their numbers
     folds: int
 
     @property
@@ -44,18 +34,7 @@ class Folds:
 
 
 def make_folds(series: BlockSeries) -> Folds:
-    """Make stretches of about 2 s without gaps, and up to 8 contiguous folds of equally many stretches.
-
-    Parameters
-    ----------
-    series
-        Block means.
-
-    Returns
-    -------
-    Folds
-        Of the blocks that are used.
-    """
+    """Make stretches of about 2 s without gaps, and up to 8 contiguous folds of equally many stretches."""
     rows = np.flatnonzero(series.used)
     length = max(1, round(STRETCH / series.step))
     new = (np.diff(rows, prepend=-2) > 1) | (np.diff(series.segment[rows], prepend=-1) != 0)

@@ -7,16 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval.
+    """A value with its 95 % interval."""
 
-    Attributes
-    ----------
-    value
-        The value.
-    low, high
-        Ends of the interval.
-    """
-
-    value: float
-    low: float
+    value: float  # the value
+    low: float  # ends of the interval
     high: float

@@ -25,36 +25,15 @@ _MOST = 500  # blocks; more are joined with their neighbours, so that memory sta
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and the 95 % interval of the true value.
+    """A value and the 95 % interval of the true value."""
 
-    Attributes
-    ----------
-    value
-        The value.
-    low, high
-        Ends of the interval; NaN if unknown.
-    """
-
-    value: float
-    low: float = math.nan
+    value: float  # the value
+    low: float = math.nan  # ends of the interval; NaN if unknown
     high: float = math.nan
 
 
 def share(count: int, of: int) -> Estimate:
-    """Return a share with the exact binomial interval (Clopper and Pearson 1934).
-
-    Parameters
-    ----------
-    count
-        How many.
-    of
-        Of how many.
-
-    Returns
-    -------
-    Estimate
-        Unknown if `of` is 0.
-    """
+    """Return a share with the exact binomial interval (Clopper and Pearson 1934)."""
     if not of:
         return Estimate(math.nan)
     low = float(betaincinv(count, of - count + 1, _TAIL)) if count else 0.0
@@ -63,20 +42,7 @@ def share(count: int, of: int) -> Estimate:
 
 
 def rate(count: int, exposure: float) -> Estimate:
-    """Return a rate with the exact Poisson interval (Garwood 1936).
-
-    Parameters
-    ----------
-    count
-        Number of events.
-    exposure
-        In any unit, such as s.
-
-    Returns
-    -------
-    Estimate
-        Events per unit. Unknown without exposure.
-    """
+    """Return a rate with the exact Poisson interval (Garwood 1936)."""
     if not exposure > 0:
         return Estimate(math.nan)
     low = float(gammaincinv(count, _TAIL)) if count else 0.0
@@ -85,22 +51,8 @@ def rate(count: int, exposure: float) -> Estimate:
 
 
 def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
-    """Return a quantile, with an interval from resampled events (percentiles).
-
-    Parameters
-    ----------
-    values
-        One for each event [k].
-    probability
-        Of the quantile.
-    seed
-        Of the resampling.
-
-    Returns
-    -------
-    Estimate
-        In the unit of the values. Without interval for fewer than `FEWEST` events.
-    """
+    """Return a quantile, with an interval from resampled events (percentiles)."""
+    # values: [k]
     if not len(values):
         return Estimate(math.nan)
     found = float(np.quantile(values, probability))
@@ -111,22 +63,8 @@ def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
 
 
 def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:
-    """Return a statistic of sums over events or blocks, with intervals from resampling these (percentiles).
-
-    Parameters
-    ----------
-    sums
-        Of each event or block [b, k].
-    statistic
-        Function from sums over all [r, k] to [r, n].
-    seed
-        Of the resampling.
-
-    Returns
-    -------
-    list of Estimate
-        [n]. Without intervals for fewer than `FEWEST` events or blocks.
-    """
+    """Return a statistic of sums over events or blocks, with intervals from resampling these (percentiles)."""
+    # sums: [b, k]; statistic: [r, k]; returns [n]. Without intervals for fewer than `FEWEST` events or blocks
     values = statistic(sums.sum(axis=0, keepdims=True))[0]
     if len(sums) < FEWEST:
         return [Estimate(float(value)) for value in values]

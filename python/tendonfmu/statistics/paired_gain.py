@@ -30,56 +30,21 @@ _LEAST_PLAIN = 12  # blocks; with fewer, the resamples' own errors are too rough
 
 @dataclass(frozen=True)
 class BlockIndex:
-    """The block of each sample.
+    """The block of each sample."""
 
-    Attributes
-    ----------
-    index
-        [N], from 0; −1 outside the chosen samples.
-    count
-        Number of blocks.
-    """
-
-    index: NDArray[np.intp]
-    count: int
+    index: NDArray[np.intp]  # [N], from 0; −1 outside the chosen samples
+    count: int  # number of blocks
 
     def sums(self, values: Numbers) -> Numbers:
-        """Return the sums of values over the blocks.
-
-        Parameters
-        ----------
-        values
-            [N].
-
-        Returns
-        -------
-        Numbers
-            [count].
-        """
+        """Return the sums of values over the blocks."""
+        # values: [N]; returns [count]
         chosen = self.index >= 0
         return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
 
 
 def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex:
-    """Cut the chosen samples into blocks.
-
-    No block spans samples that are not chosen. A short total time gives shorter blocks. A stretch of less than half a
-    block joins the block before, if there is one.
-
-    Parameters
-    ----------
-    time
-        Times [N] (s).
-    chosen
-        Samples [N].
-    length
-        Length of a block, about (s).
-
-    Returns
-    -------
-    BlockIndex
-        The block of each sample.
-    """
+    """Cut the chosen samples into blocks."""
+    # time: [N] (s); chosen: [N]; length: (s)
     index = np.full(len(time), -1, dtype=np.intp)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
     chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True))
@@ -98,22 +63,8 @@ def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex
 
 
 def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
-    """Return the gain 1 − rms_after/rms_before with its 95 % interval.
-
-    Neighbouring blocks that vary together are joined first.
-
-    Parameters
-    ----------
-    before, after
-        Sums of squared residuals of both models over the same samples of each block [B], in order of time.
-    seed
-        Of the resampling.
-
-    Returns
-    -------
-    Interval
-        Its ends are NaN for fewer than three blocks.
-    """
+    """Return the gain 1 − rms_after/rms_before with its 95 % interval."""
+    # before, after: [B]
     total_before, total_after = float(before.sum()), float(after.sum())
     if total_before <= 0:
         return Interval(0.0, math.nan, math.nan)
@@ -151,11 +102,9 @@ def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float
 
 
 def _log_ratio(weights: Numbers, pairs: Numbers) -> tuple[Numbers, Numbers]:
-    """Return log(rms after/rms before) [R] and its standard error [R], with blocks counted `weights` [R, B] times.
-
-    The error is that of a ratio of sums (delta method, or infinitesimal jackknife). With the shares a_b, c_b of a block
-    in both sums its influence is u_b = (a_b − c_b)/2, and the variance is B/(B − 1) Σ u_b².
-    """
+    """Return log(rms after/rms before) [R] and its standard error [R], with blocks counted `weights` [R, B] times."""
+    # The error is that of a ratio of sums (delta method, or infinitesimal jackknife). With the shares a_b, c_b of a
+    # block in both sums its influence is u_b = (a_b − c_b)/2, and the variance is B/(B − 1) Σ u_b².
     sums = weights @ pairs
     estimate = 0.5 * np.log(sums[:, 1] / sums[:, 0])
     share = weights[:, :, None] * pairs[None] / sums[:, None, :]

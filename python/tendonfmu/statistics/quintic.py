@@ -13,21 +13,8 @@ Numbers = NDArray[np.float64]
 
 
 def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Evaluate a curve and its derivatives.
-
-    Parameters
-    ----------
-    knots
-        [k, 4] of time (s, increasing), position (rad), velocity (rad/s), acceleration (rad/s²); k >= 1.
-    time
-        [N] (s).
-
-    Returns
-    -------
-    position, velocity, acceleration
-        [N] (rad, rad/s, rad/s²). Outside the knots the curve is at rest, which is continuous if the first and the last
-        knot are at rest.
-    """
+    """Evaluate a curve and its derivatives."""
+    # knots: [k, 4] (rad); time: [N] (s); returns [N]
     if len(knots) == 1:
         return np.full(len(time), knots[0, 1]), np.zeros(len(time)), np.zeros(len(time))
     piece = np.clip(np.searchsorted(knots[:, 0], time, side="right") - 1, 0, len(knots) - 2)

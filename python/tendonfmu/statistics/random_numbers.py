@@ -10,64 +10,26 @@ LARGEST_SEED = 2**53
 
 
 class Draws:
-    """A separate stream of random numbers for every (seed, names).
-
-    Parameters
-    ----------
-    seed
-        From 0 to `LARGEST_SEED`.
-    *stream
-        Numbers that name the stream.
-    """
+    """A separate stream of random numbers for every (seed, names)."""
 
     def __init__(self, seed: int, *stream: int) -> None:
         self._generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *stream])))
 
     def share(self) -> float:
-        """Draw a number.
-
-        Returns
-        -------
-        float
-            Uniform in [0, 1).
-        """
+        """Draw a number."""
         return float(self._generator.random())
 
     def between(self, low: float, high: float) -> float:
-        """Draw a number between bounds.
-
-        Parameters
-        ----------
-        low, high
-            Bounds.
-
-        Returns
-        -------
-        float
-            Uniform in [low, high).
-        """
+        """Draw a number between bounds."""
         return low + (high - low) * self.share()
 
     def sign(self) -> float:
-        """Draw a sign.
-
-        Returns
-        -------
-        float
-            1 or −1, equally likely.
-        """
+        """Draw a sign."""
         return 1.0 if self.share() < 0.5 else -1.0
 
     def direction(self) -> list[float]:
-        """Draw a direction (Marsaglia, Ann. Math. Statist. 43(2), 1972).
-
-        It uses square roots only, which every machine rounds alike.
-
-        Returns
-        -------
-        list of float
-            Unit vector [3], uniform on the sphere.
-        """
+        """Draw a direction (Marsaglia, Ann. Math. Statist. 43(2), 1972)."""
+        # returns unit vector [3], uniform on the sphere
         while True:
             x, y = self.between(-1.0, 1.0), self.between(-1.0, 1.0)
             square = x * x + y * y

@@ -29,49 +29,19 @@ MOST_LINES = 5
 
 @dataclass(frozen=True)
 class Line:
-    """An oscillation at a steady frequency.
+    """An oscillation at a steady frequency."""
 
-    Attributes
-    ----------
-    frequency
-        Hz.
-    amplitude
-        Largest of the recordings (N·m).
-    p_value
-        Over all frequencies.
-    share
-        Share of the variance.
-    """
-
-    frequency: float
-    amplitude: float
-    p_value: float
-    share: float
+    frequency: float  # Hz
+    amplitude: float  # largest of the recordings (N·m)
+    p_value: float  # over all frequencies
+    share: float  # share of the variance
 
 
 def find_lines(
     series: BlockSeries, residual: Numbers, filters: Whitener, *, level: float
 ) -> tuple[tuple[Line, ...], Numbers]:
-    """Find lines in the residual of a joint.
-
-    Parameters
-    ----------
-    series
-        Block means.
-    residual
-        [B] (N·m).
-    filters
-        Whitener of this joint. Lines are searched for in the whitened residual, so that a steep spectrum causes none.
-    level
-        Largest p-value of a line.
-
-    Returns
-    -------
-    lines
-        At most `MOST_LINES`, the most significant first.
-    total
-        Their sum [B] (N·m), 0 in unused blocks.
-    """
+    """Find lines in the residual of a joint."""
+    # residual: [B] (N·m); returns their sum [B] (N·m), 0 in unused blocks
     used = series.used & np.isfinite(residual)
     left = np.where(used, residual, 0.0)
     total, lines = np.zeros(len(residual)), []

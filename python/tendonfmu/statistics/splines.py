@@ -25,20 +25,8 @@ _RANK = 1e-10  # of the largest power of columns of length 1; derivatives are ex
 
 
 def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
-    """Make splines of a slow bias.
-
-    Parameters
-    ----------
-    series
-        Block means.
-    knots
-        Distance of the knots, about (s).
-
-    Returns
-    -------
-    Splines
-        Cubic B-splines in time [B, s], separate for each stretch without a gap.
-    """
+    """Make splines of a slow bias."""
+    # knots: (s); returns [B, s]
     blocks = []
     for number in np.unique(series.segment):
         time = series.time[series.segment == number]
@@ -53,29 +41,13 @@ def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
 
 
 def constant_bias(series: BlockSeries) -> Splines:
-    """Make a constant bias for every stretch without a gap.
-
-    Parameters
-    ----------
-    series
-        Block means.
-
-    Returns
-    -------
-    Splines
-        [B, s], ones and zeros.
-    """
+    """Make a constant bias for every stretch without a gap."""
+    # returns [B, s], ones and zeros
     return sparse.csr_array((series.segment[:, None] == np.unique(series.segment)).astype(np.float64))
 
 
 class Span:
-    """Removes the span of splines from other columns.
-
-    Parameters
-    ----------
-    splines
-        [R, s].
-    """
+    """Removes the span of splines from other columns."""
 
     def __init__(self, splines: Splines) -> None:
         """Invert the Gram matrix of the splines."""
@@ -85,18 +57,8 @@ class Span:
         self._inverse = np.linalg.pinv(gram, rcond=_RANK, hermitian=True) if gram.size else gram
 
     def without(self, columns: Array) -> Numbers:
-        """Return columns without their part in the span.
-
-        Parameters
-        ----------
-        columns
-            [R, d].
-
-        Returns
-        -------
-        Numbers
-            [R, d]. A column of which only rounding is left becomes 0.
-        """
+        """Return columns without their part in the span."""
+        # columns: [R, d]; returns [R, d]. A column of which only rounding is left becomes 0
         values = np.asarray(columns, dtype=np.float64)
         if not self._matrix.shape[1]:
             return values
@@ -107,18 +69,8 @@ class Span:
 
 
 def basis(columns: Array) -> Numbers:
-    """Return an orthonormal basis of the span of columns.
-
-    Parameters
-    ----------
-    columns
-        [R, c].
-
-    Returns
-    -------
-    Numbers
-        [R, r]. Directions that depend on rounding are left out.
-    """
+    """Return an orthonormal basis of the span of columns."""
+    # columns: [R, c]; returns [R, r]. Directions that depend on rounding are left out
     values = np.asarray(columns, dtype=np.float64)
     length = np.sqrt(np.einsum("rc,rc->c", values, values))
     values = values[:, length > 0] / length[length > 0]
@@ -132,41 +84,15 @@ def basis(columns: Array) -> Numbers:
 
 
 def without(columns: Array, span: Numbers) -> Array:
-    """Return columns without their part in an orthonormal span.
-
-    Parameters
-    ----------
-    columns
-        [R, ...].
-    span
-        [R, r].
-
-    Returns
-    -------
-    Array
-        [R, ...], with the columns' type of number.
-    """
+    """Return columns without their part in an orthonormal span."""
+    # columns: [R, ...]; span: [R, r]; returns [R, ...], with the columns' type of number
     own = span.astype(columns.dtype, copy=False)
     return np.asarray(columns - own @ (own.T @ columns))
 
 
 def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Numbers:
-    """Return the target without bias and without what the nominal columns explain by least squares.
-
-    Parameters
-    ----------
-    series
-        Block means.
-    splines
-        Splines of the bias [B, s].
-    nominal
-        [B, n, u].
-
-    Returns
-    -------
-    Numbers
-        [B, n] (N·m). Unused rows keep the target less its mean.
-    """
+    """Return the target without bias and without what the nominal columns explain by least squares."""
+    # splines: [B, s]; nominal: [B, n, u]; returns [B, n] (N·m). Unused rows keep the target less its mean
     used = series.used
     span = Span(splines[used])
     target = span.without(series.target[used])

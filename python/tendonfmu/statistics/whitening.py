@@ -27,35 +27,15 @@ _ROOM = 20  # rows for each coefficient, at least
 
 @dataclass(frozen=True)
 class Whitener:
-    """The filter of each joint.
+    """The filter of each joint."""
 
-    Attributes
-    ----------
-    coefficients
-        Of the means over the first p windows [p, n].
-    scale
-        Standard deviation of what they leave [n] (N·m).
-    valid
-        Rows whose windows are used and in the same stretch [B].
-    """
-
-    coefficients: Numbers
-    scale: Numbers
-    valid: Flags
+    coefficients: Numbers  # of the means over the first p windows [p, n]
+    scale: Numbers  # standard deviation of what they leave [n] (N·m)
+    valid: Flags  # rows whose windows are used and in the same stretch [B]
 
     def apply(self, values: Array) -> Array:
-        """Filter values, and scale them to the noise.
-
-        Parameters
-        ----------
-        values
-            [B, n, ...].
-
-        Returns
-        -------
-        Array
-            [B, n, ...] in units of the noise. Rows that are not valid are 0.
-        """
+        """Filter values, and scale them to the noise."""
+        # values: [B, n, ...]; returns [B, n, ...] in units of the noise. Rows that are not valid are 0
         shape = (1, values.shape[1], *[1] * (values.ndim - 2))
         found = np.array(values, dtype=np.float64)
         before = _sums(found)
@@ -87,22 +67,8 @@ def valid_rows(series: BlockSeries, reach: int) -> Flags:
 
 
 def whitener(series: BlockSeries, residual: Numbers) -> Whitener:
-    """Estimate the filter of each joint.
-
-    All joints look back as far as the one that needs most.
-
-    Parameters
-    ----------
-    series
-        Block means.
-    residual
-        [B, n] (N·m), without model and bias.
-
-    Returns
-    -------
-    Whitener
-        The filters.
-    """
+    """Estimate the filter of each joint."""
+    # residual: [B, n] (N·m)
     most = _most_windows(series)
     valid = valid_rows(series, _reach(most))
     fits = [_autoregression(residual[:, j], valid, most) for j in range(residual.shape[1])]

@@ -21,13 +21,7 @@ class Terminated(KeyboardInterrupt):
 
 
 class Ending:
-    """Remembers which signal ends the command.
-
-    Attributes
-    ----------
-    asked
-        Number of the signal, or None if none was seen.
-    """
+    """Remembers which signal ends the command."""
 
     def __init__(self) -> None:
         self.asked: int | None = None
@@ -52,27 +46,15 @@ _endings: list[Ending] = []  # of the blocks of `ended_by_signals`, innermost la
 
 
 def raise_lost_interruption() -> None:
-    """Raise the KeyboardInterrupt again that a signal asked for and somebody swallowed.
-
-    Python drops an exception that is raised in a finaliser or in a callback of ctypes, and prints it at most. A long
-    computation calls this between its phases, so that Ctrl-C ends it all the same.
-    """
+    """Raise the KeyboardInterrupt again that a signal asked for and somebody swallowed."""
+    # A long computation calls this between its phases, so that Ctrl-C ends it all the same.
     if _endings:
         _endings[-1].raise_again()
 
 
 @contextmanager
 def ended_by_signals() -> Iterator[Ending]:
-    """Let SIGTERM and SIGHUP raise KeyboardInterrupt inside the block, as Ctrl-C does, and remember which one came.
-
-    A signal that is ignored, as behind nohup, or that somebody else handles, stays so. Outside the main thread it does
-    nothing.
-
-    Yields
-    ------
-    Ending
-        Which signal ended the block.
-    """
+    """Let SIGTERM and SIGHUP raise KeyboardInterrupt inside the block, as Ctrl-C does, and remember which one came."""
     ending = Ending()
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
         yield ending
@@ -91,11 +73,8 @@ def ended_by_signals() -> Iterator[Ending]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, where the first of them takes effect.
-
-    The block should take milliseconds: it is for replacing several files together. Outside the main thread it does
-    nothing, since only the main thread is interrupted.
-    """
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, where the first of them takes effect."""
+    # Outside the main thread it does nothing, since only the main thread is interrupted.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -112,10 +91,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def worker_threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Make a pool that does not wait after an error or Ctrl-C.
-
-    Calls that have not begun are dropped; running calls are left behind.
-    """
+    """Make a pool that does not wait after an error or Ctrl-C."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool

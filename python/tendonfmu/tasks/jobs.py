@@ -36,18 +36,10 @@ Function = Callable[..., Row]
 
 @dataclass(frozen=True)
 class Job:
-    """One call of the function.
+    """One call of the function."""
 
-    Attributes
-    ----------
-    name
-        Name of its row's file, of characters that a file's name may have.
-    arguments
-        Arguments of the function; they are pickled.
-    """
-
-    name: str
-    arguments: tuple[Any, ...] = ()
+    name: str  # name of its row's file, of characters that a file's name may have
+    arguments: tuple[Any, ...] = ()  # arguments of the function; they are pickled
 
 
 def row_file(folder: Path, name: str) -> Path:
@@ -61,40 +53,12 @@ def read_row(folder: Path, name: str) -> Row | None:
 
 
 def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
-    """Return all existing rows.
-
-    Parameters
-    ----------
-    jobs
-        The jobs.
-    folder
-        Folder of the rows.
-
-    Returns
-    -------
-    list of dict
-        In the order of the jobs.
-    """
+    """Return all existing rows."""
     return [row for row in (read_row(folder, job.name) for job in jobs) if row is not None]
 
 
 def waiting_jobs(jobs: Sequence[Job], folder: Path, failed_again: bool = False) -> list[Job]:
-    """Return the jobs that have to run.
-
-    Parameters
-    ----------
-    jobs
-        The jobs.
-    folder
-        Folder of the rows.
-    failed_again
-        Whether to include jobs whose row is an error.
-
-    Returns
-    -------
-    list of Job
-        Jobs without a row, in their order.
-    """
+    """Return the jobs that have to run."""
     return [job for job in jobs if _is_waiting(read_row(folder, job.name), failed_again)]
 
 
@@ -112,36 +76,8 @@ def run_jobs(
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Call the function for each job without a row, and write its row when it ends.
-
-    Parameters
-    ----------
-    function
-        Function of a module that workers can import. function(*arguments) returns a row, a dict of numbers, strings and
-        None. An exception becomes the row's `error`.
-    jobs
-        Jobs with distinct names.
-    folder
-        Folder of the rows.
-    client
-        From `workers_of`. None: run here, one after another.
-    stop_after
-        Time after which no further job starts (s).
-    failed_again
-        Whether to run jobs again whose row is an error.
-    progress
-        Called with the number of jobs that have a row, and of all jobs.
-
-    Returns
-    -------
-    int
-        How many jobs ran.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be written, a name is not unique or not allowed for a file, or the scheduler was lost.
-    """
+    """Call the function for each job without a row, and write its row when it ends."""
+    # stop_after: (s)
     _check_names([job.name for job in jobs])
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
@@ -214,12 +150,7 @@ def _rows(function: Function, jobs: Sequence[Job], client: Any, deadline: float)
 
 
 def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], client: Any) -> Iterator[Row]:
-    """Yield each row from the workers, with at most one running job per thread.
-
-    Dask blames all jobs on a worker that dies, so no job waits on a worker beside another one. Dask repeats a job of a
-    dead worker on another worker. A job counts as running until its row has arrived, so each job gives one row, however
-    often it ran.
-    """
+    """Yield each row from the workers, with at most one running job per thread."""
     import distributed
 
     library: Any = distributed  # distributed has no types
@@ -249,11 +180,7 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
 
 
 def _row_of(future: Any, job: Job) -> Row:
-    """Return the row of a job, also for errors that `call` could not catch.
-
-    Such errors are a function that the worker cannot import, and a job that ends one worker after another (memory, a
-    crash) until dask gives up.
-    """
+    """Return the row of a job, also for errors that `call` could not catch."""
     try:
         return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
     finally:
@@ -272,25 +199,7 @@ def _first_of(failed: BaseException) -> BaseException:
 
 @contextmanager
 def workers_of(address: str | None = None, count: int = 1) -> Iterator[Any]:
-    """Connect to workers.
-
-    Parameters
-    ----------
-    address
-        Address of a scheduler (tcp://HOST:PORT). None: start worker processes here.
-    count
-        Number of worker processes to start here.
-
-    Yields
-    ------
-    Client
-        A dask client.
-
-    Raises
-    ------
-    InputError
-        Dask is missing, the address does not answer, or workers have another version of tendonfmu.
-    """
+    """Connect to workers."""
     library = _library()
     if address is None:
         with _local_workers(library, count) as client:
@@ -356,11 +265,5 @@ def check_versions(client: Any, address: str) -> None:
 
 
 def worker_count() -> int:
-    """Return the default number of workers.
-
-    Returns
-    -------
-    int
-        Number of processors that this process may use.
-    """
+    """Return the default number of workers."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -24,29 +24,15 @@ LEAST_SHARE = 0.02  # of all the work; the remaining time is not extrapolated fr
 
 @dataclass(frozen=True)
 class PhaseState:
-    """The state of a computation.
+    """The state of a computation."""
 
-    Attributes
-    ----------
-    number, count
-        Number of the present phase, from 1, and of all phases.
-    words
-        What is being done.
-    done, total
-        Steps of the phase. total is None if it is unknown.
-    seconds
-        Time since the beginning (s).
-    left_s
-        Estimate of the remaining time (s). None in the first seconds.
-    """
-
-    number: int
+    number: int  # number of the present phase, from 1, and of all phases
     count: int
-    words: str
-    done: int
+    words: str  # what is being done
+    done: int  # steps of the phase
     total: int | None
-    seconds: float
-    left_s: float | None
+    seconds: float  # time since the beginning (s)
+    left_s: float | None  # estimate of the remaining time (s)
 
 
 Watch = Callable[[PhaseState], None]
@@ -54,20 +40,7 @@ Step = Callable[[int], None]
 
 
 class Phases:
-    """Phases in their order.
-
-    A phase may be skipped: its share is then neither done nor left. A phase may be repeated, also after others: its
-    earlier runs count as work done, and the phases after it as left.
-
-    Parameters
-    ----------
-    names
-        Words -> share of the work, in any unit. Words alone: equal shares.
-    watch
-        Called at every step.
-    clock
-        Returns the time (s).
-    """
+    """Phases in their order."""
 
     def __init__(
         self,
@@ -85,20 +58,7 @@ class Phases:
 
     @contextmanager
     def start(self, words: str, total: int | None = None) -> Iterator[Step]:
-        """Enter a phase.
-
-        Parameters
-        ----------
-        words
-            One of the names.
-        total
-            Number of steps. None: unknown.
-
-        Yields
-        ------
-        Step
-            step(done), to be called during the work.
-        """
+        """Enter a phase."""
         index = self._names.index(words)
 
         def step(done: int) -> None:

@@ -20,20 +20,7 @@ FORMAT = "tendonfmu-calibration-step-1"
 
 
 class Steps:
-    """Results of steps in a folder.
-
-    Parameters
-    ----------
-    folder
-        Folder of the computation.
-    made_from
-        What every step depends on, as JSON values.
-
-    Attributes
-    ----------
-    repeated
-        Names of the steps whose results were reused.
-    """
+    """Results of steps in a folder."""
 
     def __init__(self, folder: Path, made_from: Mapping[str, Any]) -> None:
         self._folder = folder / FOLDER
@@ -47,24 +34,7 @@ class Steps:
         compute: Callable[[], dict[str, Any]],
         page: Path | None = None,
     ) -> dict[str, Any]:
-        """Return the result of a step, computed only if it does not exist.
-
-        Parameters
-        ----------
-        name
-            Name of the step.
-        made_from
-            What it depends on in addition to the steps before, as JSON values.
-        compute
-            Computes the result.
-        page
-            A file that the step also writes. If it is missing, the step is computed again.
-
-        Returns
-        -------
-        dict
-            The result, as JSON reads it.
-        """
+        """Return the result of a step, computed only if it does not exist."""
         key = self._before = digest_of({"before": self._before, "name": name, **made_from})
         file = self._folder / f"{name}.json"
         found = _read(file, key)
@@ -79,13 +49,7 @@ class Steps:
 
 
 def forget_steps(folder: Path) -> None:
-    """Delete the results, so that the next calibration in this folder computes everything again.
-
-    Parameters
-    ----------
-    folder
-        Folder of the computation.
-    """
+    """Delete the results, so that the next calibration in this folder computes everything again."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
 
 
@@ -102,34 +66,12 @@ def _read(file: Path, key: str) -> dict[str, Any] | None:
 
 
 def digest_of(content: Mapping[str, Any]) -> str:
-    """Return the digest of JSON values, independent of the order of keys.
-
-    Parameters
-    ----------
-    content
-        JSON values.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
+    """Return the digest of JSON values, independent of the order of keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def digest_of_file(file: Path) -> str:
-    """Return the digest of a file.
-
-    Parameters
-    ----------
-    file
-        The file.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
+    """Return the digest of a file."""
     found = hashlib.sha256()
     with file.open("rb") as opened:
         while piece := opened.read(1 << 20):

@@ -31,19 +31,10 @@ TABLE = "campaign.parquet"
 
 @dataclass(frozen=True)
 class How:
-    """How the cases of a campaign are diagnosed.
+    """How the cases of a campaign are diagnosed."""
 
-    Attributes
-    ----------
-    beside
-        FILE.py:FUNCTION with an absolute path, for rival methods. It is called as FUNCTION(case) and returns, for the
-        name of each rival, the causes that it names.
-    least_gain
-        Of a cause, as for `diagnose`.
-    """
-
-    beside: str | None = None
-    least_gain: float = 0.03
+    beside: str | None = None  # FILE.py:FUNCTION with an absolute path, for rival methods
+    least_gain: float = 0.03  # of a cause, as for `diagnose`
 
 
 ALL_OF_IT = How()
@@ -82,10 +73,7 @@ def _diagnosed(case: Case, how: How) -> Row:
 
 
 def named_after_experiment(case: Case, found: Diagnosis, how: How = ALL_OF_IT) -> bool:
-    """Return whether the hidden effect is named once the requested experiment has been recorded, too.
-
-    The experiment is the one for the hidden effect if the diagnosis has one, else its next experiment.
-    """
+    """Return whether the hidden effect is named once the requested experiment has been recorded, too."""
     assert case.experiment is not None
     truth = case.truth[0]
     own = [each.motion for each in found.invisible if each.where.effect == truth.effect and each.motion]
@@ -136,22 +124,7 @@ def jobs_of(cases: Sequence[Case], how: How) -> list[Job]:
 
 
 def still_to_do(cases: Sequence[Case], folder: Path, failed_again: bool = False) -> list[Case]:
-    """Return the cases without a row.
-
-    Parameters
-    ----------
-    cases
-        All cases.
-    folder
-        Folder of the campaign.
-    failed_again
-        Whether cases whose row is an error are returned, too.
-
-    Returns
-    -------
-    list of Case
-        In the order of `cases`.
-    """
+    """Return the cases without a row."""
     waiting = {job.name for job in waiting_jobs(jobs_of(cases, ALL_OF_IT), folder, failed_again)}
     return [case for case in cases if case.name in waiting]
 
@@ -166,30 +139,7 @@ def run_campaign(
     failed_again: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Run the cases that have no row yet, as `jobs.run_jobs` does.
-
-    Parameters
-    ----------
-    cases
-        All cases.
-    folder
-        Folder of the campaign.
-    client
-        Of `jobs.workers_of`.
-    how
-        Options of the diagnoses.
-    stop_after
-        Time after which no further case starts, s.
-    failed_again
-        Whether cases whose row is an error run again.
-    progress
-        Called with the number of cases done and of all.
-
-    Returns
-    -------
-    int
-        How many cases ran.
-    """
+    """Run the cases that have no row yet, as `jobs.run_jobs` does."""
     return run_jobs(
         run_case,
         jobs_of(cases, how),
@@ -202,25 +152,7 @@ def run_campaign(
 
 
 def collect(cases: Sequence[Case], folder: Path) -> list[Row]:
-    """Collect all existing rows and write them to DIR/campaign.parquet.
-
-    Parameters
-    ----------
-    cases
-        All cases.
-    folder
-        Folder of the campaign, DIR.
-
-    Returns
-    -------
-    list of rows
-        In the order of the cases.
-
-    Raises
-    ------
-    InputError
-        If there is no row.
-    """
+    """Collect all existing rows and write them to DIR/campaign.parquet."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

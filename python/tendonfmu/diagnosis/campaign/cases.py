@@ -54,88 +54,39 @@ _MAKER = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_]\w*)")
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden.
+    """What is hidden."""
 
-    Attributes
-    ----------
-    effect
-        Name of the effect.
-    joint, tendon
-        Number from 1; None if the place has none.
-    """
-
-    effect: str
-    joint: int | None = None
+    effect: str  # name of the effect
+    joint: int | None = None  # number from 1; None if the place has none
     tendon: int | None = None
 
 
 @dataclass(frozen=True)
 class Case:
-    """One diagnosis to make and to judge.
+    """One diagnosis to make and to judge."""
 
-    Attributes
-    ----------
-    name
-        Of its row's file.
-    group
-        Of `GROUPS`.
-    folder
-        Folder of the files.
-    rig
-        What made it, for the table.
-    finger, recordings, test
-        As for `tendonfmu diagnose`.
-    gain_recordings
-        Long recordings of the same finger, for the true gain of the extended model.
-    truth
-        What is hidden; empty for the group null.
-    also
-        Effects that the rig has although the description lacks them: naming them is neither right nor wrong.
-    facts
-        Numbers and words for the row.
-    maker, arguments
-        Function that makes the files, and its arguments.
-    experiment
-        FILE.py:FUNCTION that carries out what a diagnosis asks for. FUNCTION(folder, motion, **arguments) returns the
-        name of the recording; `motion` is as in `diagnosis.json`.
-    """
-
-    name: str
-    group: str
-    folder: Path
-    rig: str = ""
-    finger: Path | None = None
+    name: str  # of its row's file
+    group: str  # of `GROUPS`
+    folder: Path  # folder of the files
+    rig: str = ""  # what made it, for the table
+    finger: Path | None = None  # as for `tendonfmu diagnose`
     recordings: tuple[Path, ...] = ()
     test: tuple[Path, ...] = ()
+    # long recordings of the same finger, for the true gain of the extended model
     gain_recordings: tuple[Path, ...] = ()
     kinematics: int = 1
     seed: int = 0
-    truth: tuple[Truth, ...] = ()
+    truth: tuple[Truth, ...] = ()  # what is hidden; empty for the group null
+    # effects that the rig has although the description lacks them: naming them is neither right nor wrong
     also: tuple[str, ...] = ()
-    facts: Mapping[str, float | str] = field(default_factory=dict)
-    maker: str | None = None
+    facts: Mapping[str, float | str] = field(default_factory=dict)  # numbers and words for the row
+    maker: str | None = None  # function that makes the files, and its arguments
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    experiment: str | None = None
+    experiment: str | None = None  # FILE.py:FUNCTION that carries out what a diagnosis asks for
 
 
 def read_cases(path: Path) -> list[Case]:
-    """Read all cases of a file.
-
-    Parameters
-    ----------
-    path
-        CASES.json.
-
-    Returns
-    -------
-    list of Case
-        With unique names.
-
-    Raises
-    ------
-    InputError
-        If the file is not valid; the error names file, key path, value and what was expected.
-    """
+    """Read all cases of a file."""
     try:
         root = Node(read_json(path, "the cases of a campaign")).keys(("format", "cases"))
         root.member("format").choice(FORMAT)
@@ -255,25 +206,7 @@ def made(case: Case, folder: Path) -> Case:
 
 
 def python_function(name: str, folder: Path) -> Callable[..., Any]:
-    """Import a function of a Python file.
-
-    Parameters
-    ----------
-    name
-        FILE.py:FUNCTION.
-    folder
-        Folder that the file name is relative to.
-
-    Returns
-    -------
-    callable
-        The function.
-
-    Raises
-    ------
-    InputError
-        If the name has another form, or file or function are missing.
-    """
+    """Import a function of a Python file."""
     match = _MAKER.fullmatch(name)
     if match is None:
         raise InputError(f"{name!r}: not a function of a Python file; expected FILE.py:FUNCTION")

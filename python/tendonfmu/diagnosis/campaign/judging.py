@@ -16,36 +16,16 @@ QUESTIONS = ("in_set", "first", "set_size", "place", "both", "exactly", "not_vis
 
 @dataclass(frozen=True)
 class Answer:
-    """What a rival says of a case.
+    """What a rival says of a case."""
 
-    Attributes
-    ----------
-    names
-        Causes, the first one first.
-    one_of
-        Whether it says only that one of them is present; none of several is then first.
-    alarm
-        Whether something is missing, with or without a name; None if it does not say.
-    gain
-        1 − rms ratio of its model and the nominal one on the tests; None if it has no model.
-    """
-
-    names: Sequence[Where] = ()
-    one_of: bool = False
-    alarm: bool | None = None
-    gain: float | None = None
+    names: Sequence[Where] = ()  # causes, the first one first
+    one_of: bool = False  # whether it says only that one of them is present; none of several is then first
+    alarm: bool | None = None  # whether something is missing, with or without a name; None if it does not say
+    gain: float | None = None  # 1 − rms ratio of its model and the nominal one on the tests; None if it has no model
 
 
 def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
-    """Return a row with what was reported and how it compares with the truth; None for questions that do not apply.
-
-    In addition to `judge_causes`:
-
-    - detected: also if the verdict leaves something unexplained;
-    - not_visible: the effect is listed as such and not as a cause; experiment: an experiment is given for it;
-    - unknown: the verdict leaves something unexplained, or the set of the first cause contains unknown;
-    - wrong_name: an effect is named and the verdict calls everything explained.
-    """
+    """Return a row with what was reported and how it compares with the truth; None for questions that do not apply."""
     row = judge_causes(case, found.causes)
     unknown = found.verdict in ALARMS or any(_names(cause, "unknown") for cause in found.causes[:1])
     row |= {
@@ -67,15 +47,11 @@ def judge(case: Case, found: Diagnosis) -> dict[str, Any]:
 
 
 def judge_causes(case: Case, causes: Sequence[Cause]) -> dict[str, Any]:
-    """Return the answers that follow from the names alone.
-
-    - detected: a cause is reported;
-    - in_set: the true effect is a cause or in the confusion set of one;
-    - first: it is the first cause;
-    - set_size: number of effects in the set that contains it, or in that of the first cause;
-    - place: the true joint and tendon are among the places of the named effect; None for the whole finger;
-    - both: everything hidden is named; exactly: nothing else is named, either.
-    """
+    """Return the answers that follow from the names alone."""
+    # - detected: a cause is reported; - in_set: the true effect is a cause or in the confusion set of one; - first: it
+    # is the first cause; - set_size: number of effects in the set that contains it, or in that of the first cause; -
+    # place: the true joint and tendon are among the places of the named effect; None for the whole finger; - both:
+    # everything hidden is named; exactly: nothing else is named, either.
     own = [cause for cause in causes if cause.where.effect not in NOT_IN_MODEL and not _is_there_anyway(cause, case)]
     row: dict[str, Any] = {
         "causes": json.dumps([_listed(cause) for cause in causes]),

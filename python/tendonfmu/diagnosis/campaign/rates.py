@@ -19,25 +19,13 @@ SHOWN = 0.3  # strength from which a motion shows an absorbed effect, and at whi
 
 @dataclass(frozen=True)
 class Rate:
-    """One line of a table.
+    """One line of a table."""
 
-    Attributes
-    ----------
-    what, goal
-        What is counted, and its goal, in words.
-    hits
-        Number of cases for which it holds; None for a mean.
-    cases
-        Number of cases that it is based on.
-    value, low, high
-        Share, or mean, and its interval.
-    """
-
-    what: str
+    what: str  # what is counted, and its goal, in words
     goal: str
-    hits: int | None
-    cases: int
-    value: float
+    hits: int | None  # number of cases for which it holds; None for a mean
+    cases: int  # number of cases that it is based on
+    value: float  # share, or mean, and its interval
     low: float
     high: float
 
@@ -59,10 +47,8 @@ HEADINGS = ("rate", "goal", "found", "cases", "95 % interval")
 
 
 def rate(what: str, goal: str, rows: Iterable[Row], holds: Callable[[Row], Any]) -> Rate:
-    """Return the share of the rows for which `holds` is true.
-
-    Rows for which the question does not apply (None) are left out.
-    """
+    """Return the share of the rows for which `holds` is true."""
+    # Rows for which the question does not apply (None) are left out.
     answers = [bool(answer) for answer in (holds(row) for row in rows) if answer is not None]
     found = intervals.share(sum(answers), len(answers))
     return Rate(what, goal, sum(answers), len(answers), found.value, found.low, found.high)
@@ -83,18 +69,7 @@ def of_strength(rows: Iterable[Row], strength: float) -> list[Row]:
 
 
 def rates(rows: Sequence[Row]) -> list[Rate]:
-    """Compute the lines of the table in docs/evidence/fit.md.
-
-    Parameters
-    ----------
-    rows
-        Rows of a campaign; rows with an error are left out.
-
-    Returns
-    -------
-    list of Rate
-        One line for each rate.
-    """
+    """Compute the lines of the table in docs/evidence/fit.md."""
     good = [row for row in rows if not row.get("error")]
 
     def group(name: str) -> list[Row]:
@@ -130,18 +105,7 @@ def rates(rows: Sequence[Row]) -> list[Rate]:
 
 
 def rates_by_part(rows: Sequence[Row]) -> list[Rate]:
-    """Compute the rates that differ most, by what made the recordings and by number of joints.
-
-    Parameters
-    ----------
-    rows
-        Rows of a campaign; rows with an error are left out.
-
-    Returns
-    -------
-    list of Rate
-        Lines with at least one case; empty if all rows are of one kind.
-    """
+    """Compute the rates that differ most, by what made the recordings and by number of joints."""
     good = [row for row in rows if not row.get("error")]
     parts = [(f"{value}", [row for row in good if row["rig"] == value]) for value in _values(good, "rig")]
     counts = _values(good, "joints")
@@ -175,10 +139,8 @@ def _of_group(row: Row, group: str, answer: bool | None) -> bool | None:
 
 
 def _named_afterwards(row: Row) -> bool | None:
-    """Return whether the effect was named after the experiment.
-
-    None if, by the rig's own computation, no motion shows the effect.
-    """
+    """Return whether the effect was named after the experiment."""
+    # None if, by the rig's own computation, no motion shows the effect.
     shown = row.get("shown_strength")
     return None if shown is not None and shown < SHOWN else row.get("named_after_experiment")
 
@@ -190,10 +152,7 @@ def rivals_of(rows: Sequence[Row]) -> list[str]:
 
 
 def seen_by(rows: Sequence[Row], rival: str) -> list[Row]:
-    """Return the rows with a rival's answers in place of those of the diagnosis.
-
-    Rows without answers of the rival are left out.
-    """
+    """Return the rows with a rival's answers in place of those of the diagnosis."""
     silent = dict.fromkeys(("set_size", "not_visible", "experiment", "unknown", "true_gain"))
     own = [
         {key.removeprefix(f"{rival}."): value for key, value in row.items() if key.startswith(f"{rival}.")}
@@ -223,18 +182,7 @@ def _covered(row: Row) -> bool | None:
 
 
 def by_effect(rows: Sequence[Row]) -> list[list[str]]:
-    """Count the answers for each hidden effect.
-
-    Parameters
-    ----------
-    rows
-        Rows of a campaign; rows with an error are left out.
-
-    Returns
-    -------
-    list of lines
-        Cells of EFFECT_HEADINGS: effect, cases, detected, in the set, first, place.
-    """
+    """Count the answers for each hidden effect."""
     single = [row for row in rows if row["group"] == "single" and not row.get("error")]
     lines = []
     for effect in sorted({str(row["true_effect"]) for row in single}):
@@ -249,20 +197,7 @@ EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", 
 
 
 def campaign_report(rows: Sequence[Row], cases: int) -> dict[str, Any]:
-    """Return what `tendonfmu campaign --json` prints.
-
-    Parameters
-    ----------
-    rows
-        Rows of a campaign.
-    cases
-        Number of cases listed, also those without a row yet.
-
-    Returns
-    -------
-    dict
-        Ready for JSON. Shares from 0 to 1, with their 95 % interval.
-    """
+    """Return what `tendonfmu campaign --json` prints."""
     return {
         "format": REPORT_FORMAT,
         "cases": cases,
@@ -284,18 +219,7 @@ def _effect_entry(effect: str, *counts: str) -> dict[str, Any]:
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    """Format all tables of a campaign in Markdown.
-
-    Parameters
-    ----------
-    rows
-        Rows of a campaign.
-
-    Returns
-    -------
-    str
-        Rates, rates by part, those of each rival, a table by hidden effect, and the number of failed cases.
-    """
+    """Format all tables of a campaign in Markdown."""
     parts = [_table(HEADINGS, [each.cells() for each in rates(rows)])]
     by_part = rates_by_part(rows)
     if by_part:

@@ -39,10 +39,7 @@ MISSING = 3.0  # times the residual's standard deviation: expected size of an ef
 def background_columns(
     data: Mapping[str, Any], series: Series, force: Numbers, columns: CandidateColumns, residual: Numbers, seed: int
 ) -> tuple[Array, Numbers]:
-    """Return the columns [B, n, d], and the expected size of each weight [d].
-
-    `force` is predicted by the model, N [B, m]; `residual` is what the model leaves, N·m [B, n].
-    """
+    """Return the columns [B, n, d], and the expected size of each weight [d]."""
     seen = features(series, force=force, seed=seed)
     arms = moment_arms(data)
     spread = residual[series.used].std(axis=0)

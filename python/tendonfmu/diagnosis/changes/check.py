@@ -18,10 +18,7 @@ APART = 2.0  # times the spread of angles, forces
 
 
 def check_sides(finger: Finger, then: Sequence[FitRecording], now: Sequence[FitRecording]) -> list[str]:
-    """Return warnings about recordings of the reference and of now.
-
-    Raises InputError if both sides hold the same samples, or if one has nothing to learn from.
-    """
+    """Return warnings about recordings of the reference and of now."""
     for side, role in ((then, "reference"), (now, "recording")):
         for each in side:
             if not (each.train | each.held_out).any():

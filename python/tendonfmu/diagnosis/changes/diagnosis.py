@@ -63,21 +63,13 @@ FEWEST = 4  # least number of stretches on either side
 
 @dataclass(frozen=True)
 class ChangeCase:
-    """Checked recordings of the reference and of now.
-
-    Attributes
-    ----------
-    then, now
-        Recordings; `now` has held-out stretches if there are no tests.
-    warnings
-        About recordings.
-    """
+    """Checked recordings of the reference and of now."""
 
     finger: Finger
-    then: list[FitRecording]
+    then: list[FitRecording]  # recordings; `now` has held-out stretches if there are no tests
     now: list[FitRecording]
     tests: list[FitRecording]
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # about recordings
 
     @property
     def whole(self) -> list[FitRecording]:
@@ -94,10 +86,7 @@ def find_changes(case: ChangeCase, *, least_gain: float, seed: int, jobs: int, p
 
 
 def sizes_now(case: ChangeCase, keys: Sequence[Key], *, seed: int, jobs: int) -> list[tuple[Key, ChangedSize]]:
-    """Return how large these effects are in the new recordings, named or not.
-
-    Effects that the description cannot have are left out.
-    """
+    """Return how large these effects are in the new recordings, named or not."""
     settings = FitSettings(threads=jobs, path=case.finger.path)
     own = _Changes(case, choose(case.finger, case.then, settings), settings, 0.0, seed, Phases(PHASES))
     return own.sizes(keys)
@@ -209,10 +198,7 @@ class _Changes:
         return search.moved_on(search.grams(unseen=held))
 
     def _online(self, changes: Sequence[Change]) -> Data:
-        """Return the reference model with changes, as it runs online, with the bias at the start of the new recordings.
-
-        This bias is no part of the model: taring a sensor again moves it.
-        """
+        """Return the reference model with changes, with the bias at the start of the new recordings."""
         data: Data = self._search.now_data(changes)
         if (data.get("bias") or {}).get("initial_torque") is not None:
             own = [
@@ -302,11 +288,7 @@ class _Changes:
         return found
 
     def _unexplained(self) -> Unexplained:
-        """Return whether the new recordings, with all changes, are explained worse than the reference is by itself.
-
-        If so, something is different that has no name. A difference below LEAST_UNKNOWN is normal for a finger that is
-        well.
-        """
+        """Return whether the new recordings, with all changes, are explained worse than the reference is by itself."""
         search = self._search
         squares, rows = search.grams().left()
         is_now = search.stretches_now
@@ -334,10 +316,7 @@ class _Changes:
         return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
 
     def _load(self) -> SteadyLoad | None:
-        """Return what remains of a load both with and without the means of the changes.
-
-        A weight pulls with its mean torque, or without it where the sensors were zeroed under the weight.
-        """
+        """Return what remains of a load both with and without the means of the changes."""
         search = self._search
         found: list[SteadyLoad] = []
         for means in (False, True) if search.changes else (False,):

@@ -19,10 +19,7 @@ Numbers = NDArray[np.float64]
 
 
 def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple[Evidence, ...]:
-    """Return the picture at the joint where the change shows most.
-
-    The bins have equal counts of the new recordings. The reference is NaN in bins where it has few samples.
-    """
+    """Return the picture at the joint where the change shows most."""
     change = search.changes[number]
     left = search.left()  # with all changes, without the background
     added = search.column(number) @ change.magnitudes

@@ -17,11 +17,7 @@ Numbers = NDArray[np.float64]
 
 
 def gain_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> tuple[float, float]:
-    """Return 1 − rms after / rms before, and its standard error.
-
-    `before` and `after` are what is left on unseen rows without and with the change, N·m [r, n]; `stretch` [r] numbers
-    the rows' stretches.
-    """
+    """Return 1 − rms after / rms before, and its standard error."""
     whole, left = float(np.sum(before**2)), float(np.sum(after**2))
     if whole <= 0.0 or left <= 0.0:
         return 0.0, np.inf

@@ -44,76 +44,37 @@ _DATE = re.compile(r"(?<!\d)(\d{4})-?(\d{2})-?(\d{2})(?:[T_ -]?(\d{2})[-:h]?(\d{
 
 @dataclass(frozen=True)
 class Size:
-    """A cause in one recording.
-
-    Attributes
-    ----------
-    size
-        Size in the reference and in this recording.
-    named
-        Whether the diagnosis of the recording names it.
-    gain
-        Gain there, 0 if it is not named.
-    """
+    """A cause in one recording."""
 
     recording: str
-    size: ChangedSize
-    named: bool
-    gain: float
+    size: ChangedSize  # size in the reference and in this recording
+    named: bool  # whether the diagnosis of the recording names it
+    gain: float  # gain there, 0 if it is not named
 
 
 @dataclass(frozen=True)
 class Line:
-    """One cause over all recordings.
+    """One cause over all recordings."""
 
-    Attributes
-    ----------
-    where, title
-        Effect and place, and the effect in plain words.
-    sizes
-        Of each recording in which the cause could be estimated.
-    trend
-        Change of the size per unit of time of the history; None for fewer than FEWEST recordings.
-    since
-        First recording from which on the interval of the change excludes 0; None if there is none.
-    """
-
-    where: Where
+    where: Where  # effect and place, and the effect in plain words
     title: str
-    sizes: tuple[Size, ...]
-    trend: Interval | None
-    since: str | None
+    sizes: tuple[Size, ...]  # of each recording in which the cause could be estimated
+    trend: Interval | None  # change of the size per unit of time of the history; None for fewer than FEWEST recordings
+    since: str | None  # first recording from which on the interval of the change excludes 0; None if there is none
 
 
 @dataclass(frozen=True)
 class History:
-    """All causes over all recordings.
-
-    Attributes
-    ----------
-    references, recordings
-        Names of the files.
-    times
-        Of the recordings [K]. If the names have dates: weeks since the reference, or since the first recording if the
-        reference has no date. Otherwise the number of the recording, from 1.
-    dated
-        Whether `times` are weeks.
-    lines
-        One for each cause, the most frequently named first.
-    verdicts
-        Of each recording.
-    failed
-        (recording, reason) for each recording that could not be diagnosed.
-    """
+    """All causes over all recordings."""
 
     finger: str
-    references: tuple[str, ...]
+    references: tuple[str, ...]  # names of the files
     recordings: tuple[str, ...]
-    times: tuple[float, ...]
-    dated: bool
-    lines: tuple[Line, ...]
-    verdicts: tuple[str, ...]
-    failed: tuple[tuple[str, str], ...]
+    times: tuple[float, ...]  # of the recordings [K]
+    dated: bool  # whether `times` are weeks
+    lines: tuple[Line, ...]  # one for each cause, the most frequently named first
+    verdicts: tuple[str, ...]  # of each recording
+    failed: tuple[tuple[str, str], ...]  # (recording, reason) for each recording that could not be diagnosed
 
     @property
     def unit(self) -> str:
@@ -336,10 +297,8 @@ def _date(name: str) -> float | None:
 
 
 def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
-    """Return names of rows: number, stem, and a mark of all that the row depends on.
-
-    If any of this differs, the row is computed again.
-    """
+    """Return names of rows: number, stem, and a mark of all that the row depends on."""
+    # If any of this differs, the row is computed again.
     finger, references = str(options[0]), list(options[1])
     shared = [*options, *(_stamp(each) for each in (finger, *references))]
     return [
@@ -362,18 +321,7 @@ def _stamp(file: str) -> list[int]:
 
 
 def share_of(line: Line) -> Interval | None:
-    """Return the trend as a share of the size in the reference.
-
-    Parameters
-    ----------
-    line
-        One cause of a history.
-
-    Returns
-    -------
-    Interval or None
-        Share per unit of time with its 95 % interval; None if the reference size is 0 or there is no trend.
-    """
+    """Return the trend as a share of the size in the reference."""
     base = line.sizes[0].size.reference.value
     if line.trend is None or not base or not math.isfinite(line.trend.low):
         return None

@@ -20,10 +20,7 @@ LEVEL = 0.01  # largest share of stretches whose mean is on the other side
 
 
 def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
-    """Return the load at the joint where it is largest; None if no level moved far beyond the scatter of the reference.
-
-    `left` is measured less modelled torque, with all changes and including the bias, N·m [B, n].
-    """
+    """Return the load at the joint where it is largest; None if no level moved beyond the reference's scatter."""
     found = []
     for joint in range(left.shape[1]):
         then, now = (_Side.of(series, left[:, joint], series.used & side) for side in (~is_now, is_now))
@@ -38,24 +35,12 @@ def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> 
 
 @dataclass(frozen=True)
 class _Side:
-    """The mean torque of one side.
+    """The mean torque of one side."""
 
-    Attributes
-    ----------
-    level
-        Mean, N·m.
-    spread
-        Rms about the level, N·m.
-    apart
-        Largest distance of a recording's mean from the level, N·m.
-    means, squares, counts
-        By stretch of 2 s.
-    """
-
-    level: float
-    spread: float
-    apart: float
-    means: Numbers
+    level: float  # mean, N·m
+    spread: float  # rms about the level, N·m
+    apart: float  # largest distance of a recording's mean from the level, N·m
+    means: Numbers  # by stretch of 2 s
     squares: Numbers
     counts: Numbers
 

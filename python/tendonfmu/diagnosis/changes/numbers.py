@@ -32,26 +32,14 @@ _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_vel
 
 @dataclass(frozen=True)
 class Number:
-    """One unknown of a description's fit.
+    """One unknown of a description's fit."""
 
-    Attributes
-    ----------
-    effect
-        Name of the effect.
-    side
-        Of its law: 1 or −1; 0 if both sides are one.
-    index
-        Among the unknowns.
-    value, low, high
-        Start and bounds in the unit of the unknown.
-    """
-
-    effect: str
+    effect: str  # name of the effect
     place: Place
-    side: int
-    index: int
+    side: int  # of its law: 1 or −1; 0 if both sides are one
+    index: int  # among the unknowns
     path: str
-    value: float
+    value: float  # start and bounds in the unit of the unknown
     low: float
     high: float
 
@@ -94,11 +82,7 @@ def _owner(data: Data, path: str) -> tuple[str, Place, int]:
 
 
 def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Hypothesis]:
-    """Return each effect at each place, of one joint or tendon, and everywhere; the coarse ones first.
-
-    Both sides of a law change by the same share, or one side against the other (asymmetric friction). `count` is the
-    number of all columns, `first` the index of the first number's column.
-    """
+    """Return each effect at each place, of one joint or tendon, and everywhere; the coarse ones first."""
     by_place: dict[tuple[str, Place], list[Number]] = {}
     for number in numbers:
         by_place.setdefault((number.effect, number.place), []).append(number)

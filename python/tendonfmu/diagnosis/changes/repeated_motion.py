@@ -30,30 +30,17 @@ NEAR = (
 
 @dataclass(frozen=True)
 class Repeat:
-    """A motion that was repeated.
+    """A motion that was repeated."""
 
-    Attributes
-    ----------
-    then, now
-        Recordings, by number.
-    shift
-        From a time in `then` to the same place of the motion in `now`, s.
-    begin, end
-        Times in `then` of what both share, s.
-    """
-
-    then: int
+    then: int  # recordings, by number
     now: int
-    shift: float
-    begin: float
+    shift: float  # from a time in `then` to the same place of the motion in `now`, s
+    begin: float  # times in `then` of what both share, s
     end: float
 
 
 def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Sequence[int]) -> list[Repeat]:
-    """Return the repeated motions: new recordings that follow the motion of a reference recording under the same load.
-
-    Pretension must be the same, too. `force` [B, m], N, is predicted by the model from motion, load and pretension.
-    """
+    """Return the new recordings that follow the motion of a reference recording under the same load."""
     found = []
     for number in now:
         fits = [repeat for other in then if (repeat := _repeat(series, force, other, number)) is not None]
@@ -73,10 +60,7 @@ def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> 
 
 
 def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
-    """Return the blocks that add nothing to the differences [B].
-
-    They are all of the repeated motions of the reference, and the new recordings before and after the motion.
-    """
+    """Return the blocks that add nothing to the differences [B]."""
     found = np.isin(series.recording, [each.then for each in repeats])
     for each in repeats:
         rows, first, _ = _places(series, each)
@@ -133,11 +117,7 @@ def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
 
 
 def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
-    """Yield possible delays of the second motion, in blocks.
-
-    These are 0, for recordings that start alike, and the delay at which the angles differ least. The latter is searched
-    within `near` blocks of the largest correlation.
-    """
+    """Yield possible delays of the second motion, in blocks."""
     yield 0
     whole = np.zeros(len(one) + len(other) - 1)
     for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):

@@ -45,45 +45,23 @@ STEPS = 3  # of Newton's method, with the derivatives of the reference
 
 @dataclass(frozen=True)
 class Change:
-    """A change that was found.
+    """A change that was found."""
 
-    Attributes
-    ----------
-    hypothesis
-        What and where.
-    magnitudes, covariance
-        [d] and [d, d].
-    gain, error
-        1 − rms with / rms without on held-out parts of the new recordings, and its standard error.
-    p_value
-        Family-wise.
-    alike
-        What the data cannot distinguish from it, best first.
-    """
-
-    hypothesis: Hypothesis
-    magnitudes: Numbers
+    hypothesis: Hypothesis  # what and where
+    magnitudes: Numbers  # [d] and [d, d]
     covariance: Numbers
-    gain: float
+    gain: float  # 1 − rms with / rms without on held-out parts of the new recordings, and its standard error
     error: float
-    p_value: float
-    alike: tuple[Hypothesis, ...] = ()
+    p_value: float  # family-wise
+    alike: tuple[Hypothesis, ...] = ()  # what the data cannot distinguish from it, best first
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Which blocks belong to which recordings.
+    """Which blocks belong to which recordings."""
 
-    Attributes
-    ----------
-    now
-        Blocks of the new recordings [B].
-    test
-        Those of them that are not learned from [B].
-    """
-
-    now: Flags
-    test: Flags
+    now: Flags  # blocks of the new recordings [B]
+    test: Flags  # those of them that are not learned from [B]
 
 
 class ChangeSearch:
@@ -100,21 +78,8 @@ class ChangeSearch:
         left_out: Flags | None = None,
         seed: int = 0,
     ) -> None:
-        """Prepare all columns.
-
-        Parameters
-        ----------
-        data
-            The model fitted to the reference.
-        recordings
-            As estimated from.
-        now
-            Numbers of the new recordings.
-        tests
-            Numbers of the new recordings that are not learned from.
-        left_out
-            Blocks that are ignored [B].
-        """
+        """Prepare all columns."""
+        # left_out: [B]
         self.data, self._recordings, self._grid, self._least = data, recordings, grid, least
         self.series = series_of(data, recordings, grid, left_out)
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
@@ -162,10 +127,7 @@ class ChangeSearch:
         return sorted([*missing, *present], key=lambda each: each.level)
 
     def _level_shift(self) -> Numbers:
-        """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n].
-
-        This is a load or a sensor's zero, which is no state of the motion.
-        """
+        """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
         left, series = self.torque_left(), self.series
         then = left[series.used & ~self.sides.now].mean(axis=0)
         found = np.zeros_like(left)
@@ -193,10 +155,7 @@ class ChangeSearch:
                 self.refused.append(found)
 
     def _best(self, tried: Collection[str]) -> Judged | None:
-        """Return the hypothesis that lowers the error most, at the coarsest place that is as good.
-
-        Effects in `tried` are left out.
-        """
+        """Return the hypothesis that lowers the error most, at the coarsest place that is as good."""
         ranked = [each for each in self.selection.ranked() if each.hypothesis.effect not in tried]
         if not ranked:
             return None
@@ -208,10 +167,8 @@ class ChangeSearch:
         return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
 
     def _at_best_place(self, judged: Judged) -> Judged:
-        """Return, of places that are nearly as good, the one with the smallest error.
-
-        The size is free in each new recording here, because a growing change differs from one recording to the next.
-        """
+        """Return, of places that are nearly as good, the one with the smallest error."""
+        # The size is free in each new recording here, because a growing change differs from one recording to the next.
         options = [judged, *self.selection.near(judged)]
         if len(options) == 1:
             return judged
@@ -253,11 +210,8 @@ class ChangeSearch:
         return float(np.sqrt(self.selection.base.sum()))
 
     def matters(self, gain: float, before: float, effect: str, named: Sequence[str], least_gain: float) -> bool:
-        """Return whether a change gains enough.
-
-        It must remove enough of what is left without it (`before`), each further name more than the one before. It must
-        also remove enough of the whole difference, so that small remnants of a large change are not named.
-        """
+        """Return whether a change gains enough."""
+        # It must also remove enough of the whole difference, so that small remnants of a large change are not named.
         return gain >= least_gain * names_with(effect, named) and gain * before >= least_gain * self._whole
 
     def _take(self, change: Change) -> None:
@@ -270,10 +224,7 @@ class ChangeSearch:
         self._selection = None
 
     def free(self, keys: Sequence[Key]) -> None:
-        """Free these effects at these places in the new recordings, whether they are certain or not.
-
-        Each gets the form that fits best. Effects that the description cannot have are left out.
-        """
+        """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
             own = [each for each in self.hypotheses if each.key == key]
@@ -338,11 +289,7 @@ class ChangeSearch:
         return found
 
     def grams(self, without: int | None = None, unseen: Flags | None = None) -> Grams:
-        """Return the products with the changes' own columns among the shared ones.
-
-        The change `without` is left out and is the only candidate. Blocks in `unseen` [B] are the only ones judged;
-        they are not learned from.
-        """
+        """Return the products with the changes' own columns among the shared ones."""
         kept = [each for k, each in enumerate(self.changes) if k != without]
         used = np.zeros(0, dtype=np.intp)
         target = self._target_now()
@@ -354,10 +301,7 @@ class ChangeSearch:
         return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
     def grams_of_recording(self, number: int, only: int) -> Grams:
-        """Return the products with one change in one new recording as the only candidate.
-
-        The change is free in each of the other new recordings, too.
-        """
+        """Return the products with one change in one new recording as the only candidate."""
         change = self.changes[number]
         column = (self._values @ self._mixed(change))[:, :, None]
         of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
@@ -429,11 +373,7 @@ class ChangeSearch:
         return len(self._repeats)
 
     def torque_left(self, means: bool = False) -> Numbers:
-        """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n].
-
-        The changes are included, with `means` also their means, which no motion can distinguish from a load or a
-        sensor's zero.
-        """
+        """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
         whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
         left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
         if self.changes:
@@ -457,11 +397,7 @@ class ChangeSearch:
     # --- certainty ---
 
     def certainty_of(self, grams: Grams, mix: Numbers, magnitudes: Numbers, by_fold: Numbers) -> tuple[float, Numbers]:
-        """Return the p-value of there being no change, corrected for all that was tried, and the covariance [d, d].
-
-        It is Hotelling's test on the scores of stretches of all recordings. Neighbouring stretches are summed in pairs
-        if they vary together: what wanders from stretch to stretch in the reference is no change.
-        """
+        """Return the p-value of there being no change, corrected for all that was tried, and the covariance [d, d]."""
         energy, scores = grams.scores(mix, by_fold)
         inverse = np.linalg.pinv(energy, hermitian=True)
         score = energy @ magnitudes

@@ -29,21 +29,11 @@ _OTHER_SIDE = {"positive": "negative", "negative": "positive"}
 
 @dataclass(frozen=True)
 class Sized:
-    """The size of a change.
+    """The size of a change."""
 
-    Attributes
-    ----------
-    places
-        Values now and units of all numbers that changed, by place.
-    size
-        Of the main number.
-    words
-        The size in plain words.
-    """
-
-    places: tuple[FoundPlace, ...]
-    size: ChangedSize
-    words: str
+    places: tuple[FoundPlace, ...]  # values now and units of all numbers that changed, by place
+    size: ChangedSize  # of the main number
+    words: str  # the size in plain words
 
 
 def sized(search: ChangeSearch, changes: Sequence[Change], number: int) -> Sized:
@@ -99,10 +89,7 @@ _FORM = ("stribeck_velocity", "beyond", "turns", "time_constant", "reaction", "r
 
 
 def _main(paths: Sequence[str], now: Data, change: Change) -> list[str]:
-    """Return the paths that say how large the term is.
-
-    It is the largest number that does not describe the term's form; sine and cosine count together.
-    """
+    """Return the paths that say how large the term is."""
     waves = [path for path in paths if path.rsplit(".", 1)[-1] in ("sine", "cosine")]
     if waves:
         return waves[:2]

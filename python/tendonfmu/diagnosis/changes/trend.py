@@ -18,10 +18,7 @@ Numbers = NDArray[np.float64]
 def sizes_by_recording(
     search: ChangeSearch, number: int, size: ChangedSize, recordings: Sequence[FitRecording]
 ) -> tuple[Interval, ...]:
-    """Return the size of a change in each of the new recordings, in their order and in its unit.
-
-    The tuple is empty for a single recording.
-    """
+    """Return the size of a change in each of the new recordings, in their order and in its unit."""
     if len(recordings) < 2:
         return ()
     change = search.changes[number]
@@ -57,10 +54,7 @@ def _in_unit(share: tuple[float, float], change: Change, size: ChangedSize) -> I
 
 
 def slope(times: Numbers, sizes: Sequence[Interval]) -> Interval:
-    """Return the change per unit of time, by weighted least squares.
-
-    Its error is the larger of the sizes' own errors and their scatter.
-    """
+    """Return the change per unit of time, by weighted least squares."""
     value = np.array([each.value for each in sizes])
     error = np.maximum(np.array([(each.high - each.low) / 3.92 for each in sizes]), 1e-300)
     weight = 1.0 / error**2

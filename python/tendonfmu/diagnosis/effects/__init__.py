@@ -68,10 +68,7 @@ __all__ = ["CANDIDATES", "Candidate", "Column", "Place", "Variant", "by_name"]
 
 
 def by_name(name: str) -> Candidate:
-    """Return the candidate of an effect of docs/reference/commands/diagnose.md.
-
-    Raises InputError if there is none of this name.
-    """
+    """Return the candidate of an effect of docs/reference/commands/diagnose.md."""
     for candidate in CANDIDATES:
         if candidate.name == name:
             return candidate

@@ -26,10 +26,7 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Return the variant; its magnitude is the difference between the directions in shares of the law.
-
-    Viscous friction has a magnitude of its own.
-    """
+    """Return the variant; its magnitude is the difference between the directions in shares of the law."""
     path = law_path(place, shape)
     edits = (Edit(SIDES, path),)
     split = apply_edits(data, edits, (), {})

@@ -14,10 +14,7 @@ _OF_RANGE = (0.0006, 0.005, 0.03)  # widths, of the range of the position; the s
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Return joints, and tendons if their positions are used.
-
-    Kinematics source 3 brings its own velocities, which no play changes.
-    """
+    """Return joints, and tendons if their positions are used."""
     tendons = all_tendons(data) if kinematics == 1 else []
     joints = all_joints(data) if kinematics != 3 else []
     return without_rows(data, NAME, joints + tendons)

@@ -25,39 +25,20 @@ LEAST_SHARE = 0.01  # of the expected size: a fit could not distinguish a smalle
 
 @dataclass(frozen=True)
 class Place:
-    """Where an effect is.
+    """Where an effect is."""
 
-    Attributes
-    ----------
-    joint, tendon
-        Number from 1; None if the place has none.
-    """
-
-    joint: int | None = None
+    joint: int | None = None  # number from 1; None if the place has none
     tendon: int | None = None
 
 
 @dataclass(frozen=True)
 class Column:
-    """One direction in the space of a description's numbers.
+    """One direction in the space of a description's numbers."""
 
-    Attributes
-    ----------
-    numbers
-        Path -> how much a magnitude of 1 adds. `coulomb` moves with `static` − `coulomb` held constant; `static` is
-        that difference, as in `estimation.Unknown`.
-    sign
-        Expected sign of the magnitude, 0 for either.
-    expected
-        Magnitude of an ordinary effect, > 0; a fit without better knowledge starts there.
-    least
-        Smallest magnitude that the description accepts.
-    """
-
-    numbers: Mapping[str, float]
-    sign: int
-    expected: float
-    least: float = -math.inf
+    numbers: Mapping[str, float]  # path -> how much a magnitude of 1 adds
+    sign: int  # expected sign of the magnitude, 0 for either
+    expected: float  # magnitude of an ordinary effect, > 0; a fit without better knowledge starts there
+    least: float = -math.inf  # smallest magnitude that the description accepts
 
     @property
     def path(self) -> str:
@@ -67,45 +48,21 @@ class Column:
 
 @dataclass(frozen=True)
 class Variant:
-    """A candidate at one place and one point of the grid of its non-linear numbers.
+    """A candidate at one place and one point of the grid of its non-linear numbers."""
 
-    Attributes
-    ----------
-    base
-        The description without the term.
-    shape
-        The non-linear numbers here.
-    columns
-        Derivatives to compute.
-    edits, rows
-        What is added at a strength of zero: changes of laws and covers, and rows of `extensions`.
-    settings
-        Numbers of laws without a meaning at strength zero: path of the law -> Stribeck velocity.
-    secant_rows
-        The rows at full strength, if there is no derivative. The one column is then the difference that they make; its
-        magnitude is 1.
-    scaled
-        Keys of `secant_rows` that grow with the magnitude.
-    most
-        Largest value of these keys, of either sign.
-    only_joint
-        The only joint whose torque the rows change, from 1.
-    late
-        By how much forces come later than positions, s. The column is then the effect of this delay on measured forces,
-        not what the row makes of them.
-    """
-
-    base: Data
-    shape: Mapping[str, float]
-    columns: tuple[Column, ...] = ()
+    base: Data  # the description without the term
+    shape: Mapping[str, float]  # the non-linear numbers here
+    columns: tuple[Column, ...] = ()  # derivatives to compute
+    # what is added at a strength of zero: changes of laws and covers, and rows of `extensions`
     edits: tuple[Edit, ...] = ()
     rows: tuple[Mapping[str, Any], ...] = ()
+    # numbers of laws without a meaning at strength zero: path of the law -> Stribeck velocity
     settings: Mapping[str, float] | None = None
-    secant_rows: tuple[Mapping[str, Any], ...] = ()
-    scaled: tuple[str, ...] = ()
-    most: float = math.inf
-    only_joint: int | None = None
-    late: float = 0.0
+    secant_rows: tuple[Mapping[str, Any], ...] = ()  # the rows at full strength, if there is no derivative
+    scaled: tuple[str, ...] = ()  # keys of `secant_rows` that grow with the magnitude
+    most: float = math.inf  # largest value of these keys, of either sign
+    only_joint: int | None = None  # the only joint whose torque the rows change, from 1
+    late: float = 0.0  # by how much forces come later than positions, s
 
     @cached_property
     def data(self) -> dict[str, Any]:
@@ -137,11 +94,9 @@ class Variant:
         return 1 if self.secant_rows else len(self.columns)
 
     def extended(self, magnitudes: Sequence[float]) -> dict[str, Any]:
-        """Return the description with the term at these magnitudes, one per column, none of its numbers at zero.
-
-        A magnitude of the wrong sign, or close to 0, becomes a small one of the right sign, because a fit can only
-        start from a number that is present.
-        """
+        """Return the description with the term at these magnitudes, one per column, none of its numbers at zero."""
+        # A magnitude of the wrong sign, or close to 0, becomes a small one of the right sign, because a fit can only
+        # start from a number that is present.
         if len(magnitudes) != self.count:
             raise InputError(f"magnitudes: {counted(len(magnitudes), 'number')}; expected {self.count}, one per column")
         if self.secant_rows:
@@ -168,48 +123,22 @@ def _present(column: Column, magnitude: float) -> float:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect of docs/reference/commands/diagnose.md.
+    """One effect of docs/reference/commands/diagnose.md."""
 
-    Attributes
-    ----------
-    name
-        Name of the effect.
-    title
-        A few plain words.
-    explanation
-        What it is physically, and what to look at on the hand.
-    sign
-        Expected sign of its magnitudes: +1, −1, or 0 for either.
-    excited_by
-        Motion or load that shows it.
-    confused_with
-        Effects that look alike in many recordings.
-    coordinate
-        What its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load".
-    unit
-        Of its main number.
-    number
-        What the main number is called.
-    find_places
-        (data, kinematics) -> places where it is absent and possible.
-    find_shapes
-        (data, place, span) -> the grid of its non-linear numbers.
-    make
-        (data, place, shape) -> the variant there.
-    """
-
-    name: str
-    title: str
-    explanation: str
-    sign: int
-    excited_by: str
-    confused_with: tuple[str, ...]
+    name: str  # name of the effect
+    title: str  # A few plain words
+    explanation: str  # what it is physically, and what to look at on the hand
+    sign: int  # expected sign of its magnitudes: +1, −1, or 0 for either
+    excited_by: str  # motion or load that shows it
+    confused_with: tuple[str, ...]  # effects that look alike in many recordings
+    # what its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load"
     coordinate: str
-    unit: str
-    number: str
-    find_places: Callable[[Data, int], list[Place]]
+    unit: str  # of its main number
+    number: str  # what the main number is called
+    find_places: Callable[[Data, int], list[Place]]  # (data, kinematics) -> places where it is absent and possible
+    # (data, place, span) -> the grid of its non-linear numbers
     find_shapes: Callable[[Data, Place, Span], list[dict[str, float]]]
-    make: Callable[[Data, Place, Mapping[str, float]], Variant]
+    make: Callable[[Data, Place, Mapping[str, float]], Variant]  # (data, place, shape) -> the variant there
 
     def places(self, data: Data, kinematics: int = 1) -> list[Place]:
         """Return the places where it is possible and absent now; `kinematics` is the source, 1 to 3."""
@@ -226,11 +155,7 @@ class Candidate:
     def extended(
         self, data: Data, place: Place, shape: Mapping[str, float], magnitudes: Sequence[float]
     ) -> dict[str, Any]:
-        """Return a description with the term at these magnitudes, ready for `check`, `build` and `fit`.
-
-        `shape` is that of the variant; `magnitudes` has one entry per column. Raises InputError if their number is
-        wrong.
-        """
+        """Return a description with the term at these magnitudes, ready for `check`, `build` and `fit`."""
         return self.make(data, place, shape).extended(magnitudes)
 
 

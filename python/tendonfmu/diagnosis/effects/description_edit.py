@@ -27,31 +27,17 @@ _TENDON_LAW = re.compile(r"tendons\[(\d+)\]\.((?:edge|pulley)_friction)\[(\d+)\]
 
 @dataclass(frozen=True)
 class Edit:
-    """A change of a description.
+    """A change of a description."""
 
-    Attributes
-    ----------
-    kind
-        "absent": a law where there was none. "points": working points at `angles` in place of a single edge law.
-        "sides": two sides in place of one. "cover": a cover without stiffness.
-    path
-        Of the effect or of the joint.
-    angles
-        Of the working points, rad.
-    """
-
-    kind: str
-    path: str
-    angles: tuple[float, ...] = ()
+    kind: str  # "absent": a law where there was none
+    path: str  # of the effect or of the joint
+    angles: tuple[float, ...] = ()  # of the working points, rad
 
 
 def apply_edits(
     data: Data, edits: Iterable[Edit], rows: Sequence[Mapping[str, Any]], settings: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return a copy with the edits made, rows added to `extensions` and Stribeck velocities set.
-
-    `settings` maps the path of a law's effect to the Stribeck velocity of all of its laws, m/s or rad/s.
-    """
+    """Return a copy with the edits made, rows added to `extensions` and Stribeck velocities set."""
     result = own_copy(data)
     for edit in sorted(edits, key=lambda each: _ORDER.index(each.kind)):
         _MAKE[edit.kind](result, edit)
@@ -128,10 +114,7 @@ def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple
 
 
 def finer_paths(data: Data, path: str) -> list[str]:
-    """Return the numbers of an edited description that make up a number of the one before.
-
-    They are those of all working points and sides.
-    """
+    """Return the numbers of an edited description that make up a number of the one before."""
     matched = _LAW.fullmatch(path)
     if matched is None:
         return [path]

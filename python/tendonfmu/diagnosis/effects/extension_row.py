@@ -22,11 +22,7 @@ def row_variant(
     fixed: Mapping[str, float] | None = None,
     least: float = -math.inf,
 ) -> Variant:
-    """Return the variant of a term that is linear in its magnitudes.
-
-    `numbers` maps the name of each magnitude to its expected sign. `fixed` holds the other numbers of the row. `least`
-    is the smallest magnitude that the description accepts.
-    """
+    """Return the variant of a term that is linear in its magnitudes."""
     path = next_row(data)
     sizes = MAGNITUDES[effect]
     columns = tuple(Column({f"{path}.{name}": 1.0}, sign, sizes[name], least) for name, sign in numbers.items())
@@ -45,19 +41,7 @@ def secant_variant(
     only_joint: int | None = None,
     most: float = math.inf,
 ) -> Variant:
-    """Return the variant of a term without a useful derivative at zero: its column is the difference at full strength.
-
-    Parameters
-    ----------
-    number
-        Key of the row that gets the shape's value.
-    scaled
-        Whether twice the number makes about twice the difference.
-    only_joint
-        The only joint whose torque it changes.
-    most
-        Largest size of the number that the description accepts.
-    """
+    """Return the variant of a term without a useful derivative at zero: its column is a finite difference."""
     rows = (row(effect, place, **{number: float(shape[number])}),)
     keys = (number,) if scaled else ()
     return Variant(data, shape, secant_rows=rows, scaled=keys, only_joint=only_joint, most=most)

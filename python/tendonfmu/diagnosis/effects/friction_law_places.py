@@ -21,10 +21,7 @@ def place_of(effect: Effect) -> Place:
 
 
 def kind_shape(effect: Effect) -> dict[str, float]:
-    """Return what distinguishes the two laws of one place: {"pulley": 1} or {"load": 1}.
-
-    The dictionary is empty for edges and for the joint's own friction.
-    """
+    """Return what distinguishes the two laws of one place: {"pulley": 1} or {"load": 1}."""
     return {"pulley_friction": {"pulley": 1.0}, "load_friction": {"load": 1.0}}.get(effect.kind, {})
 
 
@@ -91,20 +88,7 @@ def rubbing_tendons(data: Data) -> list[Place]:
 
 
 def thresholds(data: Data) -> tuple[float, float]:
-    """Return the velocity thresholds of motion.
-
-    Parameters
-    ----------
-    data
-        Description; the default applies to a threshold that it leaves out.
-
-    Returns
-    -------
-    tendon
-        Threshold of tendons, m/s.
-    joint
-        Threshold of joints, rad/s.
-    """
+    """Return the velocity thresholds of motion."""
     return number_of(data, "velocity_threshold.tendon"), number_of(data, "velocity_threshold.joint")
 
 

@@ -24,10 +24,7 @@ def _single_places(data: Data) -> list[Place]:
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    """Return everywhere if no place has presliding, else the single places without it.
-
-    A place's own row takes precedence over the row for everywhere.
-    """
+    """Return everywhere if no place has presliding, else the single places without it."""
     taken = row_places(data, NAME)
     if not taken:
         return [EVERYWHERE] if _single_places(data) and min(thresholds(data)) > _SLOWEST else _single_places(data)

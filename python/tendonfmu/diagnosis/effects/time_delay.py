@@ -28,11 +28,8 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-    """Return the variant; its column is the effect of a delay on forces that the model explains.
-
-    The row of the description undoes this for measured forces. At a reversal the two differ in the sign of the time
-    since.
-    """
+    """Return the variant; its column is the effect of a delay on forces that the model explains."""
+    # At a reversal the two differ in the sign of the time since.
     variant = secant_variant(data, NAME, place, shape, "delay", scaled=True, most=_LONGEST)
     return replace(variant, late=float(shape["delay"]))
 

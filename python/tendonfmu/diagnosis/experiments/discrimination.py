@@ -25,21 +25,11 @@ RATE = 100.0  # rows per second
 
 @dataclass(frozen=True)
 class Discrimination:
-    """What to record next.
+    """What to record next."""
 
-    Attributes
-    ----------
-    sentence
-        What the recording distinguishes.
-    entry
-        Of the menu.
-    performed
-        The motion of the entry.
-    """
-
-    sentence: str
-    entry: Entry
-    performed: Performed
+    sentence: str  # what the recording distinguishes
+    entry: Entry  # of the menu
+    performed: Performed  # the motion of the entry
 
     def columns(self) -> dict[str, Numbers]:
         """Return name -> values [N], as `tendonfmu excite` writes a motion."""
@@ -78,29 +68,8 @@ def discriminating_motion(
     limits: Sequence[tuple[float, float]] | None = None,
     rate: float = RATE,
 ) -> Discrimination:
-    """Read the experiment that a diagnosis asked for and compute its motion.
-
-    Parameters
-    ----------
-    folder
-        Folder of the diagnosis.
-    data
-        Description of the finger.
-    limits
-        (low, high) of each joint, rad [n], if known.
-    rate
-        Rows per second.
-
-    Returns
-    -------
-    Discrimination
-        Sentence, menu entry and motion.
-
-    Raises
-    ------
-    InputError
-        If the folder has no valid report, the report asks for no experiment, or a joint would leave its limits.
-    """
+    """Read the experiment that a diagnosis asked for and compute its motion."""
+    # limits: [n]
     report = _read_report(folder / REPORT)
     experiment = report.get("experiment") or {}
     motion = experiment.get("motion") or {}

@@ -37,37 +37,18 @@ _ALTERNATIONS = 2  # from one side to the other, of a known load
 
 @dataclass(frozen=True)
 class Section:
-    """A stretch of motion.
+    """A stretch of motion."""
 
-    Attributes
-    ----------
-    ranges
-        (low, high) of each joint, rad [n].
-    max_speed
-        rad/s.
-    seconds
-        Duration, s.
-    pretension
-        Mean, N.
-    swing
-        Frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions.
-    lowest, highest
-        Limits of swinging tensions, N.
-    load
-        Known load at the joints, N·m [n].
-    max_acceleration
-        rad/s².
-    """
-
-    ranges: tuple[tuple[float, float], ...]
-    max_speed: float
-    seconds: float
-    pretension: float
+    ranges: tuple[tuple[float, float], ...]  # (low, high) of each joint, rad [n]
+    max_speed: float  # rad/s
+    seconds: float  # duration, s
+    pretension: float  # mean, N
+    # frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions
     swing: float | None = None
-    lowest: float = 0.0
+    lowest: float = 0.0  # limits of swinging tensions, N
     highest: float = 0.0
-    load: tuple[float, ...] = ()
-    max_acceleration: float = 10.0
+    load: tuple[float, ...] = ()  # known load at the joints, N·m [n]
+    max_acceleration: float = 10.0  # rad/s²
 
 
 @dataclass(frozen=True)
@@ -118,30 +99,14 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What was recorded.
+    """What was recorded."""
 
-    Attributes
-    ----------
-    ranges
-        rad [n, 2].
-    speed
-        Fastest, rad/s.
-    pretension
-        Mean tendon force, N.
-    torque
-        Spread of the joint torque, N·m [n].
-    seconds
-        Length of the longest stretch.
-    load
-        Mean of the known load, N·m [n].
-    """
-
-    ranges: Numbers
-    speed: float
-    pretension: float
-    torque: Numbers
-    seconds: float
-    load: Numbers | None = None
+    ranges: Numbers  # rad [n, 2]
+    speed: float  # fastest, rad/s
+    pretension: float  # mean tendon force, N
+    torque: Numbers  # spread of the joint torque, N·m [n]
+    seconds: float  # length of the longest stretch
+    load: Numbers | None = None  # mean of the known load, N·m [n]
 
 
 def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
@@ -235,10 +200,7 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
 
 
 def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
-    """Yield the entry at several pretensions, and with tensions that swing faster than a bias drifts.
-
-    Nothing is yielded if the finger holds no pretension.
-    """
+    """Yield the entry at several pretensions, and with tensions that swing faster than a bias drifts."""
     base = entry.sections[0].pretension
     if not own_tension(data).any() or base <= 0:
         return
@@ -291,11 +253,7 @@ def _held_by_load(data: Data, recorded: Recorded) -> bool:
 
 
 def known_load(data: Data, tension: Numbers, recorded: Recorded) -> Numbers:
-    """Return a load that leaves every pulling tendon taut at these tensions (N, [m]), on either side, N·m [n].
-
-    If the recorded load holds the tendons, it is that load. Cable loops carry any load; they get some times the joint
-    torque.
-    """
+    """Return a load that leaves every pulling tendon taut at these tensions (N, [m]), on either side, N·m [n]."""
     if _held_by_load(data, recorded):
         return np.asarray(recorded.load)
     arms = moment_arms(data)

@@ -30,29 +30,15 @@ _PEAK_OVER_MEAN = 1.875  # of the speed of a quintic stroke from rest to rest
 
 @dataclass(frozen=True)
 class Performed:
-    """The motion of an entry.
+    """The motion of an entry."""
 
-    Attributes
-    ----------
-    time
-        s [N].
-    position, velocity, acceleration
-        rad, rad/s, rad/s² [N, n].
-    tension
-        Tendon forces in balance with each other, N [N, m].
-    load
-        Known load, N·m [N, n].
-    tendon_position
-        On the motor side, without friction and load, m [N, m].
-    """
-
-    time: Numbers
-    position: Numbers
+    time: Numbers  # s [N]
+    position: Numbers  # rad, rad/s, rad/s² [N, n]
     velocity: Numbers
     acceleration: Numbers
-    tension: Numbers
-    load: Numbers
-    tendon_position: Numbers
+    tension: Numbers  # tendon forces in balance with each other, N [N, m]
+    load: Numbers  # known load, N·m [N, n]
+    tendon_position: Numbers  # on the motor side, without friction and load, m [N, m]
 
     def columns(self) -> dict[str, Numbers]:
         """Return name -> values [N], as `tendonfmu excite` writes them."""
@@ -69,10 +55,7 @@ class Performed:
 
 
 def perform(data: Data, entry: Entry, rate: float, seed: int = 0) -> Performed:
-    """Return an entry's sections one after the other, at rest between them.
-
-    `rate` is in 1/s. Raises InputError if a section is not possible.
-    """
+    """Return an entry's sections one after the other, at rest between them."""
     pieces: list[Performed] = []
     for number, section in enumerate(entry.sections):
         piece = _section(data, section, rate, seed + number)
@@ -83,10 +66,7 @@ def perform(data: Data, entry: Entry, rate: float, seed: int = 0) -> Performed:
 
 
 def expected_recording(data: Data, performed: Performed, kinematics: int) -> FitRecording:
-    """Return the recording that the model expects, with the forces that carry its friction and the load.
-
-    All samples are free motion. `kinematics` is the source of the future recordings, 1 to 3.
-    """
+    """Return the recording that the model expects, with the forces that carry its friction and the load."""
     spread = np.linalg.pinv(moment_arms(data))
     motion = {
         "time": performed.time,
@@ -152,11 +132,9 @@ def _plannable(data: Data) -> Data:
 
 
 def _tension(data: Data, section: Section, motion: Excitation) -> Numbers:
-    """Return tendon forces in balance with each other, N [N, m].
-
-    If they swing, each independent change of the tensions that turns no joint has its own frequency, so that no two
-    tendons swing alike. Together they stay within the limits.
-    """
+    """Return tendon forces in balance with each other, N [N, m]."""
+    # If they swing, each independent change of the tensions that turns no joint has its own frequency, so that no two
+    # tendons swing alike.
     if section.swing is None:
         return motion.tension
     arms, time = moment_arms(data), motion.time
@@ -183,10 +161,7 @@ def _fit(limit: Numbers, shares: Numbers, worst: Any) -> float:
 
 
 def _passage(before: Performed, after: Performed, speed: float, rate: float) -> Performed:
-    """Return the motion from the end of one section to the beginning of the next, without its first and last sample.
-
-    It begins and ends at rest.
-    """
+    """Return the motion from the end of one section to the beginning of the next, without its first and last sample."""
     way = float(np.abs(after.position[0] - before.position[-1]).max())
     rows = int(np.ceil(max(_CHANGE, _PEAK_OVER_MEAN * way / (0.5 * speed)) * rate))
     time = np.arange(1, rows) / rate

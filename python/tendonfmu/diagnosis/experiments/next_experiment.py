@@ -53,11 +53,7 @@ _RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1
 
 @dataclass(frozen=True)
 class Question:
-    """What a recording is to show: the difference between `cause` and `rival`, or whether `cause` is there at all.
-
-    Magnitudes of () are those of an ordinary effect; a shape {} is the middle one of its grid. `rival` is None for the
-    second question.
-    """
+    """What a recording is to show: the difference between `cause` and `rival`, or whether `cause` is there at all."""
 
     cause: Accepted
     rival: Accepted | None = None
@@ -65,31 +61,18 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an entry shows for one question.
-
-    Attributes
-    ----------
-    distance
-        Rms of what the entry adds to the remaining part of the cause, over that of the noise.
-    now
-        The same for the present recordings.
-    share
-        Share of the cause's variance that survives bias and refit, in all recordings together.
-    """
+    """What an entry shows for one question."""
 
     question: Question
     entry: Entry
-    distance: float
-    now: float
-    share: float
+    distance: float  # rms of what the entry adds to the remaining part of the cause, over that of the noise
+    now: float  # the same for the present recordings
+    share: float  # share of the cause's variance that survives bias and refit, in all recordings together
 
     @property
     def tells(self) -> bool:
-        """Whether the entry is worth recording.
-
-        The size of an effect that was never seen is unknown. For such an effect it is enough, and necessary, that a
-        refit leaves some of it, and clearly more than in the present recordings.
-        """
+        """Whether the entry is worth recording."""
+        # The size of an effect that was never seen is unknown.
         if self.question.rival is None:
             shown = self.distance >= max(_BETTER * self.now, _FAINTEST)
         else:
@@ -103,18 +86,10 @@ class Answer:
 
 @dataclass(frozen=True)
 class Experiments:
-    """The planned experiments.
+    """The planned experiments."""
 
-    Attributes
-    ----------
-    answers
-        For each question, the entry that answers it best.
-    best
-        What to do first: the experiment that answers most questions.
-    """
-
-    answers: tuple[Answer, ...]
-    best: Experiment
+    answers: tuple[Answer, ...]  # for each question, the entry that answers it best
+    best: Experiment  # what to do first: the experiment that answers most questions
     seed: int = 0
 
     def motion(self, number: int) -> dict[str, Any]:
@@ -137,24 +112,8 @@ def plan_experiments(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Experiments:
-    """Choose experiments from the menu.
-
-    Parameters
-    ----------
-    data
-        The fitted description, without the causes in question.
-    noise
-        What a good model leaves in blocks of 20 ms, N·m [n]; None for the description's `bias.noise_std`.
-    span
-        Of the recordings.
-    progress
-        Called with the number of recordings predicted and of all.
-
-    Raises
-    ------
-    InputError
-        If a recording or the description is at fault.
-    """
+    """Choose experiments from the menu."""
+    # noise: [n]
     if not questions:
         return Experiments((), Experiment(""))
     if not recordings:
@@ -190,24 +149,12 @@ def plan_experiments(
 
 @dataclass(frozen=True)
 class _Seen:
-    """What one or several recordings show.
+    """What one or several recordings show."""
 
-    Attributes
-    ----------
-    gram
-        Products of all columns over the noise, without the slow bias [c, c].
-    whole
-        The same about their means.
-    power
-        Of the columns by joint [c, n].
-    blocks
-        Number of blocks.
-    """
-
-    gram: Numbers
-    whole: Numbers
-    power: Numbers
-    blocks: int
+    gram: Numbers  # products of all columns over the noise, without the slow bias [c, c]
+    whole: Numbers  # the same about their means
+    power: Numbers  # of the columns by joint [c, n]
+    blocks: int  # number of blocks
 
     def __add__(self, other: _Seen) -> _Seen:
         return _Seen(
@@ -414,10 +361,7 @@ def _best(answers: Sequence[Answer]) -> Answer:
 
 
 def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
-    """Return the entry that distinguishes most pairs of causes, then shows most effects, and is the simplest of these.
-
-    An entry that changes tension and load at once is chosen only if no other one shows anything else that matters.
-    """
+    """Return the entry that distinguishes most pairs of causes, then shows most effects, and is simplest."""
 
     def told_by(found: Sequence[Answer]) -> tuple[int, int]:
         told = [answer for answer in found if answer.tells]

@@ -23,21 +23,11 @@ Converter = Callable[..., Columns]
 
 @dataclass(frozen=True)
 class Source:
-    """A foreign format.
+    """A foreign format."""
 
-    Attributes
-    ----------
-    module
-        The module that reads it.
-    about
-        What the format is.
-    options
-        The options of `convert` that it takes.
-    """
-
-    module: str
-    about: str
-    options: tuple[str, ...]
+    module: str  # the module that reads it
+    about: str  # what the format is
+    options: tuple[str, ...]  # the options of `convert` that it takes
 
 
 # key: name on the command line
@@ -64,27 +54,8 @@ def converter(name: str) -> Converter:
 
 
 def convert_file(name: str, file: Path, options: Mapping[str, Any]) -> Columns:
-    """Convert a file of a foreign format.
-
-    Parameters
-    ----------
-    name
-        Name of the format, as on the command line.
-    file
-        The foreign file.
-    options
-        Options that the user gave, by name.
-
-    Returns
-    -------
-    dict of arrays
-        Columns of a recording, [N] each, in the units of docs/reference/recordings.md.
-
-    Raises
-    ------
-    InputError
-        The format is unknown, it does not have such an option, or the file is wrong.
-    """
+    """Convert a file of a foreign format."""
+    # returns [N]
     convert = converter(name)
     known = CONVERTERS[name].options
     for option in options:

@@ -32,30 +32,14 @@ ROWS = 1 << 18  # of a block
 
 @dataclass(frozen=True)
 class Array:
-    """An array of a file.
+    """An array of a file."""
 
-    Attributes
-    ----------
-    topic
-        Struct or group, with the separator at its end; "" at the top.
-    name
-        Full name.
-    shape
-        As rows and columns are counted in the file.
-    dtype
-        Of its elements.
-    read
-        Returns rows (start, stop) of it, [rows] or [rows, columns].
-    unit
-        What the file states, or "".
-    """
-
-    topic: str
-    name: str
-    shape: tuple[int, ...]
-    dtype: np.dtype[Any]
-    read: Callable[[int, int], Any]
-    unit: str = ""
+    topic: str  # struct or group, with the separator at its end; "" at the top
+    name: str  # full name
+    shape: tuple[int, ...]  # as rows and columns are counted in the file
+    dtype: np.dtype[Any]  # of its elements
+    read: Callable[[int, int], Any]  # returns rows (start, stop) of it, [rows] or [rows, columns]
+    unit: str = ""  # what the file states, or ""
 
     def fields(self) -> Iterator[tuple[Field, int | None]]:
         """Yield the fields, each with the column that it is; None: of the only one."""
@@ -84,17 +68,7 @@ def turned_rows(values: Any, start: int, stop: int) -> Any:
 
 
 class ArraysLog:
-    """A file of arrays.
-
-    Parameters
-    ----------
-    file
-        The log.
-    arrays
-        What it holds.
-    notes
-        What could not be read.
-    """
+    """A file of arrays."""
 
     open_ended = False
 

@@ -51,33 +51,15 @@ _COLUMN = re.compile(r"([a-z_]+)\[([1-9][0-9]?)\]")
 
 @dataclass(frozen=True)
 class MappedColumn:
-    """One of our columns.
+    """One of our columns."""
 
-    Attributes
-    ----------
-    path
-        Its key in the map.
-    source
-        Name of the column in the log, or its number from 1.
-    factor
-        sign · scale · unit.
-    offset
-        The reading that stands for zero, in the log's unit. None: the first reading.
-    stamp
-        One of `units.STAMPS` if the readings are points in time, or "".
-    zone
-        Time zone of texts without one.
-    pattern
-        Pattern of texts (`datetime.strptime`), or "": ISO 8601.
-    """
-
-    path: str
-    source: str | int
-    factor: float = 1.0
-    offset: float | int | None = 0.0
-    stamp: str = ""
-    zone: str = "UTC"
-    pattern: str = ""
+    path: str  # its key in the map
+    source: str | int  # name of the column in the log, or its number from 1
+    factor: float = 1.0  # sign · scale · unit
+    offset: float | int | None = 0.0  # the reading that stands for zero, in the log's unit
+    stamp: str = ""  # one of `units.STAMPS` if the readings are points in time, or ""
+    zone: str = "UTC"  # time zone of texts without one
+    pattern: str = ""  # pattern of texts (`datetime.strptime`), or "": ISO 8601
 
     def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
         """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
@@ -88,92 +70,48 @@ class MappedColumn:
 
 @dataclass(frozen=True)
 class Joint:
-    """A one-joint machine.
+    """A one-joint machine."""
 
-    Attributes
-    ----------
-    kind
-        "turning" or "sliding".
-    name
-        Name of the joint.
-    velocity_cutoff
-        Cut-off of the velocity (Hz). 0: no filter. None: chosen by the log's sample rate.
-    """
-
-    kind: str
-    name: str
-    velocity_cutoff: float | None
+    kind: str  # "turning" or "sliding"
+    name: str  # name of the joint
+    velocity_cutoff: float | None  # cut-off of the velocity (Hz)
 
 
 @dataclass(frozen=True)
 class LogFormat:
-    """How a log is written, and what to do about its faults.
+    """How a log is written, and what to do about its faults."""
 
-    Attributes
-    ----------
-    separator, decimal, skip, header, units_row, encoding
-        Of texts. None: found in the first lines.
-    leave_out_missing
-        Whether rows without a number are left out; otherwise they are refused.
-    sort
-        Whether rows are sorted by time, and all but the first with the same time left out; otherwise they are refused.
-    clocks
-        Column of time by topic, where it is not the obvious one.
-    """
-
-    separator: str | None = None
+    separator: str | None = None  # of texts
     decimal: str | None = None
     skip: int | None = None
     header: bool | None = None
     units_row: bool | None = None
     encoding: str | None = None
-    leave_out_missing: bool = False
+    leave_out_missing: bool = False  # whether rows without a number are left out; otherwise they are refused
+    # whether rows are sorted by time, and all but the first with the same time left out; otherwise they are refused
     sort: bool = False
+    # column of time by topic, where it is not the obvious one
     clocks: Mapping[str, MappedColumn] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Resampling:
-    """How topics come onto one clock.
+    """How topics come onto one clock."""
 
-    Attributes
-    ----------
-    rate
-        Samples per second. None: the times of the column `time`.
-    largest_gap
-        s; None: ten times the median step of each topic.
-    leave_out_gaps
-        Whether samples in larger gaps are left out; otherwise the gap is refused.
-    """
-
-    rate: float | None = None
-    largest_gap: float | None = None
-    leave_out_gaps: bool = False
+    rate: float | None = None  # samples per second
+    largest_gap: float | None = None  # s; None: ten times the median step of each topic
+    leave_out_gaps: bool = False  # whether samples in larger gaps are left out; otherwise the gap is refused
 
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """A map that has been checked.
+    """A map that has been checked."""
 
-    Attributes
-    ----------
-    path
-        File of the map.
-    columns
-        By our name, or by the keys of `joint` if that is given.
-    joint
-        The one-joint machine, or None.
-    log
-        Format of the log.
-    resample
-        None: only if the columns have several clocks.
-    """
-
-    path: Path
-    columns: Mapping[str, MappedColumn]
-    joint: Joint | None = None
-    log: LogFormat = field(default_factory=LogFormat)
-    resample: Resampling | None = None
+    path: Path  # file of the map
+    columns: Mapping[str, MappedColumn]  # by our name, or by the keys of `joint` if that is given
+    joint: Joint | None = None  # the one-joint machine, or None
+    log: LogFormat = field(default_factory=LogFormat)  # format of the log
+    resample: Resampling | None = None  # none: only if the columns have several clocks
 
 
 def read_map(path: Path) -> ColumnMap:

@@ -43,10 +43,7 @@ RADIUS = 0.005  # m; sets the scale of force and position; torques do not depend
 
 
 def convert(file: Path, radius: float = RADIUS, pretension: float = 0.0) -> dict[str, NDArray[Any]]:
-    """Return the columns of the recording. Raise InputError with row and column.
-
-    radius: m. pretension: N, of the opening cable; 0: the net force of the loop.
-    """
+    """Return the columns of the recording. Raise InputError with row and column."""
     rows = _read(file)
     force = rows[:, 2] * TORQUE / radius + pretension
     if pretension > 0.0 and force.min() < 0.0:

@@ -16,21 +16,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Order:
-    """How the elements of a finger are numbered.
+    """How the elements of a finger are numbered."""
 
-    Attributes
-    ----------
-    of
-        "tendons" or "joints".
-    sure
-        LIKELY by numbers in the names, GUESS by the order of the log.
-    elements
-        The log's names of each element, from index 1 on.
-    """
-
-    of: str
-    sure: str
-    elements: tuple[tuple[str, ...], ...]
+    of: str  # "tendons" or "joints"
+    sure: str  # LIKELY by numbers in the names, GUESS by the order of the log
+    elements: tuple[tuple[str, ...], ...]  # the log's names of each element, from index 1 on
 
     def line(self) -> str:
         """Return the order in one line, and what to do about it."""
@@ -46,20 +36,7 @@ def numbers_of(name: str) -> tuple[int, ...]:
 
 
 def in_order(members: Sequence[T], name_of: Callable[[T], str]) -> tuple[list[T], bool]:
-    """Return members by the numbers in their names, and True; or in their own order, and False.
-
-    Parameters
-    ----------
-    members
-        In the log's order.
-    name_of
-        Returns the name of one.
-
-    Returns
-    -------
-    tuple of list and bool
-        Numbers count if every name has some, and no two have the same.
-    """
+    """Return members by the numbers in their names, and True; or in their own order, and False."""
     numbers = [numbers_of(name_of(each)) for each in members]
     if all(numbers) and len(set(numbers)) == len(numbers):
         return sorted(members, key=lambda each: numbers_of(name_of(each))), True
@@ -67,20 +44,7 @@ def in_order(members: Sequence[T], name_of: Callable[[T], str]) -> tuple[list[T]
 
 
 def matched(names: Sequence[str], others: Sequence[str]) -> list[int] | None:
-    """Return for each of some names the index of the name of the same element: `x_flex` belongs to `F_flex`.
-
-    Parameters
-    ----------
-    names
-        Names of one quantity of several elements.
-    others
-        Names of another quantity, at most as many.
-
-    Returns
-    -------
-    list of int or None
-        Indices into `names`; None if not every name belongs to exactly one.
-    """
+    """Return for each of some names the index of the name of the same element: `x_flex` belongs to `F_flex`."""
     for marks in (_parts, _stems):
         wanted, given = marks(names), marks(others)
         found = []
@@ -129,17 +93,7 @@ def _without_unit(name: str) -> str:
 
 
 def order_of(of: str, by_number: bool, groups: Sequence[Sequence[str]]) -> Order:
-    """Return the order of elements.
-
-    Parameters
-    ----------
-    of
-        "tendons" or "joints".
-    by_number
-        Whether the names are numbered.
-    groups
-        Names by quantity, each from index 1 on; "" where there is none.
-    """
+    """Return the order of elements."""
     longest = max((len(names) for names in groups), default=0)
     elements = tuple(tuple(names[k] for names in groups if k < len(names) and names[k]) for k in range(longest))
     return Order(of, LIKELY if by_number else GUESS, elements)

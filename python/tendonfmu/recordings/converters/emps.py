@@ -42,10 +42,8 @@ LEAST = 100  # samples, times the decimation
 
 
 def convert(file: Path, mass: float = MASS, decimation: int = DECIMATION) -> dict[str, NDArray[Any]]:
-    """Return the columns of the recording at every decimation-th sample. Raise InputError with the variable.
-
-    Force and position pass the same filter, so that the equation of motion holds for the result. mass: kg.
-    """
+    """Return the columns of the recording at every decimation-th sample. Raise InputError with the variable."""
+    # Force and position pass the same filter, so that the equation of motion holds for the result. mass: kg.
     time, position, force = _read(file)
     step = _step(file, time, LEAST * decimation)
     position, force = _zero_phase(position, step), _zero_phase(force, step)
@@ -70,13 +68,11 @@ def _zero_phase(series: Array, step: float) -> Array:
 
 
 def _decimated(series: Array, n: int) -> Array:
-    """Return every n-th value of a triangular mean over ±n samples, except where the mean would reach beyond the ends.
-
-    The zeros of the mean lie at the multiples of the new rate, so nothing folds onto standstill. Its weights are
-    positive. This matters because friction jumps with the sign of the velocity: a steeper filter rings there and makes
-    reversals that did not happen. With the Chebyshev filter of scipy's `decimate` the error of the published model
-    grows from 4.1 to 5.9 %.
-    """
+    """Return every n-th value of a triangular mean over ±n samples, without those at the ends."""
+    # A steeper filter rings where friction jumps and makes reversals that did not happen: with the Chebyshev filter of
+    # scipy's `decimate` the error of the published model grows from 4.1 to 5.9 %.
+    # This matters because friction jumps with the sign of the velocity: a steeper filter rings there and makes
+    # reversals that did not happen.
     weights = np.bartlett(2 * n + 1)[1:-1] / n
     kept = np.arange(n, len(series) - n + 1, n) if n > 1 else np.arange(len(series))
     return np.convolve(series, weights, mode="same")[kept]

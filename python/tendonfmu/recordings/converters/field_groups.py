@@ -50,19 +50,7 @@ _ELEMENT = re.compile(r"(.*)\[([^\[\]]+)\]")
 
 
 def field_groups(found: Inspection) -> tuple[dict[str, list[Member]], set[str]]:
-    """Sort the fields of a log into groups of columns.
-
-    Parameters
-    ----------
-    found
-        What is in the log.
-
-    Returns
-    -------
-    tuple of dict and set
-        Fields by group, each in the order of the log; a group of columns, or "torque". And the names of those that are
-        tendon positions only because their names match those of the forces.
-    """
+    """Sort the fields of a log into groups of columns."""
     groups: dict[str, list[Member]] = {}
     for topic in found.topics:
         of_topic = [each for each in topic.fields if topic.clock is None or each.field.name != topic.clock.name]
@@ -115,10 +103,7 @@ def words_of(name: str) -> list[str]:
 
 
 def group_of(summary: FieldSummary) -> str | None:
-    """Return what a field likely is: a group of columns, "torque", or None.
-
-    An element of an array is what its array is: the name of one element, such as `ext`, says less.
-    """
+    """Return what a field likely is: a group of columns, "torque", or None."""
     if not is_numeric(summary):
         return None
     array = array_of(summary.field.name)

@@ -22,32 +22,16 @@ GAP = 10.0  # median steps
 
 @dataclass
 class FieldSummary:
-    """A field and its values.
+    """A field and its values."""
 
-    Attributes
-    ----------
-    field
-        The field.
-    key
-        With which it is read: its name, or its number if the name is not unique.
-    count, missing
-        Rows, and those without a number.
-    low, high
-        Range of the numbers.
-    example
-        First text.
-    only_flags
-        Whether all numbers are 0 or 1.
-    """
-
-    field: Field
-    key: str
-    count: int = 0
+    field: Field  # the field
+    key: str  # with which it is read: its name, or its number if the name is not unique
+    count: int = 0  # rows, and those without a number
     missing: int = 0
-    low: float = np.inf
+    low: float = np.inf  # range of the numbers
     high: float = -np.inf
-    example: str = ""
-    only_flags: bool = True
+    example: str = ""  # first text
+    only_flags: bool = True  # whether all numbers are 0 or 1
 
     def add(self, values: Any) -> None:
         """Take a block of the field."""
@@ -65,38 +49,18 @@ class FieldSummary:
 
 @dataclass
 class ClockSummary:
-    """The times of a topic, in the unit of its field; ns for points in time.
+    """The times of a topic, in the unit of its field; ns for points in time."""
 
-    Attributes
-    ----------
-    name
-        The field.
-    stamp
-        Kind of a point in time that the field holds without doubt, or "".
-    first, last
-        First and last time.
-    step
-        Median step, of the first block.
-    largest
-        Largest step.
-    gaps
-        Steps of more than `GAP` median steps.
-    repeated, backwards
-        Steps of zero, and negative ones.
-    rows
-        Number of times.
-    """
-
-    name: str
-    stamp: str = ""
-    first: float = 0.0
+    name: str  # the field
+    stamp: str = ""  # kind of a point in time that the field holds without doubt, or ""
+    first: float = 0.0  # first and last time
     last: float = 0.0
-    step: float = 0.0
-    largest: float = 0.0
-    gaps: int = 0
-    repeated: int = 0
+    step: float = 0.0  # median step, of the first block
+    largest: float = 0.0  # largest step
+    gaps: int = 0  # steps of more than `GAP` median steps
+    repeated: int = 0  # steps of zero, and negative ones
     backwards: int = 0
-    rows: int = 0
+    rows: int = 0  # number of times
     whole: bool = True
     _end: Any = None
 
@@ -137,47 +101,18 @@ class TopicSummary:
 
 @dataclass
 class Inspection:
-    """What is in a log.
+    """What is in a log."""
 
-    Attributes
-    ----------
-    file
-        The log.
-    topics
-        Its topics.
-    settings
-        How a text is written, as keys of `log` in a map; empty for other formats.
-    notes
-        What was recovered or could not be read.
-    messages
-        Whether the log holds messages, whose units are those of ROS if nothing else is said.
-    """
-
-    file: Path
-    topics: list[TopicSummary]
+    file: Path  # the log
+    topics: list[TopicSummary]  # its topics
+    # how a text is written, as keys of `log` in a map; empty for other formats
     settings: dict[str, Any] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    messages: bool = False
+    notes: list[str] = field(default_factory=list)  # what was recovered or could not be read
+    messages: bool = False  # whether the log holds messages, whose units are those of ROS if nothing else is said
 
 
 def inspect_log(file: Path) -> Inspection:
-    """Read a log and summarise it.
-
-    Parameters
-    ----------
-    file
-        The log.
-
-    Returns
-    -------
-    Inspection
-        Its topics, fields and clocks.
-
-    Raises
-    ------
-    InputError
-        It cannot be read.
-    """
+    """Read a log and summarise it."""
     log = open_log(file, LogFormat())
     found = [_fresh(topic) for topic in log.topics]
     wanted = {each.topic.name: [f.key for f in each.fields if f.field.kind != OTHER] for each in found}

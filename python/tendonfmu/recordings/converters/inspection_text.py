@@ -17,20 +17,7 @@ MOST = 40  # characters of a name in a table
 
 
 def inspection_document(found: Inspection, proposal: Proposal) -> dict[str, Any]:
-    """Return all results as JSON values.
-
-    Parameters
-    ----------
-    found
-        What is in the log.
-    proposal
-        The proposed map.
-
-    Returns
-    -------
-    dict
-        Keys `format`, `log`, `topics`, `proposal`, `orders`, `undecided`, `unused`, `map`, `notes`.
-    """
+    """Return all results as JSON values."""
     return {
         "format": FORMAT,
         "log": str(found.file),

@@ -30,46 +30,22 @@ LONGEST = 64  # elements of an array that are listed as fields; images and cloud
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a topic.
+    """A field of a topic."""
 
-    Attributes
-    ----------
-    name
-        As a map names it; unique in the log, but for columns of CSV files that occur twice.
-    kind
-        NUMBER, TIME, TEXT or OTHER.
-    type
-        As the log calls it, such as "double".
-    unit
-        What the log states, or "".
-    """
-
-    name: str
-    kind: str = NUMBER
-    type: str = ""
-    unit: str = ""
+    name: str  # as a map names it; unique in the log, but for columns of CSV files that occur twice
+    kind: str = NUMBER  # NUMBER, TIME, TEXT or OTHER
+    type: str = ""  # as the log calls it, such as "double"
+    unit: str = ""  # what the log states, or ""
 
 
 @dataclass(frozen=True)
 class Topic:
-    """Fields with a common clock.
+    """Fields with a common clock."""
 
-    Attributes
-    ----------
-    name
-        "" if the log has only one.
-    fields
-        In the log's order.
-    rows
-        Number of rows, or None if it takes a pass over the log to count them.
-    prefix
-        With which the names of its fields begin.
-    """
-
-    name: str
-    fields: tuple[Field, ...]
-    rows: int | None = None
-    prefix: str = ""
+    name: str  # "" if the log has only one
+    fields: tuple[Field, ...]  # in the log's order
+    rows: int | None = None  # number of rows, or None if it takes a pass over the log to count them
+    prefix: str = ""  # with which the names of its fields begin
 
     def field(self, name: str) -> Field | None:
         """Return the field of that name, or None."""
@@ -98,70 +74,21 @@ def _rank(field: Field, prefix: str) -> int | None:
 
 
 class Log(Protocol):
-    """A log that has been opened.
+    """A log that has been opened."""
 
-    Attributes
-    ----------
-    file
-        The file or folder.
-    topics
-        What is in it.
-    notes
-        What was recovered or left out, one sentence each. Complete after the last block.
-    open_ended
-        Whether messages may have more fields than are listed: elements of long arrays, joints that come later.
-    """
-
-    file: Path
-    topics: list[Topic]
-    notes: list[str]
+    file: Path  # the file or folder
+    topics: list[Topic]  # what is in it
+    notes: list[str]  # what was recovered or left out, one sentence each
+    # whether messages may have more fields than are listed: elements of long arrays, joints that come later
     open_ended: bool
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
-        """Read fields.
-
-        Parameters
-        ----------
-        wanted
-            Names of fields by the name of their topic.
-        texts
-            Those among them that are wanted as texts, if the format does not know their type.
-
-        Yields
-        ------
-        tuple of str and dict
-            Name of a topic, and its next rows. A missing number is NaN.
-
-        Raises
-        ------
-        InputError
-            A field is no number, with column and row.
-        """
+        """Read fields."""
         ...
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
-    """Return topic and name of a field.
-
-    Parameters
-    ----------
-    log
-        The log.
-    source
-        Its name, or its number from 1 in a log of one topic.
-    where
-        File and key of the map, for messages.
-
-    Returns
-    -------
-    tuple
-        The topic and the name of the field in `Log.blocks`.
-
-    Raises
-    ------
-    InputError
-        There is no such field, or several.
-    """
+    """Return topic and name of a field."""
     if isinstance(source, int):
         return _numbered(log, source, where)
     found = [(topic, field) for topic in log.topics for field in topic.fields if field.name == source]

@@ -28,25 +28,7 @@ FOLDER = ("ros2_bag_log", "open_bag")
 
 
 def open_log(file: Path, settings: LogFormat) -> Log:
-    """Open a log.
-
-    Parameters
-    ----------
-    file
-        A file with a suffix of `FORMATS`, a text also with .gz, or the folder of a ROS 2 bag.
-    settings
-        What the map says about the format.
-
-    Returns
-    -------
-    Log
-        Its topics, and a method that reads them.
-
-    Raises
-    ------
-    InputError
-        The file does not exist, has another format, or is damaged.
-    """
+    """Open a log."""
     suffix = (Path(file.stem).suffix if file.suffix.lower() == ".gz" else file.suffix).lower()
     known = ", ".join(FORMATS)
     if not file.is_dir():

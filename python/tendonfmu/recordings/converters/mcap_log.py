@@ -19,17 +19,7 @@ Decoder = Callable[[bytes], Any]
 
 
 class McapLog:
-    """MCAP files, one after the other.
-
-    Parameters
-    ----------
-    file
-        What the user named: a file, or a folder.
-    settings
-        Of the map.
-    parts
-        The files of a folder, in their order. None: `file` itself.
-    """
+    """MCAP files, one after the other."""
 
     open_ended = True
 

@@ -21,18 +21,7 @@ LARGEST = 1 << 32  # bytes of a record
 
 
 class McapRecords:
-    """The schemas, channels and messages of an MCAP file in its order.
-
-    Parameters
-    ----------
-    file
-        The file.
-
-    Attributes
-    ----------
-    cut
-        What was wrong with the end of the file, or "". Complete after the last record.
-    """
+    """The schemas, channels and messages of an MCAP file in its order."""
 
     def __init__(self, file: Path) -> None:
         self.file = file

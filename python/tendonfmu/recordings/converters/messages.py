@@ -34,22 +34,12 @@ _STEP = re.compile(r"\.?([^.\[\]]+)|\[([^\[\]]+)\]")
 
 @dataclass
 class Received:
-    """A message as its file has it.
+    """A message as its file has it."""
 
-    Attributes
-    ----------
-    topic
-        Its topic.
-    log_time, publish_time
-        ns since 1970, or since an arbitrary start.
-    decode
-        Returns its content; raises ValueError if it is damaged.
-    """
-
-    topic: str
-    log_time: int
+    topic: str  # its topic
+    log_time: int  # ns since 1970, or since an arbitrary start
     publish_time: int
-    decode: Callable[[], Any]
+    decode: Callable[[], Any]  # returns its content; raises ValueError if it is damaged
 
 
 # --- content ----------------------------------------------------------------------------------------------------------
@@ -75,17 +65,7 @@ def stamp_of(parts: Mapping[str, Any]) -> int | None:
 
 
 def leaves(value: Any, path: str = "", names: Sequence[str] = ()) -> Iterator[tuple[str, str, Any]]:
-    """Yield (path, kind, value) of each field of a message, down to numbers.
-
-    Parameters
-    ----------
-    value
-        A message, or a part of it.
-    path
-        Path of the part.
-    names
-        The list of names that was found above it.
-    """
+    """Yield (path, kind, value) of each field of a message, down to numbers."""
     parts = members(value)
     if parts is not None:
         stamp = stamp_of(parts)
@@ -196,13 +176,7 @@ class FieldLister:
 
 
 class Collector:
-    """Collects fields of messages as columns.
-
-    Parameters
-    ----------
-    wanted
-        Names of fields by topic.
-    """
+    """Collects fields of messages as columns."""
 
     def __init__(self, wanted: Mapping[str, Sequence[str]]) -> None:
         self._names = wanted

@@ -37,10 +37,7 @@ RESTS = 0.01  # of the largest speed; slower samples before the first motion are
 
 
 def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[dict[str, Series], float, list[str]]:
-    """Return the columns of the recording, the cut-off of its velocity in Hz (0: not filtered, or given), and notes.
-
-    parts: [N] each, in SI, by the keys of the map. Raises InputError.
-    """
+    """Return the columns of the recording, the cut-off of its velocity in Hz (0: not filtered, or given), and notes."""
     time = parts["time"]
     if len(time) < LEAST:
         raise InputError(f"{file}: {counted(len(time), 'sample')}; expected at least {LEAST} of a one-joint machine")
@@ -73,10 +70,7 @@ def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[d
 
 
 def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
-    """Return the velocity [N] of angles [N] at times [N]. Gaps of the log divide it.
-
-    cutoff: Hz, 0: not filtered.
-    """
+    """Return the velocity [N] of angles [N] at times [N]. Gaps of the log divide it."""
     steps = np.diff(time)
     usual = float(np.median(steps))
     velocity = np.empty_like(angle)
@@ -92,11 +86,7 @@ def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
 
 
 def first_motion(file: Path, velocity: Series) -> int:
-    """Return the number of samples before the first motion.
-
-    They are left out: the friction of a machine that has not moved yet is unknown, and the constant bias of
-    `one_joint_description` would take it for an offset.
-    """
+    """Return the number of samples before the first motion."""
     speed = np.abs(velocity)
     if not speed.max() > 0.0:
         raise InputError(f"{file}: the joint does not move; expected a log of motion")

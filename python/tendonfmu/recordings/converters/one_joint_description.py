@@ -30,23 +30,7 @@ LEAST_SHARE = 1e-3  # of the torque's rms; starting value of a magnitude for whi
 
 
 def describe_joint(log: ConvertedLog) -> dict[str, Any]:
-    """Make the finger description of the machine in a log.
-
-    Parameters
-    ----------
-    log
-        A converted log whose map has the key `joint`.
-
-    Returns
-    -------
-    dict
-        A finger description, as in the JSON file.
-
-    Raises
-    ------
-    InputError
-        The map has no `joint`, or the joint does not move.
-    """
+    """Make the finger description of the machine in a log."""
     joint = log.map.joint
     if joint is None:
         raise InputError(
@@ -56,27 +40,8 @@ def describe_joint(log: ConvertedLog) -> dict[str, Any]:
 
 
 def describe_recorded_joint(name: str, recording: Recording, moment_arm: float) -> dict[str, Any]:
-    """Make the finger description of a one-joint machine, with starting numbers from its recording.
-
-    Parameters
-    ----------
-    name
-        Name of the machine and of its joint.
-    recording
-        A recording with one tendon.
-    moment_arm
-        Of the tendon (m).
-
-    Returns
-    -------
-    dict
-        A finger description, as in the JSON file.
-
-    Raises
-    ------
-    InputError
-        The recording has several tendons, or the joint does not move.
-    """
+    """Make the finger description of a one-joint machine, with starting numbers from its recording."""
+    # moment_arm: (m)
     recording.require(1, 1, ())
     groups = {f"{group}[1]": values[:, 0] for group, values in recording.groups.items()}
     torque = moment_arm * groups["tendon_force[1]"]
@@ -105,30 +70,8 @@ def joint_description(
     inertia: float = 0.0,
     moment_arm: float = 1.0,
 ) -> dict[str, Any]:
-    """Make the finger description of a one-joint machine from what its data sheet says.
-
-    Parameters
-    ----------
-    name
-        Name of the machine and of its joint.
-    torque
-        Largest torque of the drive (N.m).
-    speed
-        Largest speed of the joint (rad/s).
-    coulomb
-        Coulomb friction (N.m). None: 5 % of the torque.
-    viscous
-        Viscous friction (N.m.s/rad). None: 2 % of the torque at the largest speed.
-    inertia
-        Moved inertia (kg.m2). 0: a small one to start from, 1 % of what the torque accelerates to the speed in 1 s.
-    moment_arm
-        Of the tendon that stands for the drive (m).
-
-    Returns
-    -------
-    dict
-        A finger description, as in the JSON file.
-    """
+    """Make the finger description of a one-joint machine from what its data sheet says."""
+    # speed: (rad/s); moment_arm: (m)
     numbers = {
         "coulomb": COULOMB_SHARE * torque if coulomb is None else coulomb,
         "viscous": VISCOUS_SHARE * torque / speed if viscous is None else viscous,
@@ -187,35 +130,18 @@ def _description(
 
 
 def description_text(description: dict[str, Any]) -> str:
-    """Return the text of a description's file.
-
-    Parameters
-    ----------
-    description
-        A finger description.
-
-    Returns
-    -------
-    str
-        JSON with a line end.
-    """
+    """Return the text of a description's file."""
     return json.dumps(description, indent=1) + "\n"
 
 
 def slowest_motion(velocity: Series, angle: Series, cutoff: float) -> float:
-    """Return the speed (rad/s) below which the joint is at rest.
-
-    It is the velocity that one step of the encoder causes, and at least a thousandth of the largest speed.
-    """
+    """Return the speed (rad/s) below which the joint is at rest."""
     step = 2 * np.pi * cutoff * value_step(angle)
     return float(f"{max(step, value_step(velocity), SLOWEST * np.abs(velocity).max()):.3g}")
 
 
 def starting_numbers(columns: dict[str, Series], slowest: float) -> dict[str, float]:
-    """Return the numbers of the straight line.
-
-    These are coulomb (N.m), viscous (N.m.s/rad), inertia (kg.m2), offset (N.m) and missed (N.m, rms of the residual).
-    """
+    """Return the numbers of the straight line."""
     velocity = columns["joint_velocity[1]"]
     known = columns.get("external_torque[1]")
     torque = columns["tendon_force[1]"] - (0.0 if known is None else known)

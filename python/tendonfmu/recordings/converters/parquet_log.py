@@ -16,15 +16,7 @@ ROWS = 1 << 18  # of a block
 
 
 class ParquetLog:
-    """A Parquet log.
-
-    Parameters
-    ----------
-    file
-        The log.
-    settings
-        Of the map.
-    """
+    """A Parquet log."""
 
     open_ended = False
 

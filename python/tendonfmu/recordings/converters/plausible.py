@@ -26,15 +26,7 @@ STEPS = (2e-6, 2.0)  # s; usual time from sample to sample
 
 
 class Ranges:
-    """Follows the ranges of columns, block by block.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    wanted
-        The map.
-    """
+    """Follows the ranges of columns, block by block."""
 
     def __init__(self, file: Path, wanted: ColumnMap) -> None:
         self._file, self._map = file, wanted

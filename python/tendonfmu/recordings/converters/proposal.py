@@ -31,67 +31,28 @@ SI = {"force": "N", "length": "m", "angle": "rad", "angular speed": "rad/s", "to
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the proposed map.
+    """A line of the proposed map."""
 
-    Attributes
-    ----------
-    column
-        Our name.
-    source
-        The log's, or "?".
-    unit
-        Its unit, or "?".
-    sure
-        SURE, LIKELY, GUESS or UNDECIDED.
-    why
-        In words.
-    """
-
-    column: str
-    source: str | int
-    unit: str
-    sure: str
-    why: str
+    column: str  # our name
+    source: str | int  # the log's, or "?"
+    unit: str  # its unit, or "?"
+    sure: str  # SURE, LIKELY, GUESS or UNDECIDED
+    why: str  # in words
 
 
 @dataclass
 class Proposal:
-    """A proposed map.
+    """A proposed map."""
 
-    Attributes
-    ----------
-    document
-        The map, as in the JSON file.
-    lines
-        Its lines.
-    unused
-        Names of fields that it does not use.
-    orders
-        How tendons and joints are numbered, where there are several.
-    undecided
-        Keys of the map that are "?".
-    """
-
-    document: dict[str, Any]
-    lines: list[Line] = field(default_factory=list)
-    unused: list[str] = field(default_factory=list)
-    orders: list[Order] = field(default_factory=list)
-    undecided: list[str] = field(default_factory=list)
+    document: dict[str, Any]  # the map, as in the JSON file
+    lines: list[Line] = field(default_factory=list)  # its lines
+    unused: list[str] = field(default_factory=list)  # names of fields that it does not use
+    orders: list[Order] = field(default_factory=list)  # how tendons and joints are numbered, where there are several
+    undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
 
 
 def propose(found: Inspection) -> Proposal:
-    """Propose a map.
-
-    Parameters
-    ----------
-    found
-        What is in the log.
-
-    Returns
-    -------
-    Proposal
-        The map, and why.
-    """
+    """Propose a map."""
     groups, by_name = field_groups(found)
     one_joint = "tendon_force" not in groups and "torque" in groups
     slots, orders = _numbered(groups)
@@ -141,10 +102,7 @@ def _numbered(groups: dict[str, list[Member]]) -> tuple[Slots, list[Order]]:
 
 
 def _beside(leading: Sequence[Member], members: Sequence[Member]) -> tuple[list[Member | None], bool]:
-    """Return members at the indices of those with the same number or name, or else in an order of their own.
-
-    And whether their names tell this order.
-    """
+    """Return members at the indices of those with the same number or name, or else in an order of their own."""
     places = matched([_name(each) for each in leading], [_name(each) for each in members])
     if places is None:
         own, numbered = in_order(members, _name)

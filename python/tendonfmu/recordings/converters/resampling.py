@@ -21,29 +21,8 @@ STEPS = 10.0  # median steps; a longer one is a gap unless the map says otherwis
 def on_one_clock(
     file: Path, topics: Mapping[str, Mapping[str, Series]], main: str, wanted: ColumnMap
 ) -> tuple[dict[str, Series], list[str]]:
-    """Return the columns of all topics at common times.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    topics
-        Columns of each topic, [N] each, with its own "time", s, increasing.
-    main
-        The topic whose times are taken, if the map has no rate.
-    wanted
-        The map.
-
-    Returns
-    -------
-    tuple of dict and list
-        The columns [M], with the common "time", and what was done, one sentence each.
-
-    Raises
-    ------
-    InputError
-        The topics do not overlap in time, or a gap is larger than the map allows.
-    """
+    """Return the columns of all topics at common times."""
+    # topics: [N]; returns [M]
     rule = wanted.resample or Resampling()
     time, notes = _times(file, topics, main, rule)
     in_gap = np.zeros(len(time), dtype=bool)

@@ -49,17 +49,7 @@ def _in_order(part: Path) -> list[int | str]:
 
 
 class Db3Log:
-    """SQLite files of a ROS 2 bag.
-
-    Parameters
-    ----------
-    file
-        What the user named.
-    settings
-        Of the map.
-    parts
-        The files.
-    """
+    """SQLite files of a ROS 2 bag."""
 
     open_ended = True
 

@@ -10,13 +10,7 @@ from tendonfmu.files import require_extra
 
 
 class Ros2Types:
-    """Types of messages.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    """
+    """Types of messages."""
 
     def __init__(self, file: Path) -> None:
         self._typesys = require_extra("rosbags.typesys", str(file))
@@ -24,22 +18,7 @@ class Ros2Types:
         self._usual: Any = None
 
     def decoder(self, name: str, definition: str, encoding: str) -> Callable[[bytes], Any] | None:
-        """Return a function that decodes messages, or None if the type is not known.
-
-        Parameters
-        ----------
-        name
-            Of the type, such as sensor_msgs/msg/JointState.
-        definition
-            As the file has it; "" if it has none. The types of the latest ROS 2 are then tried.
-        encoding
-            Of the definition: ros2msg or ros2idl.
-
-        Returns
-        -------
-        function or None
-            Takes bytes; raises ValueError for a damaged message.
-        """
+        """Return a function that decodes messages, or None if the type is not known."""
         if name.count("/") == 1:
             name = name.replace("/", "/msg/")
         store = self._own

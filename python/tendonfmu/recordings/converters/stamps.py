@@ -20,29 +20,8 @@ ZONED = r"(Z|[+-]\d{2}:?(\d{2})?)\s*$"
 
 
 def nanoseconds(file: Path, column: MappedColumn, readings: Any, row: int = 0) -> NDArray[np.int64]:
-    """Return stamps as ns since 1970.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    column
-        The column of the map, with a stamp.
-    readings
-        [N]; texts (Arrow), or numbers.
-    row
-        Rows before them, for messages.
-
-    Returns
-    -------
-    ndarray
-        int64 [N].
-
-    Raises
-    ------
-    InputError
-        A reading is no stamp, with its row.
-    """
+    """Return stamps as ns since 1970."""
+    # readings: [N]; returns int64 [N]
     import pyarrow as pa
 
     if not isinstance(readings, pa.Array | pa.ChunkedArray):

@@ -29,45 +29,16 @@ Series = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ConvertedLog:
-    """A log that has been converted.
+    """A log that has been converted."""
 
-    Attributes
-    ----------
-    columns
-        Columns of a recording, [N] each, in SI.
-    map
-        The map that was used.
-    velocity_cutoff
-        Cut-off of velocities that were computed here (Hz); 0 if there are none.
-    notes
-        What was left out or computed, one sentence each.
-    """
-
-    columns: dict[str, Series]
-    map: ColumnMap
-    velocity_cutoff: float = 0.0
-    notes: list[str] = field(default_factory=list)
+    columns: dict[str, Series]  # columns of a recording, [N] each, in SI
+    map: ColumnMap  # the map that was used
+    velocity_cutoff: float = 0.0  # cut-off of velocities that were computed here (Hz); 0 if there are none
+    notes: list[str] = field(default_factory=list)  # what was left out or computed, one sentence each
 
 
 class Conversion:
-    """A log that is being converted.
-
-    Parameters
-    ----------
-    file
-        The log.
-    map_file
-        MAP.json.
-
-    Attributes
-    ----------
-    notes
-        What was left out or computed. Complete after the last block.
-    in_blocks
-        Whether `blocks` needs little memory, however long the log is.
-    velocity_cutoff
-        As in `ConvertedLog`.
-    """
+    """A log that is being converted."""
 
     def __init__(self, file: Path, map_file: Path) -> None:
         self.map = read_map(map_file)
@@ -112,18 +83,8 @@ class Conversion:
             self._names[name]["time"] = source
 
     def blocks(self) -> Iterator[dict[str, Series]]:
-        """Yield columns of the recording, block by block.
-
-        Yields
-        ------
-        dict of ndarray
-            [N] each, in SI.
-
-        Raises
-        ------
-        InputError
-            The column and row that is wrong, and what was expected.
-        """
+        """Yield columns of the recording, block by block."""
+        # returns [N] each, in SI
         ranges = Ranges(self.log.file, self.map)
         for columns in self._in_blocks() if self.in_blocks else self._at_once():
             ranges.add(columns)
@@ -203,25 +164,8 @@ class Conversion:
 
 
 def convert_table(file: Path, map_file: Path) -> ConvertedLog:
-    """Convert a log with a map of columns.
-
-    Parameters
-    ----------
-    file
-        The log: text, Parquet, MATLAB, HDF5, MCAP, or a ROS 2 bag.
-    map_file
-        MAP.json.
-
-    Returns
-    -------
-    ConvertedLog
-        Its columns are those of docs/reference/recordings.md, [N] each.
-
-    Raises
-    ------
-    InputError
-        The file, column or key, and row that is wrong, and what was expected.
-    """
+    """Convert a log with a map of columns."""
+    # returns its columns are those of docs/reference/recordings.md, [N] each
     conversion = Conversion(file, map_file)
     blocks = list(conversion.recording())
     columns = {key: np.concatenate([block[key] for block in blocks]) for key in blocks[0]}

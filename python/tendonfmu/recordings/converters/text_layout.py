@@ -28,33 +28,15 @@ _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codec
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text log is written.
+    """How a text log is written."""
 
-    Attributes
-    ----------
-    separator
-        A space stands for any number of them.
-    decimal
-        "." or ",".
-    start
-        Number of lines before the first row.
-    names
-        Of the columns; "1", "2", ... if the log has none.
-    units
-        Of the columns, if the log has a row of them; otherwise empty.
-    skip
-        Number of lines before the line of names.
-    header
-        Whether there is a line of names.
-    """
-
-    separator: str
-    decimal: str
-    start: int
-    names: list[str]
-    units: list[str]
-    skip: int
-    header: bool
+    separator: str  # A space stands for any number of them
+    decimal: str  # "." or ","
+    start: int  # number of lines before the first row
+    names: list[str]  # of the columns; "1", "2", ... if the log has none
+    units: list[str]  # of the columns, if the log has a row of them; otherwise empty
+    skip: int  # number of lines before the line of names
+    header: bool  # whether there is a line of names
 
 
 def find_encoding(file: Path, begin: bytes, wanted: str | None) -> tuple[str, str]:
@@ -78,27 +60,7 @@ def find_encoding(file: Path, begin: bytes, wanted: str | None) -> tuple[str, st
 
 
 def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
-    """Return how a log is written.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    lines
-        Its first lines.
-    log
-        What the map says.
-
-    Returns
-    -------
-    Layout
-        The layout.
-
-    Raises
-    ------
-    InputError
-        There is no line after those that are left out.
-    """
+    """Return how a log is written."""
     given = log.skip or 0
     content = [(k, line) for k, line in enumerate(lines) if k >= given and line.strip()]
     if not content:

@@ -37,15 +37,7 @@ CHUNK = 4 << 20  # bytes of text at once
 
 
 class TextLog:
-    """A text log.
-
-    Parameters
-    ----------
-    file
-        The log.
-    settings
-        What the map says about its format.
-    """
+    """A text log."""
 
     open_ended = False
 

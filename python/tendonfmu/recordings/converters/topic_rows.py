@@ -22,18 +22,10 @@ Series = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of a topic.
+    """Rows of a topic."""
 
-    Attributes
-    ----------
-    readings
-        By key of the map, [N] each; stamps in ns.
-    numbers
-        Number of each row in the log, from 1, [N].
-    """
-
-    readings: Mapping[str, NDArray[Any]]
-    numbers: NDArray[np.int64]
+    readings: Mapping[str, NDArray[Any]]  # by key of the map, [N] each; stamps in ns
+    numbers: NDArray[np.int64]  # number of each row in the log, from 1, [N]
 
     @staticmethod
     def joined(parts: Sequence[Rows]) -> Rows:
@@ -47,28 +39,7 @@ class Rows:
 
 
 class TopicRows:
-    """Takes the rows of a topic, block by block.
-
-    Parameters
-    ----------
-    file
-        The log, for messages.
-    columns
-        What the map says, by our key; "time" is the topic's clock.
-    names
-        Names of the fields in the log, by our key.
-    leave_out_missing, sort
-        As in `column_map.LogFormat`.
-
-    Attributes
-    ----------
-    count
-        Rows so far.
-    left_out
-        Rows left out so far.
-    first
-        First reading of each column.
-    """
+    """Takes the rows of a topic, block by block."""
 
     def __init__(
         self,
@@ -178,31 +149,7 @@ def as_columns(rows: Rows, columns: Mapping[str, MappedColumn], first: Mapping[s
 
 
 def clock_of(file: Path, topic: Topic, main: Topic, name: str, time: MappedColumn) -> MappedColumn:
-    """Return the clock of a topic beside the main one: the field with the same name in it.
-
-    Parameters
-    ----------
-    file
-        The log, for the message.
-    topic
-        The topic.
-    main
-        The topic with the time.
-    name
-        Name of the time in the log.
-    time
-        The time in the map.
-
-    Returns
-    -------
-    MappedColumn
-        With the same unit.
-
-    Raises
-    ------
-    InputError
-        There is no such field.
-    """
+    """Return the clock of a topic beside the main one: the field with the same name in it."""
     relative = name[len(main.prefix) :] if name.startswith(main.prefix) else name
     wanted = topic.prefix + relative
     if topic.field(wanted) is not None:

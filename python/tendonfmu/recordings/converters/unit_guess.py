@@ -12,21 +12,11 @@ SURE, LIKELY, GUESS, UNDECIDED = "sure", "likely", "guess", "undecided"
 
 @dataclass(frozen=True)
 class Guess:
-    """A unit.
+    """A unit."""
 
-    Attributes
-    ----------
-    unit
-        Its name, or "?".
-    sure
-        SURE, LIKELY, GUESS or UNDECIDED.
-    why
-        In words.
-    """
-
-    unit: str
-    sure: str
-    why: str
+    unit: str  # its name, or "?"
+    sure: str  # SURE, LIKELY, GUESS or UNDECIDED
+    why: str  # in words
 
 
 # largest magnitude -> unit; what a finger's signals have in each unit. Between the ranges several units fit.
@@ -51,15 +41,7 @@ STEPS = [(1e-5, 0.12, "s"), (0.5, 120.0, "ms"), (500.0, 120e3, "us"), (500e3, 12
 
 
 def stated(name: str, unit: str) -> tuple[str, str, str] | None:
-    """Return (unit, quantity, where) that a log states for a field, or None.
-
-    Parameters
-    ----------
-    name
-        Of the field.
-    unit
-        In a row of units, or as an attribute; "" if there is none.
-    """
+    """Return (unit, quantity, where) that a log states for a field, or None."""
     if unit and (found := units.quantity(unit.strip(" []()"))):
         return (*found, f"the log states {unit!r}")
     for text in re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", name):
@@ -74,19 +56,7 @@ def stated(name: str, unit: str) -> tuple[str, str, str] | None:
 
 
 def unit_of(name: str, unit: str, quantity: str, low: float, high: float, ros: bool) -> Guess:
-    """Return the unit of a signal of a known quantity.
-
-    Parameters
-    ----------
-    name, unit
-        Of the field, as the log has them.
-    quantity
-        A key of `units.QUANTITIES`.
-    low, high
-        Its range.
-    ros
-        Whether the log holds messages, whose units are SI by REP 103.
-    """
+    """Return the unit of a signal of a known quantity."""
     said = stated(name, unit)
     if said and said[1] == quantity:
         return Guess(said[0], SURE, said[2])

@@ -78,25 +78,7 @@ QUANTITIES = {
 
 
 def factor(name: str, known: Mapping[str, float]) -> float | None:
-    """Return the factor of a unit to SI.
-
-    Parameters
-    ----------
-    name
-        Name of the unit.
-    known
-        The table of the quantity.
-
-    Returns
-    -------
-    float or None
-        None if it is no unit of the quantity.
-
-    Raises
-    ------
-    InputError
-        The name is in no table, and pint is not installed.
-    """
+    """Return the factor of a unit to SI."""
     usual = ALIASES.get(name, name)
     if usual in known:
         return known[usual]
