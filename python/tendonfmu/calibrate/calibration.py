@@ -20,9 +20,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tendonfmu.arrays import Data
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all
 from tendonfmu.calibrate.parts import stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
@@ -45,9 +43,6 @@ from tendonfmu.recordings import (
 )
 from tendonfmu.report import diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
-
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis

@@ -7,13 +7,13 @@ there is little motion, an earlier calibration is the prior.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis import (
     Event,
     FitSettings,
@@ -43,8 +43,6 @@ from tendonfmu.estimate import (
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import FitRecording, Signals
-
-Data = Mapping[str, Any]
 
 
 @dataclass(frozen=True)

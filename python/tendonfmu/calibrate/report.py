@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Data
 from tendonfmu.detect import ContactTuning, contact_at_rest, tune_report
 from tendonfmu.diagnosis import Diagnosis, residual_of
 from tendonfmu.estimate import residuals
 from tendonfmu.recordings import FitRecording, rms
 from tendonfmu.report import cards_of, names_of
-
-Data = Mapping[str, Any]
 
 OF_TUNING = (
     "method",

@@ -7,13 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.calibrate import rms_of
 from tendonfmu.demo.demo import Story
 from tendonfmu.demo.run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES
 from tendonfmu.drawing import Bars, Curve, Dots, Interval, Panel, Sheet
 from tendonfmu.report import CompensationFigure, JointCurves, law_sheets, residual_tables, torque_sheets
-
-Numbers = NDArray[np.float64]
 
 SHOWN = (20.0, 40.0)  # s
 _HEIGHT = 270  # CSS pixels

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import MERGED
 from tendonfmu.detect.free_motion import FreePart, Signal
 
-Numbers = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CELL = 0.02  # s

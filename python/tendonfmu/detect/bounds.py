@@ -12,14 +12,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.alarm_level import Cells, level_for, rows_of
 from tendonfmu.detect.free_motion import FreeRun, Signal
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Pairs (c_H, c_J) to try. A push makes the model jump and ends stiction, so large shares hide it:
 # docs/reference/commands/tune.md

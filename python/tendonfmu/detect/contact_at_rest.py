@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
 from tendonfmu.detect.free_motion import NEVER, FreePart
 from tendonfmu.files import counted
 from tendonfmu.model import DEFAULTS, native, number_of
-
-Numbers = NDArray[np.float64]
 
 SETTLE_TIME = DEFAULTS["contact.rest.settle_time"]  # s
 INNOVATION_TIME = 0.5  # s; a touch rises within this time, creep hardly changes

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.recordings import gaps
 
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Spans = NDArray[np.int64]
 
 MERGED = 0.1  # s; labelled stretches, or alarms, closer than this are one

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.counting import sample_seconds
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, native, number_of
 from tendonfmu.recordings import Held, Recording, prepare
 
-Numbers = NDArray[np.float64]
 Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
-Flags = NDArray[np.bool_]
 
 SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
 NEVER = 1e9  # N·m, a threshold that is never exceeded

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.alarm_level import Cells, Index, level_for
 from tendonfmu.detect.bounds import COMPARED, Bound, Choice, Search, Tried, choose, choose_at
 from tendonfmu.detect.free_motion import FreePart, Signal
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 SECOND_SHARE = 4  # the residual, as second signal, gets one in so many of the allowed alarms
 _SCALES = np.geomspace(0.15, 3.0, 48)  # scales of a bound at which evidence is computed

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, nnls
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.alarm_level import Cells, rows_of
 from tendonfmu.detect.bounds import Bound
 from tendonfmu.detect.free_motion import FreePart, FreeRun
 from tendonfmu.errors import InputError
 from tendonfmu.recordings import bias_settings
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 BINS = 8  # of mean force, divided among the pretensions
 _LEAST = 0.02  # of the residual's spread: least standard deviation at the recorded forces

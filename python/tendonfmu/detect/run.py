@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.errors import InputError
 from tendonfmu.fmu import check_model, outputs_of, run_fmu
@@ -28,9 +29,6 @@ from tendonfmu.model import (
     watches_motors,
 )
 from tendonfmu.recordings import Recording, model_alone
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # the keys of `contact` that decide
 THRESHOLDS = ("threshold", "threshold_per_force")

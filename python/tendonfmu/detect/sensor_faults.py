@@ -13,13 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.model import DEFAULTS, native
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # s, and a number of samples for slow rates. Shorter than the default of sensor_fault.hold_time: the check on free
 # motion shows that channels that are read at different times raise no fault.

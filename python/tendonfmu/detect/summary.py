@@ -7,12 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import ContactSums, DetectionScore, Event, FreeBlocks
 from tendonfmu.statistics import Estimate, intervals
-
-Numbers = NDArray[np.float64]
 
 QUARTILES = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75, "ninety_percent": 0.9}
 FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.25 to 8, with 1, those of the description

@@ -19,8 +19,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect.alarm_level import alarms_above, cells_of, least_hours, rate_limit
 from tendonfmu.detect.bounds import Bound, Search, search_for
 from tendonfmu.detect.closed_loop import LoopAlarms, count_loop
@@ -35,8 +35,6 @@ from tendonfmu.estimate import ConstructorArguments, check_given_once, own_copy
 from tendonfmu.files import are, counted
 from tendonfmu.model import FingerSource, description_text, finger_from_data, read_finger
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
-
-Numbers = NDArray[np.float64]
 
 METHODS = ("innovation", "cusum", "threshold")
 INNOVATION_TIME = 0.05  # s, T

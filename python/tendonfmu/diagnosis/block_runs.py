@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import moment_arms, native
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import SampleBlocks
-
-Numbers = NDArray[np.float64]
 
 _NEVER = 1e9  # N·m; a contact threshold that is never passed
 _STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache

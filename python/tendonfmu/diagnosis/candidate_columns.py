@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.block_runs import block_late_forces, block_prediction
 from tendonfmu.diagnosis.derivative_passes import Direction, nominal_directions, plan_passes, run_pass
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant
@@ -22,7 +23,6 @@ from tendonfmu.errors import InputError
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import SampleBlocks
 
-Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Progress = Callable[[int, int], None]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]

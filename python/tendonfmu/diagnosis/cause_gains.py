@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause_search import look, predicted_of, series_of
 from tendonfmu.diagnosis.cause_selection import names_with
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
@@ -28,8 +26,6 @@ from tendonfmu.statistics import Interval, gain_interval
 
 # Times the least gain where everything slides: what is left there is small, and the form of any law is a part of it.
 STRICTER = 5.0
-Data = Mapping[str, Any]
-Numbers = NDArray[np.float64]
 Parameters = Mapping[str, tuple[float, str]]
 
 

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.cause_selection import Selection
 from tendonfmu.diagnosis.confirmation import Confirmation
@@ -35,9 +35,6 @@ from tendonfmu.statistics import (
     make_folds,
     residual_of,
 )
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

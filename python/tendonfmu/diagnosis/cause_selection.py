@@ -12,14 +12,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.hypotheses import Hypothesis, Key
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.result import ABSORBED
 from tendonfmu.statistics import Grams, standard_error
-
-Numbers = NDArray[np.float64]
 
 CERTAIN = 2.0  # standard errors above 0
 ALIKE = 1.64  # standard errors of the paired difference, within which two causes cannot be distinguished

@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import Folds, Splines, Whitener, basis, residual_of, whitener, without
 
-Numbers = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Columns = NDArray[np.float32] | Numbers
 
 _RANK = 1e-9  # of the largest power: resolution of columns in single precision

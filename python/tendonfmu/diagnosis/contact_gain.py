@@ -10,14 +10,13 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Flags
 from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
@@ -33,9 +32,6 @@ from tendonfmu.diagnosis.result import DetectionGain
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, native
 from tendonfmu.recordings import FitRecording, Recording
-
-Data = Mapping[str, Any]
-Flags = NDArray[np.bool_]
 
 RATE = 6.0  # 1/h; false alarm rate that both are tuned for, or the lowest that the free motion supports
 CONFIDENCE = 0.9

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.remainder_features import features
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Event
@@ -27,8 +28,6 @@ from tendonfmu.statistics import Folds, Splines, make_folds
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LEVEL = 0.01  # probability of any event in recordings without one
 LEAST = 5.5  # robust standard deviations: least height of an event, whatever the quartiles give

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects.candidate import Variant
 from tendonfmu.diagnosis.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
 from tendonfmu.estimate import Estimator, unknown_names
@@ -22,7 +23,6 @@ from tendonfmu.model import LIMITS, native
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import BlockSums, SampleBlocks
 
-Numbers = NDArray[np.float64]
 Single = NDArray[np.float32]
 Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of the jumps there, [K, n, u]
 Direction = Mapping[str, float]  # path -> share; the description may be coarser than the merged one

@@ -17,9 +17,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
 from tendonfmu.diagnosis.changes.diagnosis import PHASES as CHANGE_PHASES
@@ -52,8 +52,6 @@ from tendonfmu.recordings import (
     RecordingSource,
 )
 from tendonfmu.tasks import Phases, PhaseState
-
-Numbers = NDArray[np.float64]
 
 LEAST_GAIN = 0.03
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned

@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.gain import residual_of
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, blocks_of, paired_gain
-
-Numbers = NDArray[np.float64]
 
 _TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 

@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects.candidate import Candidate, Place
 from tendonfmu.diagnosis.result import Evidence
 from tendonfmu.diagnosis.series import Series
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 BINS = 24
 SHOWN = 4.0  # ratio of the bins' squared means without and with the cause, for a picture that shows it

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import (
@@ -36,7 +35,6 @@ from tendonfmu.recordings import FitRecording
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.effects.candidate import Candidate, Place
 
-Numbers = NDArray[np.float64]
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
 BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it

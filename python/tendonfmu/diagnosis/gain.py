@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.result import ModelErrors
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import residuals
@@ -27,10 +27,6 @@ from tendonfmu.fmu import build_fmu, run_fmu
 from tendonfmu.model import NUMBERS, description_text, native
 from tendonfmu.recordings import BiasSettings, FitRecording, Model, bias_settings, delayed_torque, rms
 from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Data = Mapping[str, Any]
 
 AGREEMENT = 1e-9  # of the largest value of an output's series: allowed difference of two implementations
 _NEVER = 1e9  # N·m; a contact threshold that is never passed

@@ -10,12 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Shape
 from tendonfmu.diagnosis.effects import Place
 
-Numbers = NDArray[np.float64]
 Key = tuple[str, int | None, int | None]
 
 EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one

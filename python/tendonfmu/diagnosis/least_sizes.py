@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects import Candidate, Place
 from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT, Hypothesis
-
-Numbers = NDArray[np.float64]
 
 OF_NOISE = 4.0  # standard deviations of the position noise
 OF_SAMPLE = 0.75  # samples: velocities are late by half a sample

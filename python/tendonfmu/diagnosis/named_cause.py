@@ -6,16 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.extension_fit import Accepted
 from tendonfmu.diagnosis.hypotheses import Hypothesis, Key
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.model import extended_row
 from tendonfmu.statistics import Interval
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.cause_search import bias_of, series_of
 from tendonfmu.diagnosis.gain import squared_residual
 from tendonfmu.diagnosis.series import block_prediction, make_grid
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Span, make_folds
-
-Numbers = NDArray[np.float64]
 
 
 class OnlineError:

@@ -14,13 +14,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.series import Grid, Series, exact_model
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
-
-Numbers = NDArray[np.float64]
 
 MOST_SHIFT = 10.0  # times the largest measured force
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.remainder_features import Finding, features
 from tendonfmu.diagnosis.remainder_learner import Choice, Learner, choices
 from tendonfmu.diagnosis.remainder_text import described
@@ -24,7 +24,6 @@ from tendonfmu.statistics import Splines, Whitener, find_lines, make_folds, stan
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.statistics import Line
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
 
 MEMORY = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # s: time constants of what friction may remember
 TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve
 
+from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.diagnosis.remainder_features import Features
 from tendonfmu.statistics import Folds, Span, Splines
-
-Numbers = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
 

@@ -6,15 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.remainder_features import GROUPS, Finding
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
 
 CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.result import ResidualView
 from tendonfmu.statistics import make_folds
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
 
 BINS = 24
 POINTS = 1200  # of a curve over time

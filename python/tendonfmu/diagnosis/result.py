@@ -6,14 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tendonfmu.arrays import Numbers
 from tendonfmu.recordings import Signals
 from tendonfmu.statistics import Interval
-
-Numbers = NDArray[np.float64]
-
 
 NO_GAIN = Interval(0.0, 0.0, 0.0)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.cause_search import View, bias_of, look, predicted_of, residual_alone, series_of
 from tendonfmu.diagnosis.cause_selection import CERTAIN, Judged, Pick, Selection, is_alike, rms_gain
 from tendonfmu.diagnosis.contact_scan import left_out, scan_events
@@ -39,9 +39,6 @@ from tendonfmu.diagnosis.starting_point import presliding_everywhere
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.tasks import Phases, Step
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MOST_CAUSES = 8
 SIGNIFICANCE = 0.01  # family-wise

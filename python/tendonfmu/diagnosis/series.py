@@ -13,15 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array, Numbers
 from tendonfmu.model import moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, delayed_torque
 from tendonfmu.statistics import BlockSeries
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Array = NDArray[Any]
 
 SHORTEST_STEP = 0.01  # s; shortest block
 MOST_BLOCKS = 20_000

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.diagnosis.cause_selection import CERTAIN, rms_gain
@@ -27,8 +27,6 @@ from tendonfmu.model import Finger, moment_arms
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
 from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
 from tendonfmu.statistics import Grams, Products, make_folds
-
-Numbers = NDArray[np.float64]
 
 NOISIEST = 1000.0  # rad; the largest noise that `position_filter` accepts
 NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise

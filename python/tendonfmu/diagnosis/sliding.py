@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
 from tendonfmu.diagnosis.extension_fit import FittedModel
 from tendonfmu.diagnosis.nominal_fit import fitted
@@ -24,8 +24,6 @@ from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings,
 from tendonfmu.model import Finger, effects, sliding_velocity, velocity_threshold
 from tendonfmu.recordings import FitRecording, Signals
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
-
-Flags = NDArray[np.bool_]
 
 WORSE = 1.4  # times the error of the samples that slide: a smaller error of stuck ones does not mislead
 TIMES = tuple(

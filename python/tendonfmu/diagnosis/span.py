@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
-
-Numbers = NDArray[np.float64]
 
 _OUTER = 0.01  # share of samples outside of each end of a range, so that single outliers do not stretch it
 _FAST = 0.95  # quantile that counts as fast

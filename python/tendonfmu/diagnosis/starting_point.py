@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.diagnosis.effects import CANDIDATES, Place
@@ -25,8 +25,6 @@ from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.model import EFFECT_NUMBERS, moment_arms
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Grams, Products, make_folds
-
-Numbers = NDArray[np.float64]
 
 LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
 

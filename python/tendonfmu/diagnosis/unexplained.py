@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.cause_selection import CERTAIN
 from tendonfmu.diagnosis.remainder import Remainder
 from tendonfmu.diagnosis.result import Unexplained
 from tendonfmu.statistics import Interval, standard_error
-
-Numbers = NDArray[np.float64]
 
 
 def unexplained_of(left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float) -> Unexplained:

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.drawing.interactive import Figure, figure_of, plotly_figure, thinned
 from tendonfmu.drawing.panel_data import Curve, MatrixPanel, Panel, Sheet
 from tendonfmu.drawing.panel_styles import BLUE, DARK, GREEN, GREY, ORANGE, PURPLE, SKY, STYLES, VERMILION
 
-Numbers = NDArray[np.float64]
 Interval = tuple[float, float]
 
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, DARK, GREY)

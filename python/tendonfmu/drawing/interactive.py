@@ -19,10 +19,10 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.drawing.panel_data import Band, Bars, Curve, Dots, MatrixPanel, Panel
 from tendonfmu.drawing.panel_styles import DIVERGING, IN_DARK, STYLES, Style, size_of
 
-Numbers = NDArray[np.float64]
 Figure = dict[str, Any]
 
 _DASHES = {"-": "solid", "--": "dash", ":": "dot"}

@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
+
 Interval = tuple[float, float]
 Size = Literal["small", "medium", "large"]
 

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array, Numbers
 from tendonfmu.errors import InputError
 
 # find_spec, not try/except: a module that exists but does not load must raise its error
@@ -23,8 +24,6 @@ HAS_ESTIMATION = find_spec("tendonfmu._estimation") is not None
 if HAS_ESTIMATION:
     from tendonfmu import _estimation
 
-Numbers = NDArray[np.float64]
-Array = NDArray[Any]
 
 ESTIMATION_MISSING = "this installation cannot estimate parameters (Eigen was not found when it was built)"
 ROLES = ("coulomb", "drop", "rate", "viscous", "value")

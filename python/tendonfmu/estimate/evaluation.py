@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.recordings import FitRecording, Model, Residuals, bias_settings, model_alone, rms, track
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

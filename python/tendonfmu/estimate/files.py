@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate.structure import Structure, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
 from tendonfmu.model import Finger, description_text, native
 from tendonfmu.recordings import Recording
-
-Numbers = NDArray[np.float64]
 
 UNFINISHED = "tendonfmu-fit-unfinished-1"
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb

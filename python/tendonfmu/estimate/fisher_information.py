@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import (
     DEFAULTS,
     Effect,
@@ -26,7 +26,6 @@ from tendonfmu.model import (
     working_point_weights,
 )
 
-Numbers = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, and nearly so in the fourth over this

@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.verdicts import Fitted
 from tendonfmu.files import finite
 from tendonfmu.model import Finger, native
 from tendonfmu.recordings import consistency, whiteness
 from tendonfmu.statistics import effective_samples
-
-Numbers = NDArray[np.float64]
 
 FORMAT = "tendonfmu-fit-1"
 

@@ -12,8 +12,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.constructor_arguments import ConstructorArguments
 from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, with_laws_of
@@ -49,8 +49,6 @@ from tendonfmu.recordings import (
     require_noise,
     slack_sentences,
 )
-
-Numbers = NDArray[np.float64]
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `max_passes`
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.coverage import EffectCoverage
 from tendonfmu.estimate.fisher_information import Unknown
-
-Numbers = NDArray[np.float64]
 
 LIMIT = 0.3  # largest relative standard error of an identifiable number
 PRIOR = 10.0  # relative standard error of the prior: nearly nothing is known, but every information has an inverse

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.model import Effect, Instance, Law
-
-Numbers = NDArray[np.float64]
 
 CONFIDENCE = 1.96  # standard errors: 95 %
 _LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "viscous": "viscous", "static": "coulomb"}

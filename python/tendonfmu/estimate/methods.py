@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.files import with_values
@@ -26,7 +26,6 @@ from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
-Numbers = NDArray[np.float64]
 Start = Callable[[Sequence[str]], Numbers]
 
 

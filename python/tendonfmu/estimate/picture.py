@@ -20,7 +20,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
+
 Role = Literal["training", "comparison"]
 
 

@@ -13,16 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.fit_report import FORMAT
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
-
-Numbers = NDArray[np.float64]
 
 CHANGE = 0.02  # relative; docs/evidence/recalibration.md shows the effect of larger and smaller values
 _LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 leave it

@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation
 from tendonfmu.recordings import BiasSettings, bias_settings, track
-
-Numbers = NDArray[np.float64]
 
 BLOCKS = 80  # approximate number: few enough to be long, many enough for a sum of squares
 SHORTEST = 2.0  # s; several times the memory of the bias filter

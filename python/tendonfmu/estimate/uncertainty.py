@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation
 from tendonfmu.estimate.methods import Learned
@@ -26,7 +27,6 @@ from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import native
 from tendonfmu.statistics import error_directions
 
-Numbers = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions

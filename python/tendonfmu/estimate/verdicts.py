@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.coverage import EffectCoverage
 from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
-
-Numbers = NDArray[np.float64]
 
 CAUSES = {
     "never_moves": "never slides at all",

@@ -14,14 +14,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.excite.tension_plan import Variation, internal_tensions
 from tendonfmu.model import moment_arms, pretension_vector
 from tendonfmu.statistics import quintic
-
-Numbers = NDArray[np.float64]
 
 START = 2.0  # s; all joints are at rest at the beginning of a block, while the pretension changes
 END = 1.0  # s; all joints are at rest at the end of a block

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.excite.excitation import SLOW, Excitation, Stroke
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import moment_arms, pretension_vector
 from tendonfmu.statistics import quintic
-
-Numbers = NDArray[np.float64]
 
 CHANGE = 1.5  # s; from one pattern to the next, while the joints move on
 SHORTEST = 2.0  # s; of a pattern, its change included

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.files import frame_of
@@ -23,8 +23,6 @@ from tendonfmu.report import fit_text, law_sheets, torque_sheets
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Numbers = NDArray[np.float64]
 
 
 class FitInterrupted(KeyboardInterrupt):

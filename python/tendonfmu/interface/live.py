@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.interface.options import read_option
 from tendonfmu.model import FingerSource, inputs_used, native, read_finger, watches_motors
 
-Numbers = NDArray[np.float64]
 _INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
 _MASKED = np.ma.MaskedArray
 

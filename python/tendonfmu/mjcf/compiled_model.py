@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 
-Numbers = NDArray[np.float64]
 KINDS = ("free", "ball", "slide", "hinge")  # of joints, in the order of MuJoCo's mjtJoint
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers, Tendon
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
 from tendonfmu.mjcf.gravity import gravity_rows, holding_torques
 from tendonfmu.mjcf.left_out import left_out
 from tendonfmu.mjcf.link_geometry import LinkGeometry, link_geometry

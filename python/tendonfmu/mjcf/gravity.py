@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers
+from tendonfmu.arrays import Numbers
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 
 NONE = 1e-9  # N·m
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers, Tendon
+from tendonfmu.arrays import Numbers
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
 from tendonfmu.mjcf.gravity import NONE as WEIGHTLESS
 from tendonfmu.mjcf.gravity import holding_torques
 from tendonfmu.mjcf.tendon_choice import is_driven, motors_of, moved_velocities

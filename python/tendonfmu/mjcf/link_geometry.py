@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers, Tendon
+from tendonfmu.arrays import Numbers
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
 
 SAMPLES = 256  # spread over all joint ranges
 STEPS = 33  # along each joint's range, the others in the middle of theirs

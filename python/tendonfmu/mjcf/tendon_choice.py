@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Numbers, Tendon
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
 from tendonfmu.mjcf.moment_arms import NONE
 
 RIGID = 1e9  # N/m; as of a machine with one joint, whose drive counts as rigid

@@ -10,12 +10,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import native
-
-Numbers = NDArray[np.float64]
 
 LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
 _SWEEPS = 20000

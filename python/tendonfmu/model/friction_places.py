@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Law
 from tendonfmu.model.description_numbers import number_of
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import _native
+from tendonfmu.arrays import Array
 from tendonfmu.model.signals import INPUTS
-
-Array = NDArray[Any]
 
 
 class NativeError(ValueError):

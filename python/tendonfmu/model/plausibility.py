@@ -10,12 +10,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model.description import Finger, laws, sides
 from tendonfmu.model.findings import Finding
-
-Numbers = NDArray[np.float64]
 
 LONGEST_ARM = 0.3  # m; arms of fingers have 2 to 20 mm, those of a wrist 50
 SHORTEST_ARM = 1e-4  # m

@@ -9,14 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import StuckSensor, expected_values, gaps, stuck_sensors
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import value_step
-
-Numbers = NDArray[np.float64]
 
 # --- the clock
 SLOWEST, FASTEST = 5.0, 1e5  # samples per second; nothing controls or records a finger at a rate outside these

@@ -9,13 +9,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.files import counted
 from tendonfmu.model import Finger
 from tendonfmu.recordings.recording import Recording
 
-Numbers = NDArray[np.float64]
 Runs = list[tuple[int, int]]  # (begin, end) of samples, end excluded
 
 GAP = 10.0  # sample times; a longer step is a gap

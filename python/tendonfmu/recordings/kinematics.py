@@ -12,13 +12,10 @@ from dataclasses import dataclass
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import TURNS
-
-Numbers = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 FEWEST = 200  # samples; a covariance needs at least as many
 MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are known to 2 % at best

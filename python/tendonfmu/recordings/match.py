@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finding, Finger, is_direct_drive
 from tendonfmu.recordings import match_text as text
@@ -27,9 +27,6 @@ from tendonfmu.recordings.kinematics import EQUATED, FEWEST, GAIN, SAME, Balance
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.signal_noise import white_noise
 from tendonfmu.recordings.velocity import velocity_corrections
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
 UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found

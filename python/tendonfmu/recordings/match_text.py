@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.files import are, counted
 from tendonfmu.model import Finding
 from tendonfmu.recordings.channels import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
@@ -15,7 +15,6 @@ from tendonfmu.recordings.kinematics import Balance, Correction, Repair
 from tendonfmu.recordings.match_map import what_to_set, what_to_write
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording
 
-Numbers = NDArray[np.float64]
 EQUATION = "position − force/stiffness = moment arms × joint angles"
 _REASONS = {
     "tendon_force": "the force falls where its spring stretches",

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.model import (
@@ -32,9 +32,6 @@ from tendonfmu.recordings.faults import (
 )
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, model_alone
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
 _LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been

@@ -14,12 +14,9 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.model import native, number_of
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finite sum
 CONFIDENCE = 0.95

@@ -14,15 +14,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import RANGES, moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
-
-Numbers = NDArray[np.float64]
 
 NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import moment_arms, number_of
 from tendonfmu.recordings.faults import gaps
 from tendonfmu.recordings.recording import Recording
-
-Numbers = NDArray[np.float64]
 
 ORDER = 2  # of the Butterworth filter, run both ways
 OF_CROSSING = 0.6  # of the frequency at which the torque's spectrum falls to its noise; the cut-off

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import tendon_angles
 from tendonfmu.recordings.kinematics import FEWEST, Correction
 from tendonfmu.recordings.recording import Recording
-
-Numbers = NDArray[np.float64]
 
 WINDOW = 0.1  # s over which changes are compared
 ALIKE = 0.8  # correlation above which changes belong together

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted
@@ -16,7 +16,6 @@ from tendonfmu.report.diagnosis_numbers import unit_of
 from tendonfmu.report.diagnosis_text import Names, at_place, names_of
 from tendonfmu.report.diagnosis_words import Words, words_of
 
-Numbers = NDArray[np.float64]
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
 _TITLES = {
     "time": "Over time",

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array
 from tendonfmu.detect import score_detection
 from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
 
-Array = NDArray[Any]
 Interval = tuple[float, float]
 
 

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import Dots, MatrixPanel, Panel, Sheet
 from tendonfmu.estimate import FitPicture, identifiability
 from tendonfmu.files import are, counted
-
-Numbers = NDArray[np.float64]
 
 _SHOWN = (1e-3, 10.0)  # standard error over value
 _TICKS = ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %"), (10.0, "1000 %"))

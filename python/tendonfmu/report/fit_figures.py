@@ -11,14 +11,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet
 from tendonfmu.estimate import FitPicture, FitSeries
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_error_figures import correlation_sheet, error_sheet
 from tendonfmu.report.fit_law_figures import law_sheets
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 SHOWN = 10.0  # s of motion, starting at BEGIN as in the paper's figs. 6 and 7 if the recording is long enough
 BEGIN = 60.0

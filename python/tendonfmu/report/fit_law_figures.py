@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import Band, Curve, Panel, Sheet
 from tendonfmu.estimate import FitPicture, LawBands, LawCurve, asymmetric, numbers_of
 from tendonfmu.files import are, counted
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
-
-Numbers = NDArray[np.float64]
 
 LAWS_DRAWN = 240  # friction effects at most; a snake of 16 joints and 64 tendons has thousands
 _LOOKED_AT = 20_000  # samples at most that say where the motion was

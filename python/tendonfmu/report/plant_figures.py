@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array
 from tendonfmu.model import Instance
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.figure_data import Interval
-from tendonfmu.simulate import Array, Plant, Rig, simulate
+from tendonfmu.simulate import Plant, Rig, simulate
 
 Signals = Mapping[str, Array]
 WAYS = tuple[tuple[float, float], ...]

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.figure_data import Interval
 from tendonfmu.statistics import intervals as statistics_intervals
-
-Numbers = NDArray[np.float64]
 
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # drawn at most

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.detect import ContactTuning, FreeRun, rate_limit, tail_levels
 from tendonfmu.statistics import intervals
-
-Numbers = NDArray[np.float64]
 
 JOINTS = 4  # drawn at most
 WORST = 4  # moments

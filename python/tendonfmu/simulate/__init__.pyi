@@ -1,6 +1,5 @@
 from .fmu_packaging import build_plant_fmu as build_plant_fmu
 from .plant import INTEGRATORS as INTEGRATORS
-from .plant import Array as Array
 from .plant import Plant as Plant
 from .plant import require_plant as require_plant
 from .rig import Rig as Rig

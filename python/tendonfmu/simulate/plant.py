@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array
 from tendonfmu.errors import InputError
 
 # find_spec, not try/except: a module that exists but does not load must raise its error
@@ -23,7 +24,6 @@ HAS_PLANT = find_spec("tendonfmu._plant") is not None
 if HAS_PLANT:
     from tendonfmu import _plant
 
-Array = NDArray[Any]
 
 PLANT_MISSING = "this installation has no simulated finger (SUNDIALS was not found when it was built)"
 INTEGRATORS = {"cvode": 1, "fixed_step": 2}

@@ -6,13 +6,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from tendonfmu.arrays import Data
 from tendonfmu.files import counted
 from tendonfmu.model import count
 from tendonfmu.simulate.plant import Plant
 from tendonfmu.simulate.rig import Rig, read_rig
 from tendonfmu.simulate.simulation import plant_of
-
-Data = Mapping[str, Any]
 
 
 def describe_rig(path: Path) -> list[str]:

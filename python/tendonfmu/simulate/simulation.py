@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array
 from tendonfmu.files import counted
-from tendonfmu.simulate.plant import MEASURED, TRUE, Array, Plant, Statistics, refused_by, require_plant
+from tendonfmu.simulate.plant import MEASURED, TRUE, Plant, Statistics, refused_by, require_plant
 from tendonfmu.simulate.rig import Rig
 
 Table = dict[str, NDArray[np.float64]]

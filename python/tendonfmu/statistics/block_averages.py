@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.errors import InputError
-
-Numbers = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 NO_BLOCK = -1
 

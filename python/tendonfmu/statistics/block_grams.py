@@ -9,17 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.statistics.column_products import PIECE, Products
-
-Numbers = NDArray[np.float64]
-Array = NDArray[Any]
-Indices = NDArray[np.intp]
 
 MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
 _SMALLEST = 1e-100  # of a scale; its square does not underflow

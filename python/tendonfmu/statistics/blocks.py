@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
 
 
 @dataclass(frozen=True)

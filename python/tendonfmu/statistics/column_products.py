@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array, Indices, Numbers
 from tendonfmu.statistics.folds import Folds
 from tendonfmu.statistics.splines import Span, Splines
-
-Numbers = NDArray[np.float64]
-Array = NDArray[Any]
-Indices = NDArray[np.intp]
 
 PIECE = 4096  # rows at a time
 

@@ -7,10 +7,9 @@ standard deviation (Σ_d (w_d·φ)²)^½.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
 
 MOST = 4  # directions; docs/reference/semantics.md#uncertainty
 _UNSEEN = 1e-12  # of the largest second moment; the motion does not show combinations of parts with less

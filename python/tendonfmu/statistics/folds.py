@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Indices
 from tendonfmu.statistics.blocks import BlockSeries
-
-Indices = NDArray[np.int64]
 
 STRETCH = 2.0  # s; longer than the correlation of a bias between the splines' knots
 MOST_FOLDS = 8

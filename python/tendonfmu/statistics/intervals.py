@@ -10,10 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaincinv  # not scipy.stats, which takes a second to import
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
+
 Statistic = Callable[[Numbers], Numbers]
 
 CONFIDENCE = 0.95

@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.statistics.interval import Interval
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
 LEVEL = 0.95

@@ -7,9 +7,8 @@ Outside the knots the position is constant.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from tendonfmu.arrays import Numbers
 
 
 def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:

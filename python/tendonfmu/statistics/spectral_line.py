@@ -15,12 +15,12 @@ from scipy.ndimage import median_filter
 from scipy.special import gammainccinv
 from scipy.stats import gamma
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.statistics.whitening import Whitener
 
 if TYPE_CHECKING:
     from tendonfmu.statistics.blocks import BlockSeries
 
-Numbers = NDArray[np.float64]
 
 LOWEST = 0.5  # Hz; slower oscillations belong to the bias
 BACKGROUND = 121  # bins of the smooth spectrum on either side

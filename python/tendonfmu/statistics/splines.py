@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from tendonfmu.arrays import Array, Numbers
 from tendonfmu.statistics.blocks import BlockSeries
 
-Numbers = NDArray[np.float64]
-Array = NDArray[Any]
 Splines = Any  # scipy.sparse.csr_array [B, s], which comes without types
 
 KNOTS = 2.0  # s; the splines follow a bias at this pace

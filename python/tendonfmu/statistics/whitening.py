@@ -9,16 +9,11 @@ generalised least squares (Cochrane and Orcutt, 1949).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.statistics.blocks import BlockSeries
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Array = NDArray[Any]
 
 # the mean of these blocks, first to last before the present one, is a regressor
 WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), (65, 128))

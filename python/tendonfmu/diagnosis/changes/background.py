@@ -13,13 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.remainder_features import Features, features
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.model import moment_arms
-
-Numbers = NDArray[np.float64]
-Array = NDArray[Any]
 
 GROUPS = (
     "angle",

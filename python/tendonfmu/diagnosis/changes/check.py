@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
-
-Numbers = NDArray[np.float64]
 
 SHARED = 50  # consecutive samples that two recordings of a moving finger never share by chance
 APART = 2.0  # times the spread of angles, forces

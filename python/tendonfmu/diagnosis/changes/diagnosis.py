@@ -6,15 +6,14 @@ numbers, or a term that it lacks, in the new recordings only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.cause_search import residual_alone
 from tendonfmu.diagnosis.changes.evidence import change_evidence
 from tendonfmu.diagnosis.changes.gain import interval_of
@@ -48,10 +47,6 @@ from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Data = Mapping[str, Any]
 
 SIGNALS = "signals, delay and presliding"
 PHASES = {SIGNALS: 20.0, "contact": 8.0, "changes": 20.0, "gain on unseen data": 20.0}

@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.changes.search import ChangeSearch
 from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.evidence import BINS, FEWEST, coordinate_of, shown, standard_errors
 from tendonfmu.diagnosis.result import Evidence
-
-Numbers = NDArray[np.float64]
 
 
 def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple[Evidence, ...]:

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.statistics import Interval
-
-Numbers = NDArray[np.float64]
 
 
 def gain_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> tuple[float, float]:

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.changes.trend import slope
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
@@ -34,7 +33,6 @@ from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Job, rows_of, run_jobs
 
-Numbers = NDArray[np.float64]
 File = str | os.PathLike[str]
 
 WEEK = 7.0 * 86400.0  # s

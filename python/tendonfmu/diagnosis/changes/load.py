@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.result import ChangedSize, SteadyLoad
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import Interval, gain_interval, make_folds
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
 LEVEL = 0.01  # largest share of stretches whose mean is on the other side

@@ -9,15 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.hypotheses import EVERYWHERE, HERE, SHARED, SOMEWHERE, Hypothesis
 from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
 from tendonfmu.model import native
-
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 
 _LAW = re.compile(
     r"(?:joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"

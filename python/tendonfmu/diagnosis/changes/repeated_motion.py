@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
 
+from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.diagnosis.series import Series
 
-Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-Array = NDArray[Any]
 
 SAME = 0.02  # of the angles' spread: a controller follows the same reference this closely
 ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little

@@ -7,14 +7,14 @@ description has, or a term that it lacks. The error is that on held-out parts of
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
 from tendonfmu.diagnosis.cause_selection import CERTAIN, Judged, Selection, is_alike, names_with
@@ -32,11 +32,6 @@ from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Folds, Grams, Products, make_folds
 from tendonfmu.tasks import Step
-
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Array = NDArray[Any]
-Data = Mapping[str, Any]
 
 MOST_CHANGES = 4
 MOST_REFUSED = 4

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.changes.numbers import changed
 from tendonfmu.diagnosis.changes.search import Change, ChangeSearch
 from tendonfmu.diagnosis.effects.description_edit import data_number
@@ -20,8 +19,6 @@ from tendonfmu.diagnosis.size import NBSP, quantity, size_of
 from tendonfmu.model import native
 from tendonfmu.statistics import Interval
 
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 TWO_SIDED = 1.96
 LEAST_OF_NOW = 0.05  # of the present value: a change from a smaller number is not reported as a share of it
 _OTHER_SIDE = {"positive": "negative", "negative": "positive"}

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.changes.search import Change, ChangeSearch
 from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
-
-Numbers = NDArray[np.float64]
 
 
 def sizes_by_recording(

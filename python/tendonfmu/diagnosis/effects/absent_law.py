@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.diagnosis.effects.candidate import Column, Data, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Column, Variant
 from tendonfmu.diagnosis.effects.description_edit import ABSENT, Edit, magnitudes_of
 from tendonfmu.estimate import get_number
 from tendonfmu.model import DEFAULTS

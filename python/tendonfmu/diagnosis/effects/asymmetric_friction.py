@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Variant
 from tendonfmu.diagnosis.effects.description_edit import SIDES, Edit, apply_edits, law_columns, magnitudes_of, sides_at
 from tendonfmu.diagnosis.effects.friction_law_places import is_asymmetric, kind_shape, law_path, laws_at, places_with
 from tendonfmu.diagnosis.span import Span

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.effects.description_edit import Edit, add_to_number, apply_edits, raise_to
 from tendonfmu.diagnosis.span import Span
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-
-Data = Mapping[str, Any]
 
 LEAST_SHARE = 0.01  # of the expected size: a fit could not distinguish a smaller number from an absent one
 

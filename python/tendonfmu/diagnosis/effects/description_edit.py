@@ -11,9 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tendonfmu.arrays import Data
 from tendonfmu.estimate import MAGNITUDES, get_number, own_copy, set_number
-
-Data = Mapping[str, Any]
 
 ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in their order
 _NEXT_TO_NONE = 1e-15  # of the force, or N·m

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.effects.absent_law import absent_law, law_shares
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Data, Place, Variant
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Variant
 from tendonfmu.diagnosis.effects.description_edit import POINTS, Edit, apply_edits
 from tendonfmu.diagnosis.effects.friction_law_places import law_path, passes
 from tendonfmu.diagnosis.span import Span

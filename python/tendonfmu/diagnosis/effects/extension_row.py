@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from tendonfmu.diagnosis.effects.candidate import Column, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Column, Place, Variant
 from tendonfmu.diagnosis.effects.friction_law_places import next_row, row
 from tendonfmu.model import MAGNITUDES
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.effects.candidate import Place
 from tendonfmu.diagnosis.effects.description_edit import magnitudes_of, sides_at
 from tendonfmu.model import Effect, effects, moment_arms, number_of
 
-Data = Mapping[str, Any]
 KINDS = ("friction", "load_friction", "edge_friction", "pulley_friction")
 
 

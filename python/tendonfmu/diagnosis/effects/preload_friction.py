@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Place, Variant
 from tendonfmu.diagnosis.effects.extension_row import row_variant
 from tendonfmu.diagnosis.effects.friction_law_places import passes, row_places, without_rows
 from tendonfmu.diagnosis.span import Span

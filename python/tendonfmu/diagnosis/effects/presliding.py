@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Place, Variant
 from tendonfmu.diagnosis.effects.extension_row import secant_variant
 from tendonfmu.diagnosis.effects.friction_law_places import row_places, rubbing_joints, rubbing_tendons, thresholds
 from tendonfmu.diagnosis.span import Span

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.effects.absent_law import absent_law
-from tendonfmu.diagnosis.effects.candidate import Candidate, Data, Place, Variant, no_shape
+from tendonfmu.diagnosis.effects.candidate import Candidate, Place, Variant, no_shape
 from tendonfmu.diagnosis.effects.friction_law_places import law_path, passes
 from tendonfmu.model import effects
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Variant
 from tendonfmu.diagnosis.effects.description_edit import law_columns
 from tendonfmu.diagnosis.effects.extension_row import row_variant
 from tendonfmu.diagnosis.effects.friction_law_places import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Place, Variant
 from tendonfmu.diagnosis.effects.extension_row import secant_variant
 from tendonfmu.diagnosis.effects.friction_law_places import without_rows
 from tendonfmu.diagnosis.span import Span

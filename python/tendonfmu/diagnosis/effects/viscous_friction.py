@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Data, Place, Variant
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Variant
 from tendonfmu.diagnosis.effects.description_edit import law_columns
 from tendonfmu.diagnosis.effects.friction_law_places import all_sides, kind_shape, law_path, laws_at, places_with
 from tendonfmu.diagnosis.span import Span

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.experiments.menu import Entry, entry_from_json
 from tendonfmu.diagnosis.experiments.motion import Performed, perform
 from tendonfmu.errors import InputError
-
-Numbers = NDArray[np.float64]
 
 REPORT = "diagnosis.json"
 FORMAT = "tendonfmu-diagnosis-1"

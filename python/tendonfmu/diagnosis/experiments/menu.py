@@ -11,14 +11,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.span import Span
 from tendonfmu.errors import InputError
 from tendonfmu.model import moment_arms, pretension_vector
-
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 
 LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded

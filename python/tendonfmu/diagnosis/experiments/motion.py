@@ -5,22 +5,19 @@ The motion is for the table that a robot or a rig runs, and for the recording th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.experiments.menu import Entry, Section, own_tension
 from tendonfmu.excite import Excitation, Plan, plan_excitation
 from tendonfmu.model import balanced_forces, moment_arms
 from tendonfmu.recordings import FitRecording, Recording, model_alone
 from tendonfmu.statistics import quintic
-
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 
 _SPREAD = (0.75, 1.35)  # times the frequency of the swing, of the first and last independent change of tensions
 _CLOSE = 1e-9  # of the largest singular value: smaller ones mean dependent moment arms

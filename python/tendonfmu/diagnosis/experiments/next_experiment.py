@@ -10,17 +10,17 @@ discriminating between two rival models", Biometrika 62 (1975).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.sparse import identity
 from scipy.sparse.linalg import splu
 
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns
 from tendonfmu.diagnosis.effects.candidate import Candidate
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
@@ -35,8 +35,6 @@ from tendonfmu.model import NativeError, moment_arms
 from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
 from tendonfmu.statistics import KNOTS, regular_blocks
 
-Numbers = NDArray[np.float64]
-Data = Mapping[str, Any]
 Progress = Callable[[int, int], None]
 
 VISIBLE = 0.33  # rms of what is left over that of the noise: about a tenth of its variance, found in 49 of 50 cases
