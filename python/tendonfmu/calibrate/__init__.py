@@ -4,6 +4,14 @@
 present and write the results.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from . import text
+    from .calibration import DIAGNOSIS, Calibration, Options, calibrate
+    from .files import PAGE, REPORT, check_folder, write_calibration
+    from .report import rms_of
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,5 +1,13 @@
 """The demo: five chapters on built-in data, and one page at the end (`tendonfmu demo`)."""
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .demo import Story
+    from .page import write_story
+    from .report import story_report
+    from .text import chapter_lines, chapter_tables, file_lines
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,6 +4,22 @@
 and `counting` compare decisions with labels; `summary` and `score_report` report the result.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from . import contact_at_rest, score_report, tune_report
+    from .alarm_level import least_hours, rate_limit
+    from .bounds import tail_levels
+    from .counting import GRACE, DetectionScore, Event, pooled, score_detection
+    from .free_motion import SETTLING, FreeRun, free_parts, require_no_contact
+    from .push_sizes import by_size
+    from .run import Subject, Track, run_track
+    from .score_report import Scored
+    from .scoring import check_outputs, score_recordings
+    from .summary import RocPoint, Summary
+    from .support import NotEnough
+    from .tuning import ContactTuning, TuneWarning
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

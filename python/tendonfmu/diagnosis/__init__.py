@@ -8,6 +8,40 @@
 - `campaign` runs many cases.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .campaign.campaign import How, collect, run_campaign, still_to_do
+    from .campaign.cases import python_function, read_cases
+    from .campaign.rates import EFFECT_HEADINGS, HEADINGS, by_effect, campaign_report, markdown, rates, rates_by_part
+    from .cause_search import predicted_of, series_of
+    from .changes.history import History, Line, diagnose_history, share_of
+    from .diagnosis import diagnose
+    from .effects import CANDIDATES
+    from .effects.friction_law_places import thresholds
+    from .experiments.discrimination import discriminating_motion
+    from .extension_fit import FitSettings, learn_numbers
+    from .gain import residual_of, squared_residual
+    from .reported import CONTACT, TITLES, UNKNOWN, reported_causes
+    from .result import (
+        Cause,
+        ChangedSize,
+        DetectionGain,
+        Diagnosis,
+        Event,
+        Evidence,
+        Experiment,
+        FoundPlace,
+        Invisible,
+        ResidualView,
+        Where,
+    )
+    from .search import events_of, without_blocks
+    from .series import make_grid
+    from .signal_choice import estimation_recordings
+    from .size import NBSP, quantity, size_at
+    from .sliding import settled, without_stuck
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,6 +4,13 @@
 them and judges the result.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from . import training_motion
+    from .excitation import Excitation, Plan, plan_excitation
+    from .training_motion import ExciteResult, read_subject
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -6,6 +6,27 @@ of each value for error messages, `finite_numbers` replaces numbers that JSON do
 a number with its noun, and `templates` reads templates of HTML.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .counting import are, counted
+    from .extras import require_extra
+    from .finite_numbers import finite
+    from .frames import frame_of, is_frame, table_of_frame
+    from .json_node import Node, Refusal, read_json
+    from .tables import (
+        FORMATS,
+        Table,
+        check_format,
+        check_output_format,
+        csv_lines,
+        read_table,
+        write_blocks,
+        write_table,
+    )
+    from .templates import html_template
+    from .writing import check_output, check_output_folder, in_use, is_about, remove_left_behind, whole_file, write_text
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,6 +4,30 @@
 `running` runs a description or an FMU over a recording.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .documentation import render_documentation
+    from .fmpy_client import run_fmu
+    from .fmu_report import fmu_report
+    from .model_variables import NOT_IN_XML, VariableTable, elements, group_sizes, read_table, units_of
+    from .packaging import (
+        build_fmu,
+        draw_pictures,
+        find_binaries,
+        guid,
+        licenses,
+        members,
+        model_description,
+        model_identifier,
+        pack,
+        package_file,
+    )
+    from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
+    from .reference_results import bridged_rows, reference_run, related_members
+    from .running import check_model, columns_of, finger_of, outputs_of, run_model, summary
+    from .terminals import terminals_and_icons
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -3,6 +3,16 @@
 A command of `cli` parses, calls a function of this package, writes and prints.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .building import build
+    from .detecting import ScoreResult, ScoreWarning, TuneResult, score, tune
+    from .diagnosing import Diagnosis, DiagnosisWarning, diagnose
+    from .fitting import FitInterrupted, FitResult, fit
+    from .live import Runner, Sample
+    from .running import RunResult, run
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -5,6 +5,12 @@ model, `left_out` lists what a description cannot hold, and `finger_import` puts
 `number_export` decides what MJCF can express, `xml_source` changes the XML.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .finger_import import ImportSettings, import_finger
+    from .number_export import export_numbers
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

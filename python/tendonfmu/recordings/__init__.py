@@ -5,6 +5,49 @@ and if not, why. `smoothing`, `prepared` and `residuals` prepare them for a fit 
 leaves unexplained.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .check_report import check_report, recording_report, refusal_report
+    from .converters import convert_file
+    from .converters.inspection import Inspection, inspect_log
+    from .converters.inspection_text import clock_line, field_rows, inspection_document, proposal_rows, time_factor
+    from .converters.one_joint_description import (
+        describe_joint,
+        describe_recorded_joint,
+        description_text,
+        joint_description,
+    )
+    from .converters.proposal import Proposal, propose
+    from .converters.table import Conversion, convert_table
+    from .faults import gaps
+    from .match import UNFIT_FOR_SEARCH, admit, belongs
+    from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences
+    from .recording import (
+        GROUP_PER,
+        LABEL,
+        Recording,
+        RecordingSource,
+        flagged_stretches,
+        listed_sources,
+        read_recording,
+        read_recordings,
+    )
+    from .residuals import (
+        BiasSettings,
+        Model,
+        Residuals,
+        bias_settings,
+        consistency,
+        delayed_torque,
+        model_alone,
+        rms,
+        track,
+        whiteness,
+    )
+    from .signal_noise import FEWEST, joint_position_noise
+    from .smoothing import Signals, smoothing_of, zero_phase
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,6 +4,16 @@
 `ssp` package it for other simulators.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .fmu_packaging import build_plant_fmu
+    from .plant import INTEGRATORS, Plant, require_plant
+    from .rig import Rig, description_files, read_rig
+    from .rig_format import is_rig
+    from .rig_summary import describe_rig
+    from .simulation import simulate
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

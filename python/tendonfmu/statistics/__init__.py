@@ -5,6 +5,24 @@ out (`folds`). Columns are judged by their Gram matrices (`column_products`, `bl
 (`whitening`), and counts and measurements get an interval (`intervals`, `paired_gain`, `effective_number`).
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from . import error_directions, intervals, paired_gain, quintic
+    from .block_averages import BlockSums, SampleBlocks, regular_blocks
+    from .block_grams import Grams, standard_error
+    from .blocks import BlockSeries
+    from .column_products import Products
+    from .effective_number import effective_samples, sample_weights
+    from .folds import FEWEST_STRETCHES, STRETCH, Folds, make_folds
+    from .interval import Interval
+    from .intervals import Estimate
+    from .paired_gain import BlockIndex, blocks_of, gain_interval
+    from .random_numbers import LARGEST_SEED, Draws
+    from .spectral_line import Line, find_lines
+    from .splines import KNOTS, TRENDS, Span, Splines, basis, bias_splines, constant_bias, residual_of, without
+    from .whitening import Whitener, whitener
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,6 +4,14 @@
 step in a folder, and `jobs` calls a function for many inputs, here or on the workers of a cluster.
 """
 
-import lazy_loader
+from typing import TYPE_CHECKING
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from tendonfmu.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from .interruption import ended_by_signals, uninterrupted
+    from .jobs import ROWS, Job, Row, rows_of, run_jobs, waiting_jobs, worker_count, workers_of
+    from .phases import Phases, PhaseState, Step
+    from .steps import FOLDER, Steps, digest_of, digest_of_file, forget_steps
+
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
