@@ -2,20 +2,21 @@
 # Builds the source distribution, and from it (not from the tree) the wheels for Linux x86-64; tries each in a fresh
 # environment where there is no compiler, on Python 3.10 to 3.13: tools/build_wheels.sh [FOLDER]     default: build/wheels
 #
-# FOLDER/dist takes the results. zig compiles against an old C library (GLIBC) and links the C++ library in; auditwheel
-# confirms the tag. Needs .venv with requirements-wheel.lock, and a SUNDIALS (docs/reference/packages.md).
+# Sets up what is missing, as ./run does. FOLDER/dist takes the results. zig compiles against an old C library (GLIBC) and
+# links the C++ library in; auditwheel confirms the tag.
 #   PYTHONS   interpreters to build and try with; default: what is found of python3.10 to python3.13
 #   EXTRAS    extras installed and imported with the last of them: `logs,mujoco,campaign,notebook`; default: none
 # Exit status: 0 all built, tried and alike; anything else: something failed, or no interpreter was found.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. tools/setup.sh
 root=$PWD
 glibc=2.17
 policy=manylinux_2_17_x86_64
 python=$root/.venv/bin/python
 output=$(realpath -m "${1:-build/wheels}")
 
-say() { printf '%s\n' "$*"; }
+say() { printf '%s\n' "$*"; } # to standard output: this is a report
 
 # timed WHAT COMMAND...: its output is shown only if it fails.
 timed() {
@@ -131,6 +132,10 @@ tried() {
     --rig examples/rigs/index_finger.json >"$output/tried-$2.json"
 }
 
+set_up_system run
+set_up_sundials
+set_up_python
+set_up_extra wheel
 mkdir -p "$output"
 rm -rf "$output"/tried-*.json
 scratch=$(mktemp -d)

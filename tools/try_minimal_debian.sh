@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# Tries what the pages promise on a fresh machine: makes a minimal Debian on the spot (mmdebstrap, chroot), with this
+# machine's package settings and nothing else, and runs there, each in a fresh clone of the last commit,
+#   - the two commands of README.md,
+#   - the recipe of docs/reference/packages.md.
+# tools/try_minimal_debian.sh [FOLDER]     default: a temporary folder, removed at the end
+# Needs root. Exit status: 0 all succeeded.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. tools/setup.sh
+
+suite=bookworm
+root=${1:-$(mktemp -d)}
+
+# What pip and apt of this machine are told: mirrors, certificates, proxies. No package comes with it.
+package_settings() {
+  local path
+  for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/apt/keyrings \
+    /usr/share/keyrings /etc/ssl/certs/ca-certificates.crt /etc/pip.conf /root/.config/pip /root/.netrc /etc/resolv.conf /etc/hosts; do
+    if [ -e "$path" ]; then echo "$path"; fi
+  done
+}
+
+settings_of_environment() {
+  env | grep -iE '^(PIP_[A-Z_]*|https?_proxy|no_proxy|SSL_CERT_FILE|REQUESTS_CA_BUNDLE|CURL_CA_BUNDLE)=' | grep -v '^PIP_FIND_LINKS=' || true
+}
+
+make_debian() {
+  local sources
+  sources=$(find /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list -type f 2>/dev/null | head -n 1)
+  mmdebstrap --variant=minbase "$suite" "$root" ${sources:+"$sources"}
+  package_settings | xargs tar -ch 2>/dev/null | tar -x -C "$root"
+}
+
+# in_debian COMMAND: in a namespace of its own, so that no mount outlives it.
+in_debian() {
+  local settings
+  mapfile -t settings < <(settings_of_environment)
+  unshare --mount bash -euo pipefail -c '
+    mount -t proc proc "$0/proc" && mount --rbind /sys "$0/sys" && mount --rbind /dev "$0/dev"
+    exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root CI="${CI:-}" "${@:2}" bash -euo pipefail -c "$1"
+  ' "$root" "$1" "${settings[@]}" </dev/null
+}
+
+fresh_clone() { git clone --quiet --no-hardlinks . "$root/root/$1"; }
+
+# The first block of commands of a page.
+commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed 's/^    //'; }
+
+trial() {
+  local name=$1 page=$2 started=$SECONDS
+  fresh_clone "$name"
+  echo "--- $page"
+  commands_of "$page"
+  in_debian "cd /root/$name; set -x; $(commands_of "$page")"
+  echo "--- $page: done in $((SECONDS - started)) s"
+}
+
+if [ "$(id -u)" -ne 0 ]; then die "needs root: chroot and mounts"; fi
+if ! command -v mmdebstrap >/dev/null; then quietly "installing mmdebstrap" apt_install mmdebstrap; fi
+if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$root"' EXIT; fi
+quietly "making a minimal Debian" make_debian
+trial wheel docs/reference/packages.md
+trial readme README.md
