@@ -1,0 +1,101 @@
+"""What tests want beyond what `./run` installs: asked for here alone, and no failure where it is absent.
+
+A test that needs a part is skipped without it. The reason says what is not tested, and where the part comes from:
+
+    mujoco = require("mujoco")              # at the top of a module, or in a test: the imported package, or the path
+    @needs("valgrind")                      # of one test
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from repository_paths import ROOT
+
+DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something optional; `find` returns it, or None."""
+
+    untested: str  # what is not tested without it
+    source: str  # where it comes from
+    find: Callable[[], Any]
+
+
+def _package(untested: str, name: str, source: str) -> Part:
+    def find() -> Any:
+        try:
+            return importlib.import_module(name)
+        except (ImportError, OSError):  # OSError: a library that the package wants is not there
+            return None
+
+    return Part(untested, source, find)
+
+
+def _program(untested: str, source: str, *names: str) -> Part:
+    return Part(untested, source, lambda: next(filter(None, map(shutil.which, names)), None))
+
+
+def _folder(untested: str, path: Path) -> Part:
+    return Part(untested, str(path), lambda: path if path.is_dir() else None)
+
+
+PARTS = {
+    "mujoco": _package("fingers of MuJoCo", "mujoco", "requirements-foreign.lock"),
+    "ecos": _package("our FMUs in ecos", "ecospy", "requirements-coupling.lock and the library libtbb12"),
+    "libcosim": _package("our FMUs in libcosim", "libcosimpy", "requirements-coupling.lock"),
+    "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "requirements-coupling.lock"),
+    "pythonfmu3": _package("FMUs of pythonfmu3", "pythonfmu3", "requirements-coupling.lock"),
+    "fmutool": _program("our FMUs in containers of the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmucontainer"),
+    "fmi-sim": _program("our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"),
+    "java": _program("our FMUs in FMI4j and Maestro", "a Java development kit and Maven", "java"),
+    "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
+    "knockpy": _package("rivals of the diagnosis", "knockpy", "requirements-diagnosis-peers.lock"),
+    "data": _folder("measured machines", DATA),
+    "davinci data": _folder("the da Vinci tools", DATA / "davinci_tool"),
+    "emps data": _folder("the carriage EMPS", DATA / "emps"),
+    "foreign data": _folder("recordings of foreign fingers", DATA.parent / "foreign"),
+    "browser": _program("pages in a browser", "Debian: chromium", *BROWSERS),
+    "pkg-config": _program("the libraries as pkg-config offers them", "Debian: pkg-config", "pkg-config"),
+    "valgrind": _program("memory as valgrind sees it", "Debian: valgrind", "valgrind"),
+    "wine": _program("Windows binaries", "Debian: wine64", "wine64", "wine"),
+    "qemu": _program("binaries for aarch64", "Debian: qemu-user-static", "qemu-aarch64-static"),
+    "nm": _program("symbols of the binaries", "Debian: binutils", "nm"),
+    "objdump": _program("code of the binaries", "Debian: binutils", "objdump"),
+    "readelf": _program("what the binaries need", "Debian: binutils", "readelf"),
+    "git": _program("what git tracks", "Debian: git, and a checkout", "git"),
+    "localedef": _program("locales with a decimal comma", "Debian: locales", "localedef"),
+}
+
+
+@functools.cache
+def _found(name: str) -> Any:
+    return PARTS[name].find()
+
+
+def _reason(name: str) -> str:
+    return f"NOT TESTED: {PARTS[name].untested} ({name}; {PARTS[name].source})"
+
+
+def require(name: str) -> Any:
+    """Return a part; the test, or the module that asks for it, is skipped where it is not there."""
+    if _found(name) is None:
+        pytest.skip(_reason(name), allow_module_level=True)
+    return _found(name)
+
+
+def needs(*names: str) -> pytest.MarkDecorator:
+    missing = [name for name in names if _found(name) is None]
+    return pytest.mark.skipif(bool(missing), reason="; ".join(map(_reason, missing)))
