@@ -16,13 +16,17 @@ root=${1:-$(mktemp -d)}
 package_settings() {
   local path
   for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/apt/keyrings \
-    /usr/share/keyrings /etc/ssl/certs/ca-certificates.crt /etc/pip.conf /root/.config/pip /root/.netrc /etc/resolv.conf /etc/hosts; do
+    /usr/share/keyrings /etc/pip.conf /root/.config/pip /root/.netrc /etc/resolv.conf /etc/hosts; do
     if [ -e "$path" ]; then echo "$path"; fi
   done
 }
 
+# The certificates of this machine have a place of their own: the package ca-certificates writes the usual file anew.
+certificates=/etc/ssl/certs/ca-certificates.crt
+
 settings_of_environment() {
-  env | grep -iE '^(PIP_[A-Z_]*|https?_proxy|no_proxy|SSL_CERT_FILE|REQUESTS_CA_BUNDLE|CURL_CA_BUNDLE)=' | grep -v '^PIP_FIND_LINKS=' || true
+  env | grep -iE '^(PIP_[A-Z_]*|https?_proxy|no_proxy)=' | grep -vE '^(PIP_FIND_LINKS|PIP_CERT)=' || true
+  if [ -e "$certificates" ]; then printf '%s=/etc/machine-certificates.crt\n' PIP_CERT SSL_CERT_FILE REQUESTS_CA_BUNDLE; fi
 }
 
 make_debian() {
@@ -30,6 +34,7 @@ make_debian() {
   sources=$(find /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list -type f 2>/dev/null | head -n 1)
   mmdebstrap --variant=minbase "$suite" "$root" ${sources:+"$sources"}
   package_settings | xargs tar -ch 2>/dev/null | tar -x -C "$root"
+  if [ -e "$certificates" ]; then cp "$certificates" "$root/etc/machine-certificates.crt"; fi
 }
 
 # in_debian COMMAND: in a namespace of its own, so that no mount outlives it.
