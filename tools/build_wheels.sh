@@ -146,6 +146,11 @@ if [ "${#pythons[@]}" -eq 0 ]; then
   say "FAILED: no Python 3.10 to 3.13 found; name some in PYTHONS"
   exit 1
 fi
+# An environment of each: a system's Python may be without pip.
+for index in "${!pythons[@]}"; do
+  "${pythons[$index]}" -m venv "$scratch/python-$index"
+  pythons[index]=$scratch/python-$index/bin/python
+done
 
 make_compilers
 make_constraints
