@@ -25,9 +25,9 @@ from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import read_map
-from tendonfmu.recordings.converters.log_file import FORMATS
+from tendonfmu.recordings.converters.log import FORMATS
 from tendonfmu.recordings.converters.one_joint import central_velocity
-from tendonfmu.recordings.converters.one_joint_description import starting_numbers
+from tendonfmu.recordings.converters.one_joint import starting_numbers
 from tendonfmu.recordings.converters.table import convert_table
 
 EXAMPLE = ROOT / "examples" / "one_joint"
