@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .check_report import check_report, recording_report, refusal_report
     from .converters import convert_file
     from .converters.inspection import Inspection, inspect_log
     from .converters.one_joint import describe_joint, describe_recorded_joint, description_text, joint_description
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from .converters.table import Conversion, convert_table
     from .faults import gaps
     from .match import UNFIT_FOR_SEARCH, admit, belongs
+    from .match_text import check_report, recording_report, refusal_report
     from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences
     from .recording import (
         GROUP_PER,

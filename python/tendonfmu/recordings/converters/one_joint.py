@@ -32,8 +32,8 @@ from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.model import DEFAULTS
 from tendonfmu.recordings.converters.column_map import Joint
+from tendonfmu.recordings.faults import value_step
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.signal_noise import value_step
 
 if TYPE_CHECKING:
     from tendonfmu.recordings.converters.table import ConvertedLog
