@@ -1,4 +1,4 @@
-"""How noisy the joint positions and joint torques of a recording are, as `position_filter.noise` needs it.
+"""How noisy the joint positions of a recording are, as `position_filter.noise` needs it.
 
 The noise is the difference of a sample from the smooth curve through its neighbours. A cubic through the two samples
 before and the two after, at their true times, predicts each sample. The rest is noise if the motion is slow compared
@@ -68,17 +68,6 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
         angles = (position - force * compliance) @ routing.T
         floor = np.sqrt(routing**2 @ (_rounding(position) ** 2 + (_rounding(force) * compliance) ** 2))
     return np.asarray(np.maximum(np.maximum(white_noise(recording.time, angles), floor), LEAST))
-
-
-def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
-    """Estimate the standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample."""
-    # returns [n] (N·m)
-    if isinstance(recording, FitRecording):
-        recording = recording.recording
-    recording.require(len(data["joints"]), len(data["tendons"]), ("tendon_force",))
-    arms, force = moment_arms(data), recording.groups["tendon_force"]
-    floor = np.sqrt((arms**2).T @ _rounding(force) ** 2)
-    return np.asarray(np.maximum(white_noise(recording.time, force @ arms), floor))
 
 
 def white_noise(time: Numbers, values: Numbers) -> Numbers:

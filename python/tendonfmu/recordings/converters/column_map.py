@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, read_json
 from tendonfmu.recordings.converters import units
@@ -112,6 +113,16 @@ class ColumnMap:
     joint: Joint | None = None  # the one-joint machine, or None
     log: LogFormat = field(default_factory=LogFormat)  # format of the log
     resample: Resampling | None = None  # none: only if the columns have several clocks
+
+
+@dataclass(frozen=True)
+class ConvertedLog:
+    """A log that has been converted."""
+
+    columns: dict[str, Numbers]  # columns of a recording, [N] each, in SI
+    map: ColumnMap  # the map that was used
+    velocity_cutoff: float = 0.0  # cut-off of velocities that were computed (Hz); 0 if there are none
+    notes: list[str] = field(default_factory=list)  # what was left out or computed, one sentence each
 
 
 def read_map(path: Path) -> ColumnMap:

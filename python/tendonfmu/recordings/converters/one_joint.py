@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import signal
@@ -31,12 +31,9 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.model import DEFAULTS
-from tendonfmu.recordings.converters.column_map import Joint
+from tendonfmu.recordings.converters.column_map import ConvertedLog, Joint
 from tendonfmu.recordings.faults import value_step
 from tendonfmu.recordings.recording import Recording
-
-if TYPE_CHECKING:
-    from tendonfmu.recordings.converters.table import ConvertedLog
 
 CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters import units
-from tendonfmu.recordings.converters.column_map import ColumnMap, MappedColumn, Resampling, read_map
+from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, MappedColumn, Resampling, read_map
 from tendonfmu.recordings.converters.log import TIME_NAMES, Log, Topic, find_field, open_log
 from tendonfmu.recordings.converters.one_joint import joint_columns
 from tendonfmu.recordings.converters.stamps import nanoseconds
@@ -41,16 +41,6 @@ SMALLEST = {"tendon_position": 1e-5, "joint_position": 1e-3}
 STEPS = (2e-6, 2.0)  # s; usual time from sample to sample
 
 Columns = dict[str, Numbers]  # of a recording, [N] each, in SI
-
-
-@dataclass(frozen=True)
-class ConvertedLog:
-    """A log that has been converted."""
-
-    columns: Columns
-    map: ColumnMap  # the map that was used
-    velocity_cutoff: float = 0.0  # cut-off of velocities that were computed here (Hz); 0 if there are none
-    notes: list[str] = field(default_factory=list)  # what was left out or computed, one sentence each
 
 
 def convert_table(file: Path, map_file: Path) -> ConvertedLog:
