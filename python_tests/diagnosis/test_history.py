@@ -22,7 +22,7 @@ from tendonfmu.diagnosis.changes.history import History, Line, Size, diagnose_hi
 from tendonfmu.diagnosis.changes.trend import slope
 from tendonfmu.diagnosis.result import ChangedSize, Where
 from tendonfmu.errors import InputError
-from tendonfmu.files.finite_numbers import finite
+from tendonfmu.files.json_node import finite
 from tendonfmu.report.diagnosis_text import Names
 from tendonfmu.report.history_files import history_report, write_history
 from tendonfmu.report.history_text import headline, trend_sentence

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -103,15 +102,3 @@ def test_the_servo_s_log_goes_through_the_map(tmp_path: Path, call: Call) -> Non
     assert call("convert", "table", "servo.csv", *options).status == 0
     law = read_finger(tmp_path / "servo.json").data["joints"][0]["friction"]
     assert law["coulomb"] == pytest.approx(0.15, rel=0.05) and law["viscous"] == pytest.approx(0.04, rel=0.15)
-
-
-def test_a_public_finger(tmp_path: Path, call: Call) -> None:
-    """The finger of MyoSim, if somebody has fetched it: included files, degrees, pulleys, five tendons."""
-    package = importlib.util.find_spec("myo_sim")
-    if package is None or not package.submodule_search_locations:
-        pytest.skip("SKIPPED: MyoSim is not there (examples/mujoco/README.md says how to fetch it)")
-    model = Path(package.submodule_search_locations[0]) / "models" / "legacy" / "finger" / "motorfinger_v0.xml"
-    answer = call("import", "mjcf", model, "--joints", "IFadb,IFmcp,IFpip,IFdip", "--tip", "IFtip", "-o", "finger.json")
-    assert answer.status == 0 and "tendon dflx, joint IFdip: moment arm 18 to 27" in answer.err
-    data = read_finger(tmp_path / "finger.json").data
-    assert len(data["tendons"]) == 5 and data["joints"][0]["friction"]["viscous"] == 0.5

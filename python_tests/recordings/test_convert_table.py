@@ -11,7 +11,6 @@ import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import constants
 
 from command import Call
 from map_cases import LOG, SCHEMA, SMALL, TURNING, VALIDATOR, edited, written
@@ -34,32 +33,6 @@ def test_values_become_si(tmp_path: Path) -> None:
     assert found["time"].tolist() == [0.0, 0.002, 0.004]
     assert found["tendon_force[1]"].tolist() == [1.0, 2.0, 3.0]
     assert found["tendon_position[1]"].tolist() == pytest.approx([0.0, 0.001, 0.002], abs=1e-18)
-
-
-# each unit in the constants of scipy, which are those of CODATA and of the definitions
-M, INCH, TURN, MINUTE = 1.0, constants.inch, 2 * constants.pi, constants.minute
-KNOWN_UNITS = [
-    (units.TIME, {"s": 1.0, "ms": constants.milli, "us": constants.micro, "ns": constants.nano, "min": MINUTE}),
-    (units.FORCE, {"N": 1.0, "mN": constants.milli, "kN": constants.kilo, "kgf": constants.kgf, "lbf": constants.lbf}),
-    (units.FORCE, {"gf": constants.kgf * constants.milli}),
-    (units.TORQUE, {"N.m": 1.0, "mN.m": 0.001, "kN.m": 1000.0, "N.mm": 0.001, "N.cm": 0.01}),
-    (units.TORQUE, {"kgf.cm": constants.kgf * constants.centi, "lbf.in": constants.lbf * INCH}),
-    (units.LENGTH, {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": constants.micron, "inch": INCH}),
-    (units.ANGLE, {"rad": 1.0, "mrad": 0.001, "deg": constants.degree, "turn": TURN}),
-    (units.SPEED, {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "m/min": M / MINUTE}),
-    (units.ANGULAR_SPEED, {"rad/s": 1.0, "mrad/s": 0.001, "deg/s": constants.degree, "rpm": TURN / MINUTE}),
-    (units.ANGULAR_SPEED, {"turn/s": TURN}),
-    (units.NONE, {"1": 1.0}),
-]
-
-
-def test_units_are_those_of_scipy() -> None:
-    checked = 0
-    for table, expected in KNOWN_UNITS:
-        for unit, factor in expected.items():
-            assert table[unit] == pytest.approx(factor, rel=1e-14), unit
-            checked += 1
-    assert checked == sum(len(table) for table in {id(table): table for table, _ in KNOWN_UNITS}.values())
 
 
 def random_recording(random: np.random.Generator) -> dict[str, Any]:

@@ -49,16 +49,6 @@ def test_smoothing_does_not_lag_and_keeps_the_motion() -> None:
     assert ends.max() < 5.0 * after.std() + 0.05, "nothing swings in at the ends"
 
 
-def test_a_filter_that_runs_online_would_lag() -> None:
-    """So the measure above can fail."""
-    wave = recording().groups["tendon_position"][:, 0]
-    share = 1.0 - np.exp(-2 * np.pi * 20.0 / RATE)
-    lagging = np.zeros_like(wave)
-    for k in range(1, len(wave)):
-        lagging[k] = lagging[k - 1] + share * (wave[k] - lagging[k - 1])
-    assert late_by(wave, lagging, RATE) == pytest.approx(1.0 / (2 * np.pi * 20.0), rel=0.1)
-
-
 def test_smoothed_samples_are_fewer() -> None:
     raw = recording()
     found = Signals(20.0, 5).recording(raw)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 
 from command import Call
-from map_cases import SCHEMA, TURNING, VALIDATOR, edited, written
+from map_cases import TURNING, VALIDATOR, edited, written
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
@@ -23,16 +22,12 @@ from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.description import read_finger
-from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import read_map
-from tendonfmu.recordings.converters.log_file import FORMATS
-from tendonfmu.recordings.converters.one_joint import central_velocity
-from tendonfmu.recordings.converters.one_joint_description import starting_numbers
+from tendonfmu.recordings.converters.one_joint import central_velocity, starting_numbers
 from tendonfmu.recordings.converters.table import convert_table
 
 EXAMPLE = ROOT / "examples" / "one_joint"
 MEASURED = (ROOT / "docs" / "evidence" / "one_joint.md").read_text(encoding="utf-8")
-PAGE = (ROOT / "docs" / "reference" / "commands" / "convert.md").read_text(encoding="utf-8")
 DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
@@ -228,28 +223,6 @@ def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-
-
-def test_the_page_names_every_key_and_unit() -> None:
-    """In the tables of keys, and in that of units; its maps are sound, the first one is the example's."""
-    keys = set(re.findall(r"`(\w+)`", "\n".join(re.findall(r"^\| `.*$", PAGE, re.MULTILINE))))
-    resample = set(SCHEMA["properties"]["resample"]["properties"])
-    log = set(SCHEMA["properties"]["log"]["properties"])
-    joints = {key for kind in SCHEMA["properties"]["joint"]["oneOf"] for key in kind["properties"]}
-    assert log | joints | resample | set(SCHEMA["$defs"]["time"]["properties"]) <= keys
-    for name in ("time", "force", "torque", "length", "angle", "speed", "angular_speed"):
-        offered = SCHEMA["$defs"][name]["properties"]["unit"]["anyOf"][0]["enum"]
-        common = [unit for unit in offered if unit not in units.STAMPS]
-        assert f"| {name.replace('_', ' ')} | {', '.join(common)} |" in PAGE, name
-    assert all(f"`{stamp}`" in PAGE for stamp in units.STAMPS)
-    assert all(f"`{suffix}`" in PAGE for suffix in FORMATS)
-    for text in blocks("json"):
-        VALIDATOR.validate(json.loads(text))
-    assert json.loads(blocks("json")[0]) == json.loads((EXAMPLE / "map.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.long

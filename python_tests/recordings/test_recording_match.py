@@ -359,42 +359,30 @@ def test_no_advice_is_said_twice(finger: Finger, sound: Recording) -> None:
 
 # --- the commands that fit --------------------------------------------------------------------------------------------
 
-STRANGERS: dict[str, tuple[Spoil, str]] = {
-    "exchanged": (
-        exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7]),
-        'exchange in the map of columns the keys "tendon_position[2]" and "tendon_position[3]"',
-    ),
-    "degrees": (
-        SPOILT["angles in degrees"][0],
-        'at each of "joint_position[1]" to "joint_position[4]": "unit": "deg" in place of "rad"',
-    ),
-    "milliseconds": (SPOILT["time in ms"][0], 'at "time": "unit": "ms" in place of "s"'),
-}
 
-
-@pytest.mark.parametrize("stranger", repeated(STRANGERS, 0))
 @pytest.mark.parametrize(
-    ("command", "output"), [("fit", "f.json"), ("diagnose", "out"), ("tune", "t.json"), ("calibrate", "out")]
+    "arguments",
+    [
+        ("fit", FREE, "?", "-o", "f.json"),
+        ("diagnose", FREE, "?", "-o", "out"),
+        ("tune", FREE, "?", "-o", "t.json"),
+        ("calibrate", FREE, "?", "-o", "out"),
+        ("fit", FREE, "--compare", "?", "-o", "f.json"),
+        ("diagnose", FREE, "--test", "?", "-o", "out"),
+    ],
+    ids=lambda arguments: " ".join(map(str, arguments[::2])),
 )
 def test_a_stranger_is_refused_by_name_before_any_fit(
-    call: Call, tmp_path: Path, sound: Recording, stranger: str, command: str, output: str
+    call: Call, tmp_path: Path, sound: Recording, arguments: tuple[str | Path, ...]
 ) -> None:
-    """Also beside a recording that belongs."""
-    spoil, words = STRANGERS[stranger]
-    file = written(spoil(sound), tmp_path / "stranger.parquet")
-    answer = call(command, INDEX, FREE, file, "-o", output)
+    """Beside a recording that belongs, and where it only judges. "?": the stranger."""
+    file = written(exchanged("tendon_position", [0, 2, 1, 3, 4, 5, 6, 7])(sound), tmp_path / "stranger.parquet")
+    command, *rest = (file if argument == "?" else argument for argument in arguments)
+    answer = call(command, INDEX, *rest)
     assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
-    assert f"{file}: " in answer.err and words in answer.err
-    assert not (tmp_path / output).exists()
-
-
-@pytest.mark.parametrize("command", ["fit", "diagnose"])
-def test_a_stranger_is_refused_where_it_only_judges(call: Call, tmp_path: Path, sound: Recording, command: str) -> None:
-    file = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "stranger.parquet")
-    output = "f.json" if command == "fit" else "out"
-    answer = call(command, INDEX, FREE, "--compare" if command == "fit" else "--test", file, "-o", output)
-    assert answer.status == 2 and f"{file}: tendon_force[2]: " in answer.err, answer
-    assert not (tmp_path / output).exists()
+    assert f"{file}: tendon_position[2]" in answer.err
+    assert 'the keys "tendon_position[2]" and "tendon_position[3]"' in answer.err
+    assert not (tmp_path / arguments[-1]).exists()
 
 
 def test_a_fit_says_itself_what_becomes_of_gaps_and_stuck_sensors(finger: Finger, sound: Recording) -> None:

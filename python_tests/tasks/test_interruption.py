@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -28,7 +27,7 @@ import diagnosis_examples as examples
 from tendonfmu.errors import InputError
 from tendonfmu.report.diagnosis_files import write_diagnosis
 from tendonfmu.report.diagnosis_report import REPORT
-from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted, worker_threads
+from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted
 
 HERE = SUPPORT
 PROMPT = 10.0  # s; on a busy machine
@@ -45,7 +44,6 @@ import diagnosis_examples as examples
 from tendonfmu.diagnosis import diagnosis
 from tendonfmu.report import diagnosis_files
 from tendonfmu.report import diagnosis_page
-from tendonfmu.tasks.interruption import worker_threads
 def ready(): os.write(1, b"ready\\n")
 def brief(): return replace(examples.one_cause(), views=examples.one_cause().views[:1])
 {body}
@@ -65,15 +63,6 @@ def compute(*_, **__):
 def compute(*_, **__):
     matrix = np.ones((400, 400)); ready()
     while True: matrix = np.linalg.svd(matrix)[0]
-""",
-    "threads that compute": """
-def compute(*_, **__):
-    matrix = np.ones((300, 300))
-    def work(_):
-        while True: np.linalg.svd(matrix)
-    with worker_threads(2) as pool:
-        for future in [pool.submit(work, k) for k in range(8)]:
-            ready(); future.result()
 """,
     "a swallowed exception": """
 def compute(*_, **__):
@@ -353,20 +342,3 @@ def test_other_threads_are_left_alone() -> None:
     thread.start()
     thread.join()
     assert found == [130]
-
-
-def test_a_pool_gives_results_and_drops_the_rest_on_an_error() -> None:
-    with worker_threads(2) as pool:
-        assert list(pool.map(abs, range(-3, 0))) == [3, 2, 1]
-    release = threading.Event()
-
-    def fail() -> None:
-        with worker_threads(1) as pool:
-            waiting.extend(pool.submit(release.wait, 60.0) for _ in range(3))
-            raise KeyError
-
-    waiting: list[Future[bool]] = []
-    with pytest.raises(KeyError):
-        fail()
-    assert [future.cancelled() for future in waiting[1:]] == [True, True]
-    release.set()

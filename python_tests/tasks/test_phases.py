@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 
 import pytest
 
@@ -157,9 +156,3 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch, clock: Clock) -> N
 )
 def test_an_estimate_is_coarse(seconds: float | None, words: str) -> None:
     assert time_left(seconds) == words
-
-
-def test_a_display_takes_the_place_of_a_watch() -> None:
-    watch: Callable[[PhaseState], None] = PhaseDisplay(False)
-    with Phases(["reading"], watch).start("reading") as step:
-        assert step(1) is None

@@ -1,9 +1,8 @@
 """How files are read and written: whole or not at all.
 
-`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet), `mcap_table` writes them for
-PlotJuggler and Foxglove, `extras` imports the libraries of the extra `logs`, `json_node` reads JSON and keeps the path
-of each value for error messages, `finite_numbers` replaces numbers that JSON does not allow by null, `counting` writes
-a number with its noun, and `templates` reads templates of HTML.
+`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet, pandas, MCAP), `json_node`
+reads JSON and keeps the path of each value for error messages, `counting` writes a number with its noun, and
+`templates` reads templates of HTML.
 """
 
 from typing import TYPE_CHECKING
@@ -11,18 +10,19 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .counting import are, counted
-    from .extras import require_extra
-    from .finite_numbers import finite
-    from .frames import frame_of, is_frame, table_of_frame
-    from .json_node import Node, Refusal, read_json
+    from .counting import are, counted, percent
+    from .json_node import Node, Refusal, finite, read_json
     from .tables import (
         FORMATS,
         Table,
         check_format,
         check_output_format,
         csv_lines,
+        frame_of,
+        is_frame,
         read_table,
+        require_extra,
+        table_of_frame,
         write_blocks,
         write_table,
     )

@@ -1,4 +1,4 @@
-"""How JSON files are read so that every error message can give the path of the value.
+"""How JSON files are read so that every error message can give the path of the value, and what JSON cannot hold.
 
 The messages are like those of the native reader: `motion.speed[1] = -1: expected ...`. Lists count from 1.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -77,6 +77,17 @@ def shown(value: Any) -> str:
     """Return a value for a message: JSON on one line, at most 60 characters."""
     text = json.dumps(value, ensure_ascii=True)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def finite(value: Any) -> Any:
+    """Replace every number that is not finite by None."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(inner) for inner in value]
+    return value
 
 
 class Node:

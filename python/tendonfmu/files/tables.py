@@ -1,32 +1,40 @@
 """How tables of finite numbers are read and written: exact, whole, with errors by column and row.
 
-CSV and Parquet are read and written, MCAP is written. Rows count from 1, without the line of names.
+CSV, Parquet and pandas tables are read and written, MCAP is written: one topic, with a JSON message for each row, whose
+schema names each column, so that PlotJuggler and Foxglove offer them. Rows count from 1, without the line of names.
 """
 
 from __future__ import annotations
 
 import csv
+import importlib
 import itertools
+import json
 import math
 import os
 import re
+import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.files.counting import are, counted
-from tendonfmu.files.extras import require_extra
-from tendonfmu.files.mcap_table import write_mcap
 from tendonfmu.files.writing import whole_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from typing_extensions import TypeIs
 
 FORMATS = (".csv", ".parquet")
 OUTPUTS = (*FORMATS, ".mcap")
 COMPRESSION = 12  # of Parquet, zstd; a minute of a quantised recording at 500 Hz takes about 1 MB and 1 s
 LONG_COMPRESSION = 3  # of tables that come in several blocks: a third of the time, and 10 % more bytes
+MCAP_TOPIC, MCAP_SCHEMA = "/tendonfmu", "tendonfmu.Table"
+LATEST = 2**63  # ns; readers of MCAP take times as signed 64-bit integers
 
 Table = dict[str, NDArray[np.float64]]
 CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
@@ -34,6 +42,17 @@ CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
 _NUMBER = re.compile(r"[ \t\r\n]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?[ \t\r\n]*")
 _FLAGS = {"true": 1.0, "false": 0.0}
+
+
+def require_extra(module: str, what: str) -> Any:
+    """Import a module of the extra `logs`."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as missing:
+        name = (missing.name or module).split(".")[0]
+        raise InputError(
+            f"{what}: needs the Python package {name}, which is not installed; pip install 'tendonfmu[logs]'"
+        ) from None
 
 
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:
@@ -81,6 +100,59 @@ def check_duplicates(file: Path, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{file}: column {name!r} occurs {names.count(name)} times; expected once")
+
+
+# --- pandas -----------------------------------------------------------------------------------------------------------
+
+
+def is_frame(value: object) -> TypeIs[pd.DataFrame]:
+    """Return whether a value is a pandas DataFrame, without importing pandas."""
+    pandas = sys.modules.get("pandas")
+    return pandas is not None and isinstance(value, pandas.DataFrame)
+
+
+def frame_of(columns: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
+    """Make a DataFrame."""
+    import pandas as pd
+
+    return pd.DataFrame(dict(columns))
+
+
+def table_of_frame(file: Path, frame: pd.DataFrame, check_names: CheckNames, flags: Collection[str] = ()) -> Table:
+    """Read the columns of a DataFrame as finite numbers."""
+    # returns columns [N] in their order
+    if not is_frame(frame):
+        raise InputError(f"{file}: {type(frame).__name__}; expected a pandas DataFrame")
+    names = [str(name) for name in frame.columns]
+    check_duplicates(file, names)
+    wanted = check_names(file, names)
+    table = {
+        name: _frame_numbers(file, name, frame.iloc[:, names.index(name)], flags)
+        for name in (names if wanted is None else wanted)
+    }
+    check_finite(file, table)
+    return table
+
+
+def _frame_numbers(file: Path, name: str, column: pd.Series[Any], flags: Collection[str]) -> NDArray[np.float64]:
+    """Return one column. A missing value becomes NaN."""
+    from pandas.api import types
+
+    kind = column.dtype
+    if types.is_bool_dtype(kind) and name not in flags:
+        raise InputError(f"{file}: column {name}, row 1: {kind} values; expected numbers")
+    if types.is_datetime64_any_dtype(kind) or types.is_timedelta64_dtype(kind):
+        since = f"df[{name!r}]" if types.is_timedelta64_dtype(kind) else f"(df[{name!r}] - df[{name!r}].iloc[0])"
+        raise InputError(
+            f"{file}: column {name}: {kind} values; expected seconds as numbers, such as {since}.dt.total_seconds()"
+        )
+    if types.is_numeric_dtype(kind) and not types.is_complex_dtype(kind):
+        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+    number = (int, float, np.integer, np.floating) + ((bool, np.bool_) if name in flags else ())
+    for row, value in enumerate(column, start=1):
+        if not isinstance(value, number) or (isinstance(value, bool) and name not in flags):
+            raise InputError(f"{file}: column {name}, row {row}: {value!r}; expected a finite number")
+    return column.to_numpy(dtype=np.float64)
 
 
 # --- Parquet ----------------------------------------------------------------------------------------------------------
@@ -211,7 +283,7 @@ def write_blocks(path: str | os.PathLike[str], blocks: Iterable[Mapping[str, NDA
     # blocks: [N]
     file = Path(path)
     check_output_format(file)
-    write = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower(), write_mcap)
+    write = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower(), _write_mcap)
     with whole_file(file) as temporary:
         write(temporary, map(_columns, blocks))
 
@@ -251,3 +323,44 @@ def _write_parquet(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> 
     with pq.ParquetWriter(file, schema, compression="zstd", compression_level=LONG_COMPRESSION) as out:
         for columns in itertools.chain((first, second), rest):
             out.write_table(pa.table(columns, schema=schema))
+
+
+def _write_mcap(file: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    """Write a table."""
+    # blocks: [N]
+    writer_of = require_extra("mcap.writer", str(file))
+    with open(file, "wb") as raw:
+        writer = writer_of.Writer(raw)
+        writer.start(profile="", library="tendonfmu")
+        channel, count = -1, 0
+        for columns in blocks:
+            if channel < 0:
+                channel = _add_channel(file, writer, columns)
+            times = _nanoseconds(file, columns["time"])
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            for at, row in zip(times, rows, strict=True):
+                text = json.dumps(dict(zip(columns, row, strict=True)), separators=(",", ":"), allow_nan=False)
+                writer.add_message(channel, at, text.encode(), at, count)
+                count += 1
+        writer.finish()
+
+
+def _add_channel(file: Path, writer: Any, columns: Mapping[str, NDArray[Any]]) -> int:
+    if "time" not in columns:
+        raise InputError(f"{file}: no column time; expected one, which gives the times of MCAP's messages")
+    properties = {
+        name: {"type": "integer" if column.dtype.kind in "iu" else "number"} for name, column in columns.items()
+    }
+    schema = {"title": MCAP_SCHEMA, "type": "object", "properties": properties}
+    number = writer.register_schema(MCAP_SCHEMA, "jsonschema", json.dumps(schema).encode())
+    return int(writer.register_channel(MCAP_TOPIC, "json", number))
+
+
+def _nanoseconds(file: Path, time: NDArray[Any]) -> list[int]:
+    stamps = np.round(np.asarray(time, dtype=np.float64) * 1e9)
+    if len(stamps) and not (stamps.min() >= 0.0 and stamps.max() < LATEST):
+        raise InputError(
+            f"{file}: time {float(time[int(np.argmin(stamps))]):g} to {float(time[int(np.argmax(stamps))]):g} s; "
+            "MCAP holds times from 0 s on, expected those, or .csv or .parquet"
+        )
+    return [int(stamp) for stamp in stamps]

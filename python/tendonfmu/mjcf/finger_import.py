@@ -14,10 +14,16 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
-from tendonfmu.mjcf.gravity import gravity_rows, holding_torques
+from tendonfmu.mjcf.geometry import (
+    LinkGeometry,
+    MomentArm,
+    gravity_rows,
+    holding_torques,
+    link_geometry,
+    moment_arms,
+    sampled_angles,
+)
 from tendonfmu.mjcf.left_out import left_out
-from tendonfmu.mjcf.link_geometry import LinkGeometry, link_geometry
-from tendonfmu.mjcf.moment_arms import MomentArm, moment_arms, sampled_angles
 from tendonfmu.mjcf.tendon_choice import choose_tendons, drives_of, motors_of, stiffness_of
 from tendonfmu.model import NativeError, native
 
@@ -92,7 +98,7 @@ def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
         "format": FORMAT,
         "name": settings.name or model.name,
         "joints": [_joint(joint) for joint in joints],
-        "tendons": [_tendon(model, each, row, settings) for each, row in zip(tendons, arms, strict=True)],
+        "tendons": [_tendon(model, tendon, row, settings) for tendon, row in zip(tendons, arms, strict=True)],
         "contact": {"threshold": [settings.threshold] * len(joints)},
     }
     if rows:

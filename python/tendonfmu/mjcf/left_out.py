@@ -8,8 +8,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
-from tendonfmu.mjcf.gravity import NONE as WEIGHTLESS
-from tendonfmu.mjcf.gravity import holding_torques
+from tendonfmu.mjcf.geometry import WEIGHTLESS, holding_torques
 from tendonfmu.mjcf.tendon_choice import is_driven, motors_of, moved_velocities
 
 OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a description"

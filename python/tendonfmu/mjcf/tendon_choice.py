@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
-from tendonfmu.mjcf.moment_arms import NONE
+from tendonfmu.mjcf.geometry import NO_ARM
 
 RIGID = 1e9  # N/m; as of a machine with one joint, whose drive counts as rigid
 
@@ -19,11 +19,11 @@ def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numb
     """Return which velocities of the model each tendon moves."""
     # angles: [K, n] (rad); returns [tendons, velocities]
     largest = np.zeros((len(model.tendons), 0))
-    for each in angles[:: max(1, len(angles) // 32)]:
-        model.place(joints, each)
+    for placed in angles[:: max(1, len(angles) // 32)]:
+        model.place(joints, placed)
         size = np.abs(model.tendon_jacobian())
         largest = np.maximum(largest, size) if largest.size else size
-    return np.array(largest >= NONE, dtype=np.bool_)
+    return np.array(largest >= NO_ARM, dtype=np.bool_)
 
 
 def choose_tendons(
@@ -62,7 +62,7 @@ def motors_of(model: CompiledModel, tendon: Tendon) -> list[Joint]:
     return [
         joint
         for joint in model.joints
-        if joint.kind == "slide" and joint.index in driven and row[joint.velocity] >= NONE
+        if joint.kind == "slide" and joint.index in driven and row[joint.velocity] >= NO_ARM
     ]
 
 

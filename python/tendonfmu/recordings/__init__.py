@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .check_report import check_report, recording_report, refusal_report
     from .converters import convert_file
     from .converters.inspection import Inspection, inspect_log
-    from .converters.inspection_text import clock_line, field_rows, inspection_document, proposal_rows, time_factor
-    from .converters.one_joint_description import (
-        describe_joint,
-        describe_recorded_joint,
-        description_text,
-        joint_description,
+    from .converters.one_joint import describe_joint, describe_recorded_joint, description_text, joint_description
+    from .converters.proposal import (
+        Proposal,
+        clock_line,
+        field_rows,
+        inspection_document,
+        proposal_rows,
+        propose,
+        time_factor,
     )
-    from .converters.proposal import Proposal, propose
     from .converters.table import Conversion, convert_table
     from .faults import gaps
     from .match import UNFIT_FOR_SEARCH, admit, belongs
+    from .match_text import check_report, recording_report, refusal_report
     from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences
     from .recording import (
         GROUP_PER,

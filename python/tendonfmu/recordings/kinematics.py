@@ -1,8 +1,9 @@
-"""Whether tendon positions, tendon forces and joint angles satisfy x0 − f0/k = R q, and which correction is needed.
+"""Whether the columns of a recording belong together, and which correction is needed.
 
-The equation holds independent of friction, contact and weight, so it shows wrong columns before any friction is known.
-It shows nothing if a finger has as many joints as tendons and its joint angles are not measured. Offsets of the sensors
-have no effect, since the test uses covariances only.
+Tendon positions, tendon forces and joint angles satisfy x0 − f0/k = R q. The equation holds independent of friction,
+contact and weight, so it shows wrong columns before any friction is known. It shows nothing if a finger has as many
+joints as tendons and its joint angles are not measured. Offsets of the sensors have no effect, since the test uses
+covariances only. Measured velocities belong to the angles if each angle changes by the integral of its velocity.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 
 from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.model import Finger
-from tendonfmu.recordings.faults import TURNS
+from tendonfmu.recordings.faults import TURNS, tendon_angles
+from tendonfmu.recordings.recording import Recording
 
 FEWEST = 200  # samples; a covariance needs at least as many
 MISFIT = 5e-4  # share of variance below which an equation fits: arms and springs are known to 2 % at best
@@ -40,6 +42,10 @@ UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     ),
     "joint_position": ((np.pi / 180, "degrees"), (1e-3, "mrad"), (2 * np.pi, "turns")),
 }
+WINDOW = 0.1  # s over which changes of angles and velocities are compared
+TOGETHER = 0.8  # correlation above which changes belong together
+NEAR = 1.15  # a slope within this factor of a unit's factor shows the unit
+VELOCITY_UNITS = ((np.pi / 180, "degrees/s"), (2 * np.pi / 60, "rpm"), (1e-3, "mrad/s"), (2 * np.pi, "turns/s"))
 
 
 @dataclass(frozen=True)
@@ -274,3 +280,47 @@ def _exchange(groups: Sequence[Sequence[str]], order: Sequence[int]) -> Correcti
     moved = [k for k, source in enumerate(order) if source != k]
     columns = tuple(group[k] for group in groups for k in moved)
     return Correction("exchange", columns, sources=tuple(group[order[k]] for group in groups for k in moved))
+
+
+# --- velocities -------------------------------------------------------------------------------------------------------
+
+
+def velocity_corrections(recording: Recording, finger: Finger) -> Iterator[tuple[Correction, float]]:
+    """Yield corrections of columns of `joint_velocity`, each with the slope of the angle over the integral."""
+    velocity = recording.groups.get("joint_velocity")
+    if velocity is None or len(recording) < FEWEST:
+        return
+    turned, travelled = _changes(recording, finger, velocity)
+    for j in range(velocity.shape[1]):
+        column = f"joint_velocity[{j + 1}]"
+        same = _correlation(turned[:, j], travelled[:, j])
+        others = [abs(_correlation(turned[:, j], travelled[:, k])) for k in range(velocity.shape[1])]
+        best = int(np.argmax(others))
+        if best > j and abs(same) < TOGETHER / 2 and others[best] > TOGETHER:
+            columns = (column, f"joint_velocity[{best + 1}]")
+            yield Correction("exchange", columns, sources=columns[::-1]), same
+        if abs(same) < TOGETHER:
+            continue
+        slope = float(turned[:, j] @ travelled[:, j] / (travelled[:, j] @ travelled[:, j]))
+        if slope < 0.0:
+            yield Correction("sign", (column,), -1.0), slope
+        for factor, unit in VELOCITY_UNITS:
+            if 1.0 / NEAR < abs(slope) / factor < NEAR:
+                yield Correction("scale", (column,), factor, unit), slope
+
+
+def _changes(recording: Recording, finger: Finger, velocity: Numbers) -> tuple[Numbers, Numbers]:
+    """Return the change of each angle and the integral of each velocity over windows, [K, n] rad."""
+    angle = recording.groups.get("joint_position")
+    if angle is None:
+        angle = tendon_angles(recording, finger)
+    step = np.diff(recording.time)
+    every = max(5, round(WINDOW / float(np.median(step))))
+    mean = (velocity[1:] + velocity[:-1]) / 2
+    path = np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(mean * step[:, None], axis=0)])
+    return np.diff(angle[::every], axis=0), np.diff(path[::every], axis=0)
+
+
+def _correlation(one: Numbers, other: Numbers) -> float:
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / size if size > 0.0 else 0.0

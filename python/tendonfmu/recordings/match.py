@@ -16,17 +16,29 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finding, Finger, is_direct_drive
 from tendonfmu.recordings import match_text as text
-from tendonfmu.recordings.channels import (
+from tendonfmu.recordings.faults import (
+    TURNS,
     clipped_channels,
     coarse_channels,
     held_channels,
     read_clock,
+    still_runs,
+    tendon_angles,
 )
-from tendonfmu.recordings.faults import STUCK, TURNS, tendon_angles
-from tendonfmu.recordings.kinematics import EQUATED, FEWEST, GAIN, SAME, Balance, Correction, Repair, repairs, tells
+from tendonfmu.recordings.kinematics import (
+    EQUATED,
+    FEWEST,
+    GAIN,
+    SAME,
+    Balance,
+    Correction,
+    Repair,
+    repairs,
+    tells,
+    velocity_corrections,
+)
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.signal_noise import white_noise
-from tendonfmu.recordings.velocity import velocity_corrections
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
 UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found
@@ -206,9 +218,8 @@ def _serving(finger: Finger, recording: Recording, groups: Mapping[str, Numbers]
     changing = np.ones(len(recording), dtype=bool)
     for values in groups.values():
         for column in values.T:
-            bounds = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
-            for k in np.flatnonzero(recording.time[bounds[1:] - 1] - recording.time[bounds[:-1]] > STUCK):
-                changing[bounds[k] : bounds[k + 1]] = False
+            for begin, end in still_runs(recording.time, column):
+                changing[begin:end] = False
     force = np.abs(groups["tendon_force"])
     pulls = [not tendon.get("bidirectional") for tendon in finger.data["tendons"]]
     taut = ((force >= SLACK * force.max(axis=0)) | ~np.array(pulls)).all(axis=1)

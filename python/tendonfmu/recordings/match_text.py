@@ -1,20 +1,25 @@
-"""What the findings about recordings say: the observation, its probable cause and what to write."""
+"""What the findings about recordings say: the observation, its probable cause and what to write into the map."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.files import are, counted
+from tendonfmu.files import are, counted, percent
 from tendonfmu.model import Finding
-from tendonfmu.recordings.channels import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
+from tendonfmu.recordings.converters import units
+from tendonfmu.recordings.faults import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
-from tendonfmu.recordings.match_map import what_to_set, what_to_write
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording
 
+FORMAT = "tendonfmu-check-1"
+SAME = 1e-6  # relative difference of two factors of one unit
 EQUATION = "position − force/stiffness = moment arms × joint angles"
 _REASONS = {
     "tendon_force": "the force falls where its spring stretches",
@@ -25,36 +30,27 @@ _REASONS = {
 }
 
 
+Entry = Mapping[str, float | str]  # what a column gets in the map: its sign, scale or another column
+
+
 def element(column: str) -> tuple[str, int]:
     """Return the group and the index, from 0, of a column's name."""
     group, index = column.rstrip("]").split("[")
     return group, int(index) - 1
 
 
-def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
-    """Say in one line whether a recording belongs to the finger."""
-    severities = [finding.severity for finding in findings]
-    errors, warnings = severities.count("error"), severities.count("warning")
-    words = "does not belong to this finger as it is" if errors else "belongs to this finger"
-    counts = f"{counted(errors, 'error')}, {counted(warnings, 'warning')}" if findings else "nothing found"
-    length = recording.time[-1] - recording.time[0]
-    return f"{recording.path}: {words}: {counted(len(recording), 'sample')}, {length:.4g} s; {counts}"
-
-
 # --- signs, order, units ----------------------------------------------------------------------------------------------
 
 
-def repair(path: Path, found: Repair) -> Finding:
+def repair(path: Path, fitting: Repair) -> Finding:
     """Describe a correction that makes the equations fit."""
-    correction = found.correction
-    seen = (
-        f"{EQUATION} leaves {_percent(found.misfit)} of the variance unexplained, and {_percent(found.left)} once "
-        "corrected"
-    )
+    correction = fitting.correction
+    before, after = percent(fitting.misfit), percent(fitting.left)
+    seen = f"{EQUATION} leaves {before} of the variance unexplained, and {after} once corrected"
     probably = _cause(correction)
-    if found.alternatives:
-        others = [_in_words(other) for other in found.alternatives[:3]]
-        more = len(found.alternatives) - len(others)
+    if fitting.alternatives:
+        others = [_in_words(other) for other in fitting.alternatives[:3]]
+        more = len(fitting.alternatives) - len(others)
         probably += f", or equally likely {'; or '.join(others)}{f'; or {more} more' if more else ''}"
     return _of_correction(path, correction, seen, probably)
 
@@ -83,19 +79,25 @@ def _of_correction(path: Path, correction: Correction, seen: str, probably: str)
     entries: dict[str, dict[str, float | str]] = {}
     if correction.kind == "exchange":
         entries = {column: {"exchange": source} for column, source in correction.pairs}
+        write = _new_keys(correction)
     else:
         entries = {column: {correction.kind: correction.factor} for column in correction.columns}
-    write = what_to_write(correction)
+        write = _what_to_set(correction.columns, {correction.kind: correction.factor})
     return Finding("error", correction.kind, path, correction.columns, seen, probably, write, entries)
+
+
+def _swaps(correction: Correction) -> list[tuple[str, str]]:
+    """Return the pairs of an exchange that only swaps columns, each once; otherwise none."""
+    sources = dict(correction.pairs)
+    is_swap = all(sources[source] == column for column, source in correction.pairs)
+    return [pair for pair in correction.pairs if pair[0] < pair[1]] if is_swap else []
 
 
 def _in_words(correction: Correction) -> str:
     if correction.kind == "exchange":
-        sources = dict(correction.pairs)
-        if all(sources[source] == column for column, source in correction.pairs):
-            return " and ".join(
-                f"{column} exchanged with {source}" for column, source in correction.pairs if column < source
-            )
+        swaps = _swaps(correction)
+        if swaps:
+            return " and ".join(f"{column} exchanged with {source}" for column, source in swaps)
         return ", ".join(f"{column} read from the column of {source}" for column, source in correction.pairs)
     word = "sign -1" if correction.kind == "sign" else f"scale {correction.factor:.6g}"
     return f"{_columns(correction.columns)}: {word}"
@@ -122,40 +124,34 @@ def _columns(columns: Sequence[str]) -> str:
 # --- what fits nowhere ------------------------------------------------------------------------------------------------
 
 
-def columns(path: Path, group: str, found: int, counts: Mapping[str, int]) -> Finding:
+def columns(path: Path, group: str, given: int, counts: Mapping[str, int]) -> Finding:
     """Describe a group with too many or too few columns. counts: tendons and joints of the finger."""
-    return Finding(
-        "error",
-        "columns",
-        path,
-        (group,),
-        f"{counted(found, 'column')} {group}[...], expected {counts[GROUP_PER[group]]}: the finger has "
-        f"{counted(counts['joint'], 'joint')} and {counted(counts['tendon'], 'tendon')}",
-        "a recording of another finger",
-        f"give one {group}[...] for each {GROUP_PER[group]}",
-    )
+    per = GROUP_PER[group]
+    has = f"{counted(counts['joint'], 'joint')} and {counted(counts['tendon'], 'tendon')}"
+    seen = f"{counted(given, 'column')} {group}[...], expected {counts[per]}: the finger has {has}"
+    write = f"give one {group}[...] for each {per}"
+    return Finding("error", "columns", path, (group,), seen, "a recording of another finger", write)
 
 
 def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
     """Describe equations that no correction makes fit."""
-    worst = balance.worst_tendon()
-    return Finding(
-        severity,
-        "unfit",
-        path,
-        (f"tendon_position[{worst + 1}]",),
-        f"{EQUATION} leaves {_percent(left)} of the variance unexplained, most at tendon {worst + 1}; no sign, order "
-        "or unit of columns corrects it",
-        "moment_arms or stiffness of another finger, or positions in turns of a motor",
-        "compare moment_arms, stiffness and the order of the tendons with the finger; for a motor's angle in rad write "
-        'into the map "unit": "m" and "scale", the radius of its pulley in m',
+    worst = balance.worst_tendon() + 1
+    seen = (
+        f"{EQUATION} leaves {percent(left)} of the variance unexplained, most at tendon {worst}; no sign, order "
+        "or unit of columns corrects it"
     )
+    probably = "moment_arms or stiffness of another finger, or positions in turns of a motor"
+    write = (
+        "compare moment_arms, stiffness and the order of the tendons with the finger; for a motor's angle in rad write "
+        'into the map "unit": "m" and "scale", the radius of its pulley in m'
+    )
+    return Finding(severity, "unfit", path, (f"tendon_position[{worst}]",), seen, probably, write)
 
 
 def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence[Correction]) -> Finding:
     """Describe joints that move against the pull of their tendons."""
     names = " and ".join(name for name, part in zip(joints, share, strict=True) if part < 0.0)
-    seen = f"{names} moves against the pull of its tendons ({_percent(-float(share.min()))} of its power)"
+    seen = f"{names} moves against the pull of its tendons ({percent(-float(share.min()))} of its power)"
     by_hand = "a finger that was moved by hand"
     if not turning:
         write = 'write "sign": -1 into the map at the reversed columns, or record without touching the finger'
@@ -173,7 +169,7 @@ def reference(path: Path, column: str, left: float, opposed: float) -> Finding:
 
 def pushing(path: Path, column: str, name: str, share: float, least: float, is_zero: bool) -> Finding:
     """Describe a tendon that pushes. is_zero: the sensor's zero is wrong rather than its sign."""
-    seen = f"negative in {_percent(share)} of the samples, down to {least:.4g} N, but tendon {name} can only pull"
+    seen = f"negative in {percent(share)} of the samples, down to {least:.4g} N, but tendon {name} can only pull"
     if is_zero:
         severity = "error" if share > 0.5 else "warning"
         write = (
@@ -181,16 +177,10 @@ def pushing(path: Path, column: str, name: str, share: float, least: float, is_z
             "the force at which it was zeroed"
         )
         return Finding(severity, "pushing", path, (column,), seen, "a sensor zeroed under load, or slack", write)
-    return Finding(
-        "error",
-        "sign",
-        path,
-        (column,),
-        seen,
-        'a wrong sign, or a cable loop ("bidirectional": true)',
-        what_to_set((column,), {"sign": -1.0}),
-        {column: {"sign": -1.0}},
-    )
+    probably = 'a wrong sign, or a cable loop ("bidirectional": true)'
+    entry = {"sign": -1.0}
+    write = _what_to_set((column,), entry)
+    return Finding("error", "sign", path, (column,), seen, probably, write, {column: entry})
 
 
 # --- clock ------------------------------------------------------------------------------------------------------------
@@ -202,102 +192,181 @@ def senseless_rate(path: Path, clock: Clock, samples: int) -> Finding:
     if clock.unit is None:
         return Finding("error", "clock", path, ("time",), seen, "a wrong unit", "give time in s")
     factor, unit = clock.unit
-    count = ", or the number of the sample" if abs(clock.step - 1.0) < 1e-9 else ""
-    return Finding(
-        "error",
-        "clock",
-        path,
-        ("time",),
-        seen,
-        f"time in {unit}{count}",
-        what_to_set(("time",), {"scale": factor}),
-        {"time": {"scale": factor}},
-    )
+    probably = f"time in {unit}" + (", or the number of the sample" if abs(clock.step - 1.0) < 1e-9 else "")
+    entry = {"scale": factor}
+    write = _what_to_set(("time",), entry)
+    return Finding("error", "clock", path, ("time",), seen, probably, write, {"time": entry})
 
 
 def clock_warnings(path: Path, clock: Clock, time: Numbers) -> Iterator[Finding]:
     """Describe gaps, lost samples and uneven steps."""
     if clock.gaps:
         first = clock.gaps[0]
-        yield Finding(
-            "warning",
-            "gaps",
+        longest = f"the first of {time[first] - time[first - 1]:.4g} s after row {first}"
+        yield _of_clock(
             path,
-            ("time",),
-            f"{counted(len(clock.gaps), 'gap')}, the first of {time[first] - time[first - 1]:.4g} s after row {first}",
+            "gaps",
+            f"{counted(len(clock.gaps), 'gap')}, {longest}",
             "an interrupted log, or several put together",
             "split it there if the finger was touched meanwhile",
         )
-    share = clock.lost / (len(time) + clock.lost)
-    if share > LOST_SHARE:
-        yield Finding(
-            "warning",
-            "lost",
+    count = len(time) + clock.lost
+    if clock.lost / count > LOST_SHARE:
+        missing = f"{clock.lost} of {count} samples {are(clock.lost)} missing ({percent(clock.lost / count)})"
+        yield _of_clock(
             path,
-            ("time",),
-            f"{clock.lost} of {len(time) + clock.lost} samples {are(clock.lost)} missing ({_percent(share)}), steps of "
-            f"{clock.step:.4g} s",
+            "lost",
+            f"{missing}, steps of {clock.step:.4g} s",
             "a log that drops samples",
             "record with a larger buffer, or fewer channels",
         )
     if clock.jitter > JITTER:
-        yield Finding(
-            "warning",
-            "jitter",
+        yield _of_clock(
             path,
-            ("time",),
-            f"steps of {clock.step:.4g} s vary by {_percent(clock.jitter)} (standard deviation)",
+            "jitter",
+            f"steps of {clock.step:.4g} s vary by {percent(clock.jitter)} (standard deviation)",
             "the time at which a sample was written, not taken",
             "log the time of the controller's own clock; velocities are wrong by the same share",
         )
 
 
+def _of_clock(path: Path, kind: str, seen: str, probably: str, write: str) -> Finding:
+    return Finding("warning", kind, path, ("time",), seen, probably, write)
+
+
 # --- channels ---------------------------------------------------------------------------------------------------------
 
 
-def held(path: Path, found: Held, severity: str) -> Finding:
+def held(path: Path, channel: Held, severity: str) -> Finding:
     """Describe a channel that holds a value."""
-    first, last = found.first
-    return Finding(
-        severity,
-        "held",
-        path,
-        (found.column,),
-        f"holds {found.value:.6g} in {_percent(found.share)} of the samples, first from {first:.4g} to "
-        f"{last:.4g} s, while other channels change",
-        "a stuck sensor, or a cable that is not plugged in",
-        "replace the sensor's log, or cut these times out",
+    first, last = channel.first
+    seen = (
+        f"holds {channel.value:.6g} in {percent(channel.share)} of the samples, first from {first:.4g} to "
+        f"{last:.4g} s, while other channels change"
     )
+    probably = "a stuck sensor, or a cable that is not plugged in"
+    write = "replace the sensor's log, or cut these times out"
+    return Finding(severity, "held", path, (channel.column,), seen, probably, write)
 
 
-def clipped(path: Path, found: Clipped, severity: str) -> Finding:
+def clipped(path: Path, channel: Clipped, severity: str) -> Finding:
     """Describe a channel that saturates."""
-    end, value = ("above", "largest") if found.is_top else ("below", "smallest")
-    return Finding(
-        severity,
-        "clipped",
-        path,
-        (found.column,),
-        f"repeats its {value} value {found.value:.6g} in {_percent(found.share)} of the samples, and reaches it fast",
-        f"a sensor or amplifier that saturates {end} it",
-        "record with a larger range, or less force or travel",
-    )
+    end, extreme = ("above", "largest") if channel.is_top else ("below", "smallest")
+    value, share = f"{channel.value:.6g}", percent(channel.share)
+    seen = f"repeats its {extreme} value {value} in {share} of the samples, and reaches it fast"
+    probably = f"a sensor or amplifier that saturates {end} it"
+    write = "record with a larger range, or less force or travel"
+    return Finding(severity, "clipped", path, (channel.column,), seen, probably, write)
 
 
-def coarse(path: Path, found: Coarse) -> Finding:
+def coarse(path: Path, channel: Coarse) -> Finding:
     """Describe a channel with few steps."""
-    unit = GROUPS[element(found.column)[0]][0]
+    unit = GROUPS[element(channel.column)[0]][0]
+    steps = counted(round(channel.range / channel.step), "step")
+    seen = f"moves by {channel.range:.4g} {unit} in {steps} of {channel.step:.4g} {unit}"
+    probably = "a log rounded to few digits, or a coarse sensor"
     return Finding(
-        "warning",
-        "coarse",
-        path,
-        (found.column,),
-        f"moves by {found.range:.4g} {unit} in {counted(round(found.range / found.step), 'step')} of "
-        f"{found.step:.4g} {unit}",
-        "a log rounded to few digits, or a coarse sensor",
-        "log more digits, or record a larger motion",
+        "warning", "coarse", path, (channel.column,), seen, probably, "log more digits, or record a larger motion"
     )
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+# --- what to write into the map ---------------------------------------------------------------------------------------
+
+
+def map_keys(entries: Mapping[str, Entry]) -> dict[str, dict[str, float | str]]:
+    """Return the keys of a map whose log is the recording itself, with its columns in SI."""
+    return {column: _keys(column.split("[")[0], entry) for column, entry in entries.items()}
+
+
+def _keys(group: str, entry: Entry) -> dict[str, float | str]:
+    keys: dict[str, float | str] = {}
+    for key, value in entry.items():
+        if isinstance(value, str):
+            keys["column"] = value
+        elif key == "sign":
+            keys["sign"] = int(value)
+        else:
+            known = units.OF_COLUMN[group].items()
+            unit = next((unit for unit, factor in known if abs(value / factor - 1.0) < SAME), "")
+            keys |= {"unit": unit} if unit else {"scale": value}
+    return keys
+
+
+def _what_to_set(columns: Sequence[str], entry: Entry) -> str:
+    """Say what the entries of columns get in the map. entry: `sign` or `scale`."""
+    group = columns[0].split("[")[0]
+    keys = _keys(group, entry)
+    words = ", ".join(f'"{key}": {json.dumps(value)}' for key, value in keys.items())
+    if "unit" in keys:
+        words += f' in place of "{units.si_of(units.OF_COLUMN[group])}"'
+    if "sign" in keys:
+        words += " (1 where it is -1 now)"
+    return f"write into the map of columns, at {_named(columns)}: {words}"
+
+
+def _named(columns: Sequence[str]) -> str:
+    """Return the names of columns; of three and more in a row, the first and last."""
+    group, _, first = columns[0].rstrip("]").partition("[")
+    row = [f"{group}[{int(first) + k}]" for k in range(len(columns))] if first else []
+    if len(columns) > 2 and list(columns) == row:
+        return f'each of "{row[0]}" to "{row[-1]}"'
+    return ("each of " if len(columns) > 1 else "") + ", ".join(f'"{column}"' for column in columns)
+
+
+def _new_keys(correction: Correction) -> str:
+    """Say which keys of the map change places: its entries, with their units, belong to other columns."""
+    swaps = _swaps(correction)
+    if swaps:
+        listed = ", ".join(f'"{column}" and "{source}"' for column, source in swaps)
+        return f"exchange in the map of columns the keys {listed}"
+    names = ", ".join(f'"{source}" to "{column}"' for column, source in correction.pairs)
+    return f"rename in the map of columns the keys {names}"
+
+
+# --- reports ----------------------------------------------------------------------------------------------------------
+
+
+def check_report(
+    file: Path, kind: str, lines: Sequence[str], findings: Sequence[Finding], recordings: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the report of `check --json` on a sound finger description or rig."""
+    return {
+        "format": FORMAT,
+        "file": str(file),
+        "sound": True,
+        "kind": kind,
+        "summary": list(lines),
+        "findings": [_entry(finding) for finding in findings],
+        "recordings": list(recordings),
+    }
+
+
+def refusal_report(file: Path, reason: str) -> dict[str, Any]:
+    """Return the report of `check --json` on a refused description or rig. reason: one line."""
+    return {"format": FORMAT, "file": str(file), "sound": False, "reason": reason}
+
+
+def recording_report(recording: Recording, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Return the report on a recording. findings: from `belongs`."""
+    return {
+        "file": str(recording.path),
+        "belongs": not any(finding.severity == "error" for finding in findings),
+        "samples": len(recording),
+        "duration": float(recording.time[-1] - recording.time[0]),
+        "verdict": verdict(recording, findings),
+        "findings": [_entry(finding) for finding in findings],
+    }
+
+
+def _entry(finding: Finding) -> dict[str, Any]:
+    return {**asdict(finding), "path": str(finding.path), "map": map_keys(finding.entries), "line": finding.line()}
+
+
+def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
+    """Say in one line whether a recording belongs to the finger."""
+    severities = [finding.severity for finding in findings]
+    errors, warnings = severities.count("error"), severities.count("warning")
+    words = "does not belong to this finger as it is" if errors else "belongs to this finger"
+    counts = f"{counted(errors, 'error')}, {counted(warnings, 'warning')}" if findings else "nothing found"
+    length = recording.time[-1] - recording.time[0]
+    return f"{recording.path}: {words}: {counted(len(recording), 'sample')}, {length:.4g} s; {counts}"

@@ -12,18 +12,10 @@ import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.files import are, counted
-from tendonfmu.model import (
-    INPUTS_OF_SOURCE,
-    Finger,
-    inputs_used,
-    moment_arms,
-    number_of,
-    watches_motors,
-)
+from tendonfmu.files import are, counted, percent
+from tendonfmu.model import INPUTS_OF_SOURCE, Finger, inputs_used, moment_arms, number_of, watches_motors
 from tendonfmu.recordings.faults import (
     SETTLING,
-    StuckSensor,
     gap_sentences,
     gaps,
     rate_sentences,
@@ -137,7 +129,8 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     usable = ~(faulty | contact)
     _refuse_too_little(recording, parts, usable, contact)
     held_out = _held_out(recording, parts, held) & usable
-    model = model_alone(finger.data, [_arrays(recording, part) for part in parts], parts, len(recording), kinematics)
+    arrays = [{name: values[part] for name, values in recording.arrays().items()} for part in parts]
+    model = model_alone(finger.data, arrays, parts, len(recording), kinematics)
     if contact.any():
         out = int(contact.sum())
         warnings.append(f"{counted(out, 'sample')} labelled contact {are(out)} left out: no column external_torque")
@@ -153,10 +146,6 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
         model=model,
         warnings=[*warnings, *sentences],
     )
-
-
-def _arrays(recording: Recording, part: slice) -> dict[str, Numbers]:
-    return {name: values[part] for name, values in recording.arrays().items()}
 
 
 def _parts(time: Numbers) -> tuple[list[slice], Flags]:
@@ -193,16 +182,11 @@ def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
     # slack: [N, m]
     share = slack.mean(axis=0)
     return [
-        f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {_percent(part)} % of the samples: its modelled force "
+        f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {percent(part)} of the samples: its modelled force "
         "falls below 0 and counts as 0; the training should be modified: more pretension"
         for i, part in enumerate(share)
         if part > 0
     ]
-
-
-def _percent(share: float) -> str:
-    """Format a share in percent with two digits, near 100 without decimals."""
-    return f"{100 * share:.2g}" if share < 0.995 else f"{100 * share:.0f}"
 
 
 # --- stuck sensors ----------------------------------------------------------------------------------------------------
@@ -212,17 +196,15 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
     """Return the samples [N] to leave out because of stuck sensors, and sentences. Unused channels cost no samples."""
     out, sentences = np.zeros(len(recording), dtype=bool), []
     used = {"tendon_force", *INPUTS_OF_SOURCE[kinematics]}
-    by_column: dict[str, list[StuckSensor]] = {}
-    for sensor in stuck_sensors(recording, finger):
-        by_column.setdefault(sensor.column, []).append(sensor)
-    for column, found in by_column.items():
-        first = found[0]
-        begin, end = recording.time[first.begin], recording.time[first.end - 1]
-        more = f" and {len(found) - 1} times more" if len(found) > 1 else ""
+    time = recording.time
+    for column, sensors in stuck_sensors(recording, finger).items():
+        first = sensors[0]
+        begin, end = time[first.begin], time[first.end - 1]
+        more = f" and {len(sensors) - 1} times more" if len(sensors) > 1 else ""
         what = f"{column} stands still at {first.value:.6g} from {begin:.4g} to {end:.4g} s{more} while others move"
         lost = np.zeros(len(recording), dtype=bool)
-        for sensor in found:
-            lost |= _covered(recording.time, sensor)
+        for sensor in sensors:
+            lost |= (time >= time[sensor.begin]) & (time <= time[sensor.end - 1] + SETTLING)
         if first.group not in used:
             sentences.append(f"{what}: a stuck sensor; it is not used with kinematics {kinematics}")
             continue
@@ -237,10 +219,6 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
             f"{what}: a stuck sensor; {counted(many, 'sample')} until {SETTLING:g} s after it {are(many)} left out"
         )
     return out, sentences
-
-
-def _covered(time: Numbers, sensor: StuckSensor) -> Flags:
-    return np.asarray((time >= time[sensor.begin]) & (time <= time[sensor.end - 1] + SETTLING))
 
 
 # --- hold-out ---------------------------------------------------------------------------------------------------------
@@ -275,13 +253,13 @@ def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
 def motion_of(recordings: list[FitRecording]) -> tuple[Numbers, Numbers, Numbers]:
     """Return where and how fast the joints moved in the samples that are trained on."""
     # returns joint angles [K, n] (rad), joint speeds [K, n] (rad/s), time that each sample stands for [K] (s)
-    every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
+    every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
     angle, speed, share = [], [], []
-    for each in recordings:
-        rows = np.flatnonzero(each.train)[::every]
-        angle.append(each.model.joint_angle[rows])
-        speed.append(each.model.joint_speed[rows])
-        share.append(_sample_time(each)[rows] * every)
+    for recording in recordings:
+        rows = np.flatnonzero(recording.train)[::every]
+        angle.append(recording.model.joint_angle[rows])
+        speed.append(recording.model.joint_speed[rows])
+        share.append(_sample_time(recording)[rows] * every)
     return np.concatenate(angle), np.concatenate(speed), np.concatenate(share)
 
 
@@ -298,11 +276,11 @@ def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapp
         return []
     if not any(moves.values()):
         raise InputError(
-            f"{', '.join(str(each.path) for each in recordings)}: no motion: nothing is ever faster than "
+            f"{', '.join(str(recording.path) for recording in recordings)}: no motion: nothing is ever faster than "
             "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
         )
     threshold = number_of(finger.data, "velocity_threshold.joint")
-    fastest = np.max([np.abs(each.model.joint_speed[each.train]).max(axis=0) for each in recordings], axis=0)
+    fastest = np.max([np.abs(part.model.joint_speed[part.train]).max(axis=0) for part in recordings], axis=0)
     return [
         f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
         "be told, its numbers stay near where they were"
@@ -320,10 +298,11 @@ def require_noise(finger: Finger, recordings: list[FitRecording]) -> None:
             f"{finger.path}: bias.noise_std = 0 and bias.noise_std_per_force = 0: every residual would count "
             "infinitely much; expected the standard deviation of the joint torque's noise in N.m"
         )
-    for each in recordings:
-        silent = np.flatnonzero(~each.recording.groups["tendon_force"].any(axis=1))
+    for recording in recordings:
+        silent = np.flatnonzero(~recording.recording.groups["tendon_force"].any(axis=1))
         if silent.size:
+            row = f"row {int(silent[0]) + 1} of {recording.path}"
             raise InputError(
-                f"{finger.path}: bias.noise_std = 0, and row {int(silent[0]) + 1} of {each.path} has no tendon force: "
-                "its residual would count infinitely much; expected bias.noise_std above 0 (N.m)"
+                f"{finger.path}: bias.noise_std = 0, and {row} has no tendon force: its residual would count "
+                "infinitely much; expected bias.noise_std above 0 (N.m)"
             )

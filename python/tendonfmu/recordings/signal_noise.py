@@ -1,4 +1,4 @@
-"""How noisy the joint positions and joint torques of a recording are, as `position_filter.noise` needs it.
+"""How noisy the joint positions of a recording are, as `position_filter.noise` needs it.
 
 The noise is the difference of a sample from the smooth curve through its neighbours. A cubic through the two samples
 before and the two after, at their true times, predicts each sample. The rest is noise if the motion is slow compared
@@ -19,6 +19,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import RANGES, moment_arms
+from tendonfmu.recordings.faults import value_step
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
 
@@ -27,8 +28,6 @@ BLOCK = 40  # samples
 FEWEST = 60  # samples; fewer give no useful estimate
 GAP = 3.0  # times the median step; no cubic spans a longer step
 LEAST = RANGES["position_filter.noise"][0]  # rad, the smallest noise that the description accepts
-GRID = 1e-3  # of a step; differences this near to a multiple of the step count as multiples
-MOST_LEVELS = 0.5  # distinct values per sample, at most, where values come in steps
 
 
 def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitRecording, kinematics: int = 1) -> Numbers:
@@ -69,17 +68,6 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
         angles = (position - force * compliance) @ routing.T
         floor = np.sqrt(routing**2 @ (_rounding(position) ** 2 + (_rounding(force) * compliance) ** 2))
     return np.asarray(np.maximum(np.maximum(white_noise(recording.time, angles), floor), LEAST))
-
-
-def joint_torque_noise(data: Mapping[str, Any], recording: Recording | FitRecording) -> Numbers:
-    """Estimate the standard deviation of the noise of the joint torques τ = Rᵀ f0 in one sample."""
-    # returns [n] (N·m)
-    if isinstance(recording, FitRecording):
-        recording = recording.recording
-    recording.require(len(data["joints"]), len(data["tendons"]), ("tendon_force",))
-    arms, force = moment_arms(data), recording.groups["tendon_force"]
-    floor = np.sqrt((arms**2).T @ _rounding(force) ** 2)
-    return np.asarray(np.maximum(white_noise(recording.time, force @ arms), floor))
 
 
 def white_noise(time: Numbers, values: Numbers) -> Numbers:
@@ -127,18 +115,3 @@ def _of_blocks(variance: Numbers) -> float:
 def _rounding(values: Numbers) -> Numbers:
     """Return the standard deviation [c] of the rounding of columns whose values come in equal steps, else 0."""
     return np.asarray(np.array([value_step(column) for column in values.T]) / np.sqrt(12.0))
-
-
-def value_step(column: Numbers) -> float:
-    """Return the width of the equal steps in which a column's values [N] come, in its unit; 0 if there are none."""
-    levels = np.unique(column)
-    if len(levels) < 2 or len(levels) > MOST_LEVELS * len(column):
-        return 0.0
-    steps = np.diff(levels)
-    # equal values may differ by rounding of the file
-    steps = steps[steps > 1e-9 * np.abs(levels).max()]
-    if not len(steps):
-        return 0.0
-    step = float(np.median(steps[steps <= 1.5 * steps.min()]))
-    multiples = steps / step
-    return step if np.abs(multiples - np.round(multiples)).max() <= GRID * max(1.0, multiples.max()) else 0.0

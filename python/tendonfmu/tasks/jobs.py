@@ -42,28 +42,26 @@ class Job:
     arguments: tuple[Any, ...] = ()  # arguments of the function; they are pickled
 
 
-def row_file(folder: Path, name: str) -> Path:
+def _row_file(folder: Path, name: str) -> Path:
     return folder / ROWS / f"{name}.json"
 
 
-def read_row(folder: Path, name: str) -> Row | None:
+def _read_row(folder: Path, name: str) -> Row | None:
     """Return the row of a job, or None if the job has not ended."""
-    file = row_file(folder, name)
+    file = _row_file(folder, name)
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else None
 
 
 def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
     """Return all existing rows."""
-    return [row for row in (read_row(folder, job.name) for job in jobs) if row is not None]
+    rows = (_read_row(folder, job.name) for job in jobs)
+    return [row for row in rows if row is not None]
 
 
 def waiting_jobs(jobs: Sequence[Job], folder: Path, failed_again: bool = False) -> list[Job]:
     """Return the jobs that have to run."""
-    return [job for job in jobs if _is_waiting(read_row(folder, job.name), failed_again)]
-
-
-def _is_waiting(row: Row | None, failed_again: bool) -> bool:
-    return row is None or (failed_again and bool(row.get("error")))
+    rows = [_read_row(folder, job.name) for job in jobs]
+    return [job for job, row in zip(jobs, rows, strict=True) if row is None or (failed_again and row.get("error"))]
 
 
 def run_jobs(
@@ -78,7 +76,7 @@ def run_jobs(
 ) -> int:
     """Call the function for each job without a row, and write its row when it ends."""
     # stop_after: (s)
-    _check_names([job.name for job in jobs])
+    _check_names(jobs)
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
     waiting = waiting_jobs(jobs, folder, failed_again)
@@ -86,15 +84,16 @@ def run_jobs(
     progress(done, len(jobs))
     count = 0
     for row in _rows(function, waiting, client, time.monotonic() + stop_after):
-        write_row(folder, row)
+        with whole_file(_row_file(folder, row["name"])) as file:
+            file.write_text(_json(row) + "\n", encoding="utf-8")
         count += 1
         progress(done + count, len(jobs))
     return count
 
 
-def _check_names(names: Sequence[str]) -> None:
+def _check_names(jobs: Sequence[Job]) -> None:
     taken = set[str]()
-    for name in names:
+    for name in (job.name for job in jobs):
         if not name or name.startswith(".") or Path(name).name != name or "\\" in name:
             raise InputError(f"jobs: name {name!r}; expected one that a file can have")
         if name in taken:
@@ -102,25 +101,16 @@ def _check_names(names: Sequence[str]) -> None:
         taken.add(name)
 
 
-def write_row(folder: Path, row: Row) -> None:
-    with whole_file(row_file(folder, row["name"])) as file:
-        file.write_text(_json(row) + "\n", encoding="utf-8")
-
-
 def _json(row: Row) -> str:
-    return json.dumps(_plain(row), indent=1, allow_nan=False)
-
-
-def _plain(row: Row) -> Row:
-    """Convert numbers of numpy to those of JSON, and numbers that are not finite to null."""
-    found: Row = {}
+    """Write a row, numbers of numpy as those of JSON, and numbers that are not finite as null."""
+    plain: Row = {}
     for key, value in row.items():
         value = value.item() if isinstance(value, np.generic) else value
-        found[key] = None if isinstance(value, float) and not math.isfinite(value) else value
-    return found
+        plain[key] = None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(plain, indent=1, allow_nan=False)
 
 
-def failed_row(name: str, failed: BaseException) -> Row:
+def _failed_row(name: str, failed: BaseException) -> Row:
     return {"name": name, "error": f"{type(failed).__name__}: {' '.join(str(failed).split())}"}
 
 
@@ -131,7 +121,7 @@ def call(function: Function, job: Job) -> Row:
         row = {"error": "", **function(*job.arguments), "name": job.name}
         _json(row)  # a value that is not allowed in a row is an error of the job
     except Exception as failed:  # the other jobs continue; the row reports the error
-        row = failed_row(job.name, failed)
+        row = _failed_row(job.name, failed)
     return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
 
 
@@ -182,7 +172,7 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
 def _row_of(future: Any, job: Job) -> Row:
     """Return the row of a job, also for errors that `call` could not catch."""
     try:
-        return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
+        return _failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
     finally:
         future.release()  # otherwise dask computes it again when the worker that holds it dies
 
@@ -210,7 +200,7 @@ def workers_of(address: str | None = None, count: int = 1) -> Iterator[Any]:
     except (OSError, ValueError) as failed:
         raise InputError(f"--scheduler {address}: {failed}; expected the address of a dask scheduler") from None
     with client:
-        check_versions(client, address)
+        _check_versions(client, address)
         yield client
 
 
@@ -244,7 +234,7 @@ def version_here() -> str:
     return tendonfmu.__version__
 
 
-def check_versions(client: Any, address: str) -> None:
+def _check_versions(client: Any, address: str) -> None:
     """Raise InputError if there is no worker, or if scheduler or workers lack this version of tendonfmu."""
     try:
         client.wait_for_workers(1, timeout=SECONDS_TO_CONNECT)
@@ -252,14 +242,14 @@ def check_versions(client: Any, address: str) -> None:
         raise InputError(f"--scheduler {address}: no workers; expected at least one, `dask worker {address}`") from None
     try:
         # the scheduler unpickles jobs as well
-        found = {"the scheduler": client.run_on_scheduler(version_here), **client.run(version_here)}
+        versions = {"the scheduler": client.run_on_scheduler(version_here), **client.run(version_here)}
     except Exception as failed:  # from any of them, mostly a missing module
         words = " ".join(str(_first_of(failed)).split())
         raise InputError(
             f"--scheduler {address}: it or a worker cannot import tendonfmu ({words}); expected version "
             f"{version_here()} there"
         ) from None
-    for place, version in found.items():
+    for place, version in versions.items():
         if version != version_here():
             raise InputError(f"--scheduler {address}: {place} has tendonfmu {version}; expected {version_here()}")
 

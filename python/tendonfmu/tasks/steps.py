@@ -37,10 +37,10 @@ class Steps:
         """Return the result of a step, computed only if it does not exist."""
         key = self._before = digest_of({"before": self._before, "name": name, **made_from})
         file = self._folder / f"{name}.json"
-        found = _read(file, key)
-        if found is not None and (page is None or page.is_file()):
+        kept = _read(file, key)
+        if kept is not None and (page is None or page.is_file()):
             self.repeated.append(name)
-            return found
+            return kept
         result = compute()
         self._folder.mkdir(parents=True, exist_ok=True)
         write_text(file, json.dumps({"format": FORMAT, "key": key, "result": result}) + "\n")
@@ -72,8 +72,8 @@ def digest_of(content: Mapping[str, Any]) -> str:
 
 def digest_of_file(file: Path) -> str:
     """Return the digest of a file."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     with file.open("rb") as opened:
         while piece := opened.read(1 << 20):
-            found.update(piece)
-    return found.hexdigest()
+            digest.update(piece)
+    return digest.hexdigest()

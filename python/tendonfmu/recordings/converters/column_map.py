@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, read_json
 from tendonfmu.recordings.converters import units
@@ -114,21 +115,21 @@ class ColumnMap:
     resample: Resampling | None = None  # none: only if the columns have several clocks
 
 
+@dataclass(frozen=True)
+class ConvertedLog:
+    """A log that has been converted."""
+
+    columns: dict[str, Numbers]  # columns of a recording, [N] each, in SI
+    map: ColumnMap  # the map that was used
+    velocity_cutoff: float = 0.0  # cut-off of velocities that were computed (Hz); 0 if there are none
+    notes: list[str] = field(default_factory=list)  # what was left out or computed, one sentence each
+
+
 def read_map(path: Path) -> ColumnMap:
     """Read and check MAP.json. Raise InputError with file, key and what was expected."""
     document = read_json(path, "a map of columns")
     try:
         return _read(path, Node(document))
-    except Refusal as refused:
-        raise InputError(f"{path}: {refused}") from None
-
-
-def read_log_format(path: Path | None) -> LogFormat:
-    """Read the key `log` of a map, which may be incomplete otherwise. Raise InputError."""
-    if path is None:
-        return LogFormat()
-    try:
-        return _read_log(Node(read_json(path, "a map of columns")).member("log"))
     except Refusal as refused:
         raise InputError(f"{path}: {refused}") from None
 
@@ -140,10 +141,8 @@ def _read(path: Path, node: Node) -> ColumnMap:
     columns, joint = node.member("columns"), node.member("joint")
     if columns.absent == joint.absent:
         joint.refuse('either "columns" or "joint", one of the two')
-    if joint.absent:
-        return ColumnMap(path, dict(_read_columns(columns)), None, log, resample)
-    found, machine = _read_joint(joint)
-    return ColumnMap(path, found, machine, log, resample)
+    mapped, machine = (dict(_read_columns(columns)), None) if joint.absent else _read_joint(joint)
+    return ColumnMap(path, mapped, machine, log, resample)
 
 
 def _read_log(node: Node) -> LogFormat:
@@ -155,7 +154,7 @@ def _read_log(node: Node) -> LogFormat:
     for undecided, choices in ((missing, "refuse or leave out"), (disorder, "refuse or sort")):
         if undecided.value == UNDECIDED:
             undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
-    found = LogFormat(
+    log = LogFormat(
         separator=None if separator.absent else separator.choice(*SEPARATORS),
         decimal=None if decimal.absent else decimal.choice(".", ","),
         skip=None if skip.absent else skip.integer(0, 10000),
@@ -166,9 +165,9 @@ def _read_log(node: Node) -> LogFormat:
         sort=not disorder.absent and disorder.choice("refuse", "sort") == "sort",
         clocks=_read_clocks(node.member("clocks")),
     )
-    if found.separator is not None and found.separator == found.decimal:
+    if log.separator is not None and log.separator == log.decimal:
         decimal.refuse("another character than the separator")
-    return found
+    return log
 
 
 def _flag(node: Node) -> bool | None:
@@ -210,7 +209,7 @@ def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
         match = _COLUMN.fullmatch(name)
         group = match[1] if match else name
         if group not in units.OF_COLUMN or (match is None) != (group in ("time", LABEL)):
-            known = sorted(["time", *(f"{each}[1]" for each in GROUPS), LABEL])
+            known = sorted(["time", *(f"{name}[1]" for name in GROUPS), LABEL])
             raise Refusal(f"{node.path}.{name}: unknown column; expected one of {', '.join(known)}")
         yield name, _read_column(node.member(name), units.OF_COLUMN[group])
     if "time" not in names:
@@ -248,11 +247,10 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     extra = ("zone", "pattern") if known is units.TIME else ()
     node.keys(("column", "unit", "sign", "scale", "offset", "comment", *extra))
     source, unit = node.member("column"), node.member("unit")
-    for undecided in (source, unit):
+    unit_names = [*known, *units.STAMPS] if known is units.TIME else list(known)
+    for undecided, choices in ((source, "the name of a column of the log"), (unit, f"one of {', '.join(unit_names)}")):
         if undecided.value == UNDECIDED:
-            undecided.refuse(
-                f"a decision that `convert inspect` has left to you: {_expected(undecided is source, known)}"
-            )
+            undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
     if isinstance(source.value, int) and not isinstance(source.value, bool) and source.value >= 1:
         column: str | int = source.value
     else:
@@ -269,13 +267,7 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     offset = node.member("offset")
     first = offset.value == "first"
     start = None if first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
-    return MappedColumn(node.path, column, sign * scale * _factor(unit, known), start)
-
-
-def _expected(source: bool, known: Mapping[str, float]) -> str:
-    if source:
-        return "the name of a column of the log"
-    return f"one of {', '.join([*known, *units.STAMPS] if known is units.TIME else known)}"
+    return MappedColumn(node.path, column, sign * scale * _factor(unit, known, unit_names), start)
 
 
 def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
@@ -296,12 +288,11 @@ def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
     return MappedColumn(node.path, column, 1e-9, None, stamp, name, shape)
 
 
-def _factor(unit: Node, known: Mapping[str, float]) -> float:
+def _factor(unit: Node, known: Mapping[str, float], names: list[str]) -> float:
     """Return the factor of the unit. A missing unit is refused unless the quantity has none."""
     if known is units.NONE and unit.absent:
         return 1.0
     value = units.factor(unit.value, known) if isinstance(unit.value, str) and unit.value else None
     if value is None:
-        names = [*known, *units.STAMPS] if known is units.TIME else list(known)
         unit.refuse(f"one of {', '.join(names)}" + ("" if known is units.NONE else ", or another unit of this kind"))
     return value

@@ -21,17 +21,16 @@ Use kinematics source 3: the velocity is the zero-phase one of this file, not th
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import io, signal
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-
-Array = NDArray[np.float64]
 
 MASS = 95.1089  # kg, published
 DECIMATION = 10
@@ -62,23 +61,20 @@ def convert(file: Path, mass: float = MASS, decimation: int = DECIMATION) -> dic
     }
 
 
-def _zero_phase(series: Array, step: float) -> Array:
-    signal = _scipy("signal")
+def _zero_phase(series: Numbers, step: float) -> Numbers:
     return np.asarray(signal.filtfilt(*signal.butter(4, CUTOFF, fs=1.0 / step), series), dtype=np.float64)
 
 
-def _decimated(series: Array, n: int) -> Array:
+def _decimated(series: Numbers, n: int) -> Numbers:
     """Return every n-th value of a triangular mean over ±n samples, without those at the ends."""
     # A steeper filter rings where friction jumps and makes reversals that did not happen: with the Chebyshev filter of
     # scipy's `decimate` the error of the published model grows from 4.1 to 5.9 %.
-    # This matters because friction jumps with the sign of the velocity: a steeper filter rings there and makes
-    # reversals that did not happen.
     weights = np.bartlett(2 * n + 1)[1:-1] / n
     kept = np.arange(n, len(series) - n + 1, n) if n > 1 else np.arange(len(series))
     return np.convolve(series, weights, mode="same")[kept]
 
 
-def _read(file: Path) -> tuple[Array, Array, Array]:
+def _read(file: Path) -> tuple[Numbers, Numbers, Numbers]:
     """Return time [N] (s), position [N] (m) and force [N] (N)."""
     content = _content(file)
     for name in (*SERIES, "gtau"):
@@ -95,11 +91,10 @@ def _read(file: Path) -> tuple[Array, Array, Array]:
 
 
 def _content(file: Path) -> dict[str, Any]:
-    reader = _scipy("io")
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected a MATLAB file of the EMPS benchmark")
     try:
-        content: dict[str, Any] = reader.loadmat(file, appendmat=False)
+        content: dict[str, Any] = io.loadmat(file, appendmat=False)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; expected a MATLAB file of the EMPS benchmark") from None
     except Exception as error:  # scipy passes on the errors of its parsers: ValueError, TypeError, zlib.error ...
@@ -108,7 +103,7 @@ def _content(file: Path) -> dict[str, Any]:
     return content
 
 
-def _numbers(file: Path, name: str, value: Any) -> Array:
+def _numbers(file: Path, name: str, value: Any) -> Numbers:
     """Return the variable as a row of finite numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
@@ -120,7 +115,7 @@ def _numbers(file: Path, name: str, value: Any) -> Array:
     return series
 
 
-def _step(file: Path, time: Array, least: int) -> float:
+def _step(file: Path, time: Numbers, least: int) -> float:
     """Return the step (s). It must be equal between all samples, since filter and differences assume it."""
     if len(time) < least:
         raise InputError(
@@ -135,14 +130,3 @@ def _step(file: Path, time: Array, least: int) -> float:
     if step >= 0.5 / CUTOFF:
         raise InputError(f"{file}: t: {1 / step:g} samples per second; expected more than {2 * CUTOFF:g}")
     return step
-
-
-def _scipy(part: str) -> Any:
-    """Import a part of scipy, only when such a file is converted."""
-    try:
-        return importlib.import_module(f"scipy.{part}")
-    except ImportError:
-        raise InputError(
-            "convert emps: the Python package scipy is not installed; expected it in the environment of tendonfmu "
-            "(python -m pip install scipy)"
-        ) from None

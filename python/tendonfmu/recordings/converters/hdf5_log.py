@@ -1,25 +1,158 @@
-"""How HDF5 files are read: datasets by path, `/group/force` or `/group/force[2]`; fields of compound datasets by a dot.
+"""How HDF5 files are read, and what they have in common with MATLAB files: arrays with names.
 
-A file that is cut off is refused: HDF5 finds its data by tables that may lie anywhere in the file.
+Arrays of one struct or group are a topic. A row is an element along the longer side of an array; the columns of a
+matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, and fields
+of compound datasets by a dot. A file that is cut off is refused: HDF5 finds its data by tables that may lie anywhere.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tendonfmu.errors import InputError
-from tendonfmu.files import require_extra
-from tendonfmu.recordings.converters.arrays_log import Array, ArraysLog, rows_of, turned_rows
+from tendonfmu.files import counted, require_extra
 from tendonfmu.recordings.converters.column_map import LogFormat
+from tendonfmu.recordings.converters.log import (
+    LONGEST,
+    NUMBER,
+    OTHER,
+    ROWS,
+    TEXT,
+    TIME_NAMES,
+    Block,
+    Field,
+    Topic,
+    as_numbers,
+)
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array of a file."""
+
+    topic: str  # struct or group, with the separator at its end; "" at the top
+    name: str  # full name
+    shape: tuple[int, ...]  # as rows and columns are counted in the file
+    dtype: np.dtype[Any]  # of its elements
+    read: Callable[[int, int], Any]  # returns rows (start, stop) of it, [rows] or [rows, columns]
+    unit: str = ""  # what the file states, or ""
+
+    @classmethod
+    def of(cls, topic: str, name: str, values: Any, by_columns: bool, unit: str = "") -> Array:
+        """Return the array of an array or dataset. by_columns: the columns of a matrix are the rows."""
+        shape = (values.shape[1], values.shape[0]) if by_columns else values.shape
+        read = partial(_read_columns if by_columns else _read_rows, values)
+        return cls(topic, name, shape, values.dtype, read, unit)
+
+    def fields(self) -> Iterator[tuple[Field, int]]:
+        """Yield the fields, each with the column that it is."""
+        kind = NUMBER if self.dtype.kind in "biuf" else TEXT if self.dtype.kind in "SUO" else OTHER
+        if len(self.shape) < 2 or self.shape[1] == 1:
+            yield Field(self.name, kind, str(self.dtype), self.unit), 0
+        elif self.shape[1] <= LONGEST and len(self.shape) == 2:
+            for k in range(self.shape[1]):
+                yield Field(f"{self.name}[{k + 1}]", kind, str(self.dtype), self.unit), k
+        else:
+            sizes = " x ".join(map(str, self.shape))
+            yield Field(self.name, OTHER, f"{self.dtype} {sizes}", self.unit), 0
+
+
+def _read_rows(values: Any, start: int, stop: int) -> Any:
+    return values[start:stop]
+
+
+def _read_columns(values: Any, start: int, stop: int) -> Any:
+    return np.asarray(values[:, start:stop]).T
+
+
+class ArraysLog:
+    """A file of arrays."""
+
+    open_ended = False
+
+    def __init__(self, file: Path, arrays: Sequence[Array], notes: list[str]) -> None:
+        self.file = file
+        self.notes = notes
+        self._columns: dict[str, tuple[Array, int]] = {}
+        self.topics: list[Topic] = []
+        # a single value is a setting, not a signal
+        for group in _sampled_together([array for array in arrays if array.shape[0] > 1]):
+            self._add_topic(group)
+        if not self.topics:
+            reasons = f" ({'; '.join(notes)})" if notes else ""
+            raise InputError(f"{file}: no arrays of numbers{reasons}; expected at least a time and a force")
+
+    def _add_topic(self, arrays: Sequence[Array]) -> None:
+        fields = []
+        for array in arrays:
+            for field, column in array.fields():
+                self._columns[field.name] = (array, column)
+                fields.append(field)
+        prefix, rows = arrays[0].topic, arrays[0].shape[0]
+        title = prefix.rstrip("/.") or "top"
+        if any(topic.name == title for topic in self.topics):
+            title = f"{title} ({counted(rows, 'row')})"
+        self.topics.append(Topic(title, tuple(fields), rows, prefix))
+
+    def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
+        """Read columns; see `log.Log`."""
+        for topic in self.topics:
+            names = wanted.get(topic.name)
+            if names:
+                for start in range(0, topic.rows or 0, ROWS):
+                    yield topic.name, {name: self._values(name, start) for name in names}
+
+    def _values(self, name: str, start: int) -> Any:
+        import pyarrow as pa
+
+        array, column = self._columns[name]
+        try:
+            rows = np.asarray(array.read(start, min(start + ROWS, array.shape[0])))
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"{self.file}: {name}: cannot be read ({error}); the file is damaged: copy it again, or write it again"
+            ) from None
+        values = rows.reshape(len(rows), -1)[:, column] if rows.ndim > 1 else rows
+        if values.dtype.kind in "SUO":
+            texts = [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in values.tolist()]
+            if all(isinstance(text, str) for text in texts):
+                return pa.array(texts, pa.string())
+        if values.dtype.kind not in "biuf":
+            raise InputError(f"{self.file}: column {name}, row {start + 1}: {values.dtype} values; expected numbers")
+        return as_numbers(values)
+
+
+def _sampled_together(arrays: Sequence[Array]) -> Iterator[list[Array]]:
+    """Yield arrays of one length; if several groups of that length have a clock, those of each group."""
+    for length in dict.fromkeys(array.shape[0] for array in arrays):
+        groups: dict[str, list[Array]] = {}
+        for array in arrays:
+            if array.shape[0] == length:
+                groups.setdefault(array.topic, []).append(array)
+        with_clock = [
+            prefix
+            for prefix, members in groups.items()
+            if any(array.name[len(prefix) :].lower() in TIME_NAMES for array in members)
+        ]
+        if len(with_clock) > 1:
+            yield from groups.values()
+        else:
+            first = groups.pop(with_clock[0] if with_clock else next(iter(groups)))
+            yield [*first, *(array for members in groups.values() for array in members)]
+
+
+# --- HDF5 -------------------------------------------------------------------------------------------------------------
 
 
 def open_hdf5(file: Path, settings: LogFormat) -> ArraysLog:
     """Open an HDF5 file. Raise InputError."""
     h5 = open_file(file)
-    notes: list[str] = []
     arrays: list[Array] = []
 
     def add(name: str, node: Any) -> None:
@@ -30,7 +163,7 @@ def open_hdf5(file: Path, settings: LogFormat) -> ArraysLog:
         h5.visititems(add)
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise damaged(file, error) from None
-    return ArraysLog(file, arrays, notes)
+    return ArraysLog(file, arrays, [])
 
 
 def open_file(file: Path) -> Any:
@@ -52,25 +185,21 @@ def damaged(file: Path, error: Exception) -> InputError:
 
 
 def _arrays(name: str, dataset: Any) -> Iterator[Array]:
-    topic = name[: name.rindex("/") + 1]
     unit = _unit(dataset)
     if dataset.shape is None or len(dataset.shape) == 0:
         return
-    if dataset.dtype.names:
-        for part in dataset.dtype.names:
-            inner = dataset.dtype[part]
-            shape = (*dataset.shape, *inner.shape)
-            yield Array(f"{name}.", f"{name}.{part}", shape, inner.base, functools.partial(_part, dataset, part), unit)
+    if not dataset.dtype.names:
+        # signals may lie in rows: time runs along the longer side
+        by_columns = len(dataset.shape) == 2 and dataset.shape[0] < dataset.shape[1]
+        yield Array.of(name[: name.rindex("/") + 1], name, dataset, by_columns, unit)
         return
-    if len(dataset.shape) == 2 and dataset.shape[0] < dataset.shape[1]:
-        # signals lie in rows: time runs along the longer side
-        turned = (dataset.shape[1], dataset.shape[0])
-        yield Array(topic, name, turned, dataset.dtype, functools.partial(turned_rows, dataset), unit)
-        return
-    yield Array(topic, name, dataset.shape, dataset.dtype, functools.partial(rows_of, dataset), unit)
+    for part in dataset.dtype.names:
+        inner = dataset.dtype[part]
+        shape = (*dataset.shape, *inner.shape)
+        yield Array(f"{name}.", f"{name}.{part}", shape, inner.base, partial(_read_part, dataset, part), unit)
 
 
-def _part(dataset: Any, part: str, start: int, stop: int) -> Any:
+def _read_part(dataset: Any, part: str, start: int, stop: int) -> Any:
     return dataset[start:stop][part]
 
 

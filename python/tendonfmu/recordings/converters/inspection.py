@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
-from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic
-from tendonfmu.recordings.converters.log_file import open_log
+from tendonfmu.recordings.converters.log import NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic, open_log
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
-from tendonfmu.recordings.converters.unit_guess import stated
+from tendonfmu.recordings.converters.units import stated
 
 GAP = 10.0  # median steps
 
@@ -38,7 +37,7 @@ class FieldSummary:
         self.count += len(values)
         if not isinstance(values, np.ndarray):
             self.missing += int(values.null_count)
-            self.example = self.example or next((str(each) for each in values[:100] if each.is_valid), "")
+            self.example = self.example or next((str(text) for text in values[:100] if text.is_valid), "")
             return
         finite = values[np.isfinite(values)]
         self.missing += len(values) - len(finite)
@@ -114,35 +113,37 @@ class Inspection:
 def inspect_log(file: Path) -> Inspection:
     """Read a log and summarise it."""
     log = open_log(file, LogFormat())
-    found = [_fresh(topic) for topic in log.topics]
-    wanted = {each.topic.name: [f.key for f in each.fields if f.field.kind != OTHER] for each in found}
-    texts = [f.key for each in found for f in each.fields if f.field.kind == TEXT]
-    by_name = {each.topic.name: each for each in found}
+    topics = {topic.name: _empty_summary(topic) for topic in log.topics}
+    wanted = {name: [part.key for part in topic.fields if part.field.kind != OTHER] for name, topic in topics.items()}
+    texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]
     for name, block in log.blocks(wanted, texts):
-        _add(log, by_name[name], block)
-    return Inspection(file, found, _settings(log), list(log.notes), log.open_ended)
+        _add(log, topics[name], block)
+    return Inspection(file, list(topics.values()), _settings(log), list(log.notes), log.open_ended)
 
 
-def _fresh(topic: Topic) -> TopicSummary:
-    names = [each.name for each in topic.fields]
+def _empty_summary(topic: Topic) -> TopicSummary:
+    names = [field.name for field in topic.fields]
     keys = [name if names.count(name) == 1 else f"{NUMBERED}{k}" for k, name in enumerate(names, start=1)]
-    fields = [FieldSummary(each, key) for each, key in zip(topic.fields, keys, strict=True)]
-    of_time = [each.name for each in topic.fields if (found := stated(each.name, each.unit)) and found[1] == "time"]
-    clocks = [name for name in [*topic.clocks(), *of_time] if names.count(name) == 1]
-    kind = next((each.kind for each in topic.fields if clocks and each.name == clocks[0]), "")
-    return TopicSummary(topic, fields, ClockSummary(clocks[0], "datetime" if kind == TIME else "") if clocks else None)
+    fields = [FieldSummary(field, key) for field, key in zip(topic.fields, keys, strict=True)]
+    stated_units = {field.name: stated(field.name, field.unit) for field in topic.fields}
+    of_time = [name for name, statement in stated_units.items() if statement and statement[1] == "time"]
+    clock = next((name for name in [*topic.clocks(), *of_time] if names.count(name) == 1), None)
+    if clock is None:
+        return TopicSummary(topic, fields, None)
+    is_moment = topic.fields[names.index(clock)].kind == TIME
+    return TopicSummary(topic, fields, ClockSummary(clock, "datetime" if is_moment else ""))
 
 
 def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
-    for each in topic.fields:
-        values = block.get(each.key)
+    for summary in topic.fields:
+        values = block.get(summary.key)
         if values is None:
             continue
-        each.add(values)
-        if topic.clock is None or each.key != topic.clock.name:
+        summary.add(values)
+        if topic.clock is None or summary.key != topic.clock.name:
             continue
-        if each.field.kind == TEXT and (topic.clock.stamp or not topic.clock.rows):
-            values = _as_times(log, each.field.name, values)
+        if summary.field.kind == TEXT and (topic.clock.stamp or not topic.clock.rows):
+            values = _as_times(log, summary.field.name, values)
             topic.clock.stamp = "datetime" if values is not None else ""
         if isinstance(values, np.ndarray):
             topic.clock.add(values)
@@ -161,18 +162,13 @@ def _settings(log: Log) -> dict[str, Any]:
     if not isinstance(log, TextLog):
         return {}
     layout = log.layout
-    found: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
+    settings: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
     if log.encoding not in ("utf-8", "utf-8-sig"):
-        found["encoding"] = log.encoding
+        settings["encoding"] = log.encoding
     if layout.skip:
-        found["skip"] = layout.skip
+        settings["skip"] = layout.skip
     if not layout.header:
-        found["header"] = False
+        settings["header"] = False
     if layout.units:
-        found["units_row"] = True
-    return found
-
-
-def is_numeric(summary: FieldSummary) -> bool:
-    """Return whether a field holds numbers."""
-    return summary.field.kind == NUMBER and summary.count > summary.missing
+        settings["units_row"] = True
+    return settings

@@ -1,27 +1,42 @@
 """What every log format is read as: topics, each a table of fields, read in blocks.
 
-A CSV or Parquet file is one topic without a name. In a file of messages each topic has its own clock. A reader of a
-format is a class with the members of `Log`; `log_file.open_log` chooses it by the suffix.
+A CSV or Parquet file is one topic without a name. In a file of messages each topic has its own clock. To add a format,
+write a module with a class (or function) that makes a `Log`, and add its suffix to `FORMATS`.
 """
 
 from __future__ import annotations
 
+import difflib
+import importlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-from tendonfmu.recordings.converters.units import nearest
+from tendonfmu.recordings.converters.column_map import LogFormat
+
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+# suffix: module and name of what opens it
+FORMATS = {
+    **dict.fromkeys(TEXTS, ("text_log", "TextLog")),
+    ".parquet": ("parquet_log", "ParquetLog"),
+    ".mat": ("matlab_log", "open_matlab"),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
+    ".mcap": ("mcap_log", "McapLog"),
+    ".db3": ("ros2_bag_log", "open_bag"),
+}
+FOLDER = ("ros2_bag_log", "open_bag")
 
 # Columns of some rows, by name: float64, int64 or bool arrays [N]; texts as an Arrow array. Times that the format
 # declares as such are int64, in ns since 1970.
 Block = dict[str, Any]
 
+ROWS = 1 << 18  # of a block
 NUMBER, TIME, TEXT, OTHER = "number", "time", "text", "other"  # kinds of fields
 TIME_NAMES = ("time", "t", "stamp", "timestamp", "time_s", "time_ms", "header.stamp", "@log_time")
 NUMBERED = "#"  # before the number of a column whose name is not unique
@@ -47,27 +62,27 @@ class Topic:
     rows: int | None = None  # number of rows, or None if it takes a pass over the log to count them
     prefix: str = ""  # with which the names of its fields begin
 
-    def field(self, name: str) -> Field | None:
-        """Return the field of that name, or None."""
-        return next((each for each in self.fields if each.name == name), None)
-
     def clocks(self) -> list[str]:
         """Return the names of fields that may be the clock, the most likely first."""
-        usable = [each for each in self.fields if each.kind != OTHER]
-        ranks = {each.name: _rank(each, self.prefix) for each in usable}
+        ranks = {field.name: _rank(field, self.prefix) for field in self.fields if field.kind != OTHER}
         return sorted((name for name, rank in ranks.items() if rank is not None), key=lambda name: ranks[name] or 0)
+
+    def place(self, name: str) -> int:
+        """Return the index of a field by its name, or by `NUMBERED` and its number."""
+        names = [field.name for field in self.fields]
+        if name.startswith(NUMBERED) and name not in names:
+            return int(name[len(NUMBERED) :]) - 1
+        return names.index(name)
 
 
 def _rank(field: Field, prefix: str) -> int | None:
     """Return how likely a field is a clock, 0 most likely, or None."""
     name = field.name.lower()
-    inner = name[len(prefix) :] if name.startswith(prefix.lower()) else name
     # without a unit: "Time [s]", "t_ms"
-    inner = re.sub(r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", inner)
+    plain = re.sub(r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", name.removeprefix(prefix.lower()))
+    if plain in TIME_NAMES:
+        return TIME_NAMES.index(plain)
     last = re.split(r"[/.]", re.sub(r"[\[(].*$", "", name))[-1]
-    for k, wanted in enumerate(TIME_NAMES):
-        if inner == wanted:
-            return k
     if field.kind == NUMBER and last in TIME_NAMES:
         return len(TIME_NAMES) + TIME_NAMES.index(last)
     return 3 * len(TIME_NAMES) if field.kind == TIME else None
@@ -83,27 +98,43 @@ class Log(Protocol):
     open_ended: bool
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
-        """Read fields."""
+        """Read fields: yield the name of a topic and some of its rows. texts: fields that are not numbers."""
         ...
+
+
+def open_log(file: Path, settings: LogFormat) -> Log:
+    """Open a log."""
+    is_gzip = file.suffix.lower() == ".gz"
+    suffix = (Path(file.stem).suffix if is_gzip else file.suffix).lower()
+    known = ", ".join(FORMATS)
+    if not file.is_dir():
+        if suffix not in (TEXTS if is_gzip else FORMATS):
+            raise InputError(
+                f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or a bag's folder"
+            )
+        if not file.is_file():
+            raise InputError(f"{file}: no such file; expected a log, {known}")
+    module, name = FOLDER if file.is_dir() else FORMATS[suffix]
+    opener = getattr(importlib.import_module(f"tendonfmu.recordings.converters.{module}"), name)
+    return cast("Log", opener(file, settings))
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
     """Return topic and name of a field."""
     if isinstance(source, int):
         return _numbered(log, source, where)
-    found = [(topic, field) for topic in log.topics for field in topic.fields if field.name == source]
-    if len(found) > 1:
+    topics = [topic for topic in log.topics for field in topic.fields if field.name == source]
+    if len(topics) > 1:
         raise InputError(
-            f"{log.file}: column {source!r} of {where} occurs {len(found)} times; expected once, or its number"
+            f"{log.file}: column {source!r} of {where} occurs {len(topics)} times; expected once, or its number"
         )
-    if found:
-        return found[0][0], found[0][1].name
-    if log.open_ended:
-        for topic in sorted(log.topics, key=lambda each: -len(each.prefix)):
-            if source.startswith(topic.prefix):
-                return topic, source
-    names = [field.name for topic in log.topics for field in topic.fields]
-    raise InputError(f"{log.file}: column {source!r} of {where} is missing; it has {nearest(source, names)}")
+    if log.open_ended and not topics:
+        by_length = sorted(log.topics, key=lambda topic: -len(topic.prefix))
+        topics = [topic for topic in by_length if source.startswith(topic.prefix)]
+    if not topics:
+        names = [field.name for topic in log.topics for field in topic.fields]
+        raise InputError(f"{log.file}: column {source!r} of {where} is missing; it has {_nearest(source, names)}")
+    return topics[0], source
 
 
 def _numbered(log: Log, number: int, where: str) -> tuple[Topic, str]:
@@ -111,12 +142,20 @@ def _numbered(log: Log, number: int, where: str) -> tuple[Topic, str]:
         raise InputError(
             f"{where}.column = {number}: {log.file} has {counted(len(log.topics), 'topic')}; expected a name"
         )
-    fields = log.topics[0].fields
-    if number > len(fields):
-        raise InputError(f"{where}.column = {number}: {log.file} has {counted(len(fields), 'column')}")
-    name = fields[number - 1].name
-    occurs = sum(field.name == name for field in fields)
-    return log.topics[0], name if occurs == 1 else f"{NUMBERED}{number}"
+    names = [field.name for field in log.topics[0].fields]
+    if number > len(names):
+        raise InputError(f"{where}.column = {number}: {log.file} has {counted(len(names), 'column')}")
+    name = names[number - 1]
+    return log.topics[0], name if names.count(name) == 1 else f"{NUMBERED}{number}"
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """Return the known names for a message, the most similar first, at most six."""
+    names = list(known)
+    folded = {name.casefold(): name for name in names}
+    alike = [folded[match] for match in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
+    listed = [*alike, *(name for name in names if name not in alike)]
+    return ", ".join(listed[:6]) + (", ..." if len(listed) > 6 else "")
 
 
 def as_numbers(values: Any) -> Any:

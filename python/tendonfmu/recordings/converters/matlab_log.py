@@ -7,17 +7,17 @@ fully; a note says how to save them as a struct.
 
 from __future__ import annotations
 
-import functools
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import io
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.arrays_log import Array, ArraysLog, rows_of, turned_rows
 from tendonfmu.recordings.converters.column_map import LogFormat
-from tendonfmu.recordings.converters.hdf5_log import damaged, open_file
+from tendonfmu.recordings.converters.hdf5_log import Array, ArraysLog, damaged, open_file
 
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 HDF5_AT = 512  # bytes; where MATLAB puts it
@@ -31,20 +31,22 @@ def open_matlab(file: Path, settings: LogFormat) -> ArraysLog:
             begin = raw.read(HDF5_AT + len(HDF5_MARK))
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from None
+    is_hdf5 = begin[HDF5_AT:] == HDF5_MARK or begin.startswith(HDF5_MARK)
     notes: list[str] = []
-    if begin[HDF5_AT:] == HDF5_MARK or begin.startswith(HDF5_MARK):
-        return ArraysLog(file, list(_of_hdf5(file, notes)), notes)
-    return ArraysLog(file, list(_of_v5(file, notes)), notes)
+    return ArraysLog(file, list((_arrays_of_hdf5 if is_hdf5 else _arrays_of_v5)(file, notes)), notes)
+
+
+def _note_of_object(file: Path, name: str) -> str:
+    return (
+        f"{file}: {name} is a MATLAB object (timetable, datetime, ...), which is not read; in MATLAB save it as a "
+        "struct: S = table2struct(timetable2table(T), 'ToScalar', true), times by posixtime, then save('log.mat', 'S')"
+    )
 
 
 # --- v5 ---------------------------------------------------------------------------------------------------------------
 
 
-def _of_v5(file: Path, notes: list[str]) -> Iterator[Array]:
-    import warnings
-
-    from scipy import io
-
+def _arrays_of_v5(file: Path, notes: list[str]) -> Iterator[Array]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of objects, which are noted below
@@ -55,11 +57,10 @@ def _of_v5(file: Path, notes: list[str]) -> Iterator[Array]:
             f"{file}: not a whole MATLAB file ({reason}); copy the file again, or save it again in MATLAB"
         ) from None
     for name, value in content.items():
-        if name.startswith("__") or name == "None":
-            if name == "None":
-                notes.append(_of_object(file, "a variable"))
-            continue
-        yield from _walk(file, name, value, "", notes)
+        if name == "None":
+            notes.append(_note_of_object(file, "a variable"))
+        elif not name.startswith("__"):
+            yield from _walk(file, name, value, "", notes)
 
 
 def _walk(file: Path, name: str, value: Any, topic: str, notes: list[str]) -> Iterator[Array]:
@@ -68,30 +69,21 @@ def _walk(file: Path, name: str, value: Any, topic: str, notes: list[str]) -> It
         for key in value._fieldnames:
             yield from _walk(file, f"{name}.{key}", getattr(value, key), f"{name}.", notes)
     elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction", "MatlabObject"):
-        notes.append(_of_object(file, name))
+        notes.append(_note_of_object(file, name))
     elif isinstance(value, np.ndarray) and value.dtype == object:
         if value.size and isinstance(value.flat[0], str):
-            cells = value.ravel()
-            yield Array(topic, name, (len(cells),), cells.dtype, functools.partial(rows_of, cells))
+            yield Array.of(topic, name, value.ravel(), False)
             return
         for k, inner in enumerate(value.flat, start=1):
             yield from _walk(file, f"{name}[{k}]", inner, topic, notes)
     elif isinstance(value, np.ndarray) and value.ndim and value.size and value.dtype.names is None:
-        found = value.T if value.ndim == 2 and value.shape[0] < value.shape[1] else value
-        yield Array(topic, name, found.shape, found.dtype, functools.partial(rows_of, found))
-
-
-def _of_object(file: Path, name: str) -> str:
-    return (
-        f"{file}: {name} is a MATLAB object (timetable, datetime, ...), which is not read; in MATLAB save it as a "
-        "struct: S = table2struct(timetable2table(T), 'ToScalar', true), times by posixtime, then save('log.mat', 'S')"
-    )
+        yield Array.of(topic, name, value, value.ndim == 2 and value.shape[0] < value.shape[1])
 
 
 # --- v7.3 -------------------------------------------------------------------------------------------------------------
 
 
-def _of_hdf5(file: Path, notes: list[str]) -> Iterator[Array]:
+def _arrays_of_hdf5(file: Path, notes: list[str]) -> Iterator[Array]:
     h5 = open_file(file)
     try:
         for name in h5:
@@ -105,7 +97,7 @@ def _walk_hdf5(file: Path, h5: Any, name: str, node: Any, topic: str, notes: lis
     kind = node.attrs.get("MATLAB_class", b"")
     kind = kind.decode() if isinstance(kind, bytes) else str(kind)
     if kind in OBJECTS or "MATLAB_object_decode" in node.attrs:
-        notes.append(_of_object(file, name))
+        notes.append(_note_of_object(file, name))
     elif hasattr(node, "keys"):
         for key in node:
             yield from _walk_hdf5(file, h5, f"{name}.{key}", node[key], f"{name}.", notes)
@@ -115,12 +107,5 @@ def _walk_hdf5(file: Path, h5: Any, name: str, node: Any, topic: str, notes: lis
             inner = f"{base}[{k}].{key}" if base else f"{name}[{k}]"
             yield from _walk_hdf5(file, h5, inner, h5[reference], f"{base}[{k}]." if base else topic, notes)
     elif kind != "char" and node.shape and "MATLAB_empty" not in node.attrs:
-        yield _of_dataset(name, node, topic)
-
-
-def _of_dataset(name: str, node: Any, topic: str) -> Array:
-    """Return a matrix, which MATLAB stores by columns and HDF5 shows by rows; time runs along the longer side."""
-    if len(node.shape) == 2 and node.shape[0] <= node.shape[1]:
-        shape = (node.shape[1], node.shape[0])
-        return Array(topic, name, shape, node.dtype, functools.partial(turned_rows, node))
-    return Array(topic, name, node.shape, node.dtype, functools.partial(rows_of, node))
+        # MATLAB stores a matrix by columns and HDF5 shows it by rows; time runs along the longer side
+        yield Array.of(topic, name, node, len(node.shape) == 2 and node.shape[0] <= node.shape[1])

@@ -1,4 +1,4 @@
-"""How fields of messages are found by path: ROS 2, JSON and Protobuf messages alike.
+"""How logs of messages are read, and how fields are found by path: ROS 2, JSON and Protobuf messages alike.
 
 | path | is |
 | --- | --- |
@@ -13,14 +13,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
-from tendonfmu.files import are, counted
+from tendonfmu.errors import InputError
+from tendonfmu.files import are, counted, require_extra
 from tendonfmu.recordings.converters.log import LONGEST, NUMBER, OTHER, TEXT, TIME, Block, Field, Topic
 
 LOG_TIME, PUBLISH_TIME = "@log_time", "@publish_time"
@@ -31,21 +35,127 @@ NANOSECONDS = 10**9
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[([^\[\]]+)\]")
 
+Decoder = Callable[[bytes], Any]  # raises ValueError if the message is damaged
+
 
 @dataclass
 class Received:
     """A message as its file has it."""
 
-    topic: str  # its topic
+    topic: str
     log_time: int  # ns since 1970, or since an arbitrary start
     publish_time: int
-    decode: Callable[[], Any]  # returns its content; raises ValueError if it is damaged
+    decode: Decoder
+    data: bytes
+
+    def content(self) -> Any:
+        """Return the decoded message. Raise ValueError if it is damaged."""
+        return self.decode(self.data)
+
+
+# --- the log ----------------------------------------------------------------------------------------------------------
+
+
+class MessageLog(ABC):
+    """Files of messages, one after the other."""
+
+    open_ended = True
+
+    def __init__(self, file: Path, parts: Sequence[Path]) -> None:
+        self.file = file
+        self.notes: list[str] = []
+        self.unknown: dict[str, str] = {}  # by topic, why its messages cannot be read
+        self._parts = parts
+        self.topics = _topics_of(self._messages())
+        if not self.topics:
+            reasons = "; ".join([*self.unknown.values(), *self.notes])
+            raise InputError(
+                f"{file}: no messages that can be read{f' ({reasons})' if reasons else ''}; expected at least one"
+            )
+        self.notes.clear()
+
+    @abstractmethod
+    def messages_of(self, part: Path) -> Iterator[Received]:
+        """Yield the messages of one file."""
+
+    def _messages(self) -> Iterator[Received]:
+        for part in self._parts:
+            yield from self.messages_of(part)
+
+    def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
+        """Read fields; see `log.Log`."""
+        self.notes.clear()
+        getters = {topic: [_getter_of(name[len(topic) + 1 :]) for name in names] for topic, names in wanted.items()}
+        rows: dict[str, list[list[Any]]] = {topic: [] for topic in wanted}
+        damaged = 0
+        for received in self._messages():
+            topic = received.topic
+            if topic not in getters:
+                continue
+            content = None
+            if any(not of_time for of_time, _ in getters[topic]):
+                try:
+                    content = received.content()
+                except ValueError:
+                    damaged += 1
+                    continue
+            rows[topic].append([get(received if of_time else content) for of_time, get in getters[topic]])
+            if len(rows[topic]) >= ROWS:
+                yield topic, _block(wanted[topic], rows[topic])
+                rows[topic] = []
+        for topic, last in rows.items():
+            if last:
+                yield topic, _block(wanted[topic], last)
+        if damaged:
+            self.notes.append(f"{self.file}: {counted(damaged, 'damaged message')} {are(damaged)} left out")
+
+
+def _topics_of(messages: Iterator[Received]) -> list[Topic]:
+    """Return the topics in alphabetical order, with the fields of their first messages."""
+    fields_of: dict[str, dict[str, Field]] = {}
+    counts: dict[str, int] = {}
+    for received in messages:
+        topic = received.topic
+        counts[topic] = counts.get(topic, 0) + 1
+        if counts[topic] > SAMPLES:
+            continue
+        try:
+            content = received.content()
+        except ValueError:
+            continue
+        fields = fields_of.setdefault(topic, {})
+        for path, kind, value in _leaves(content):
+            type_name = str(value) if kind == OTHER else "time" if kind == TIME else type(value).__name__
+            fields.setdefault(path, Field(f"{topic}.{path}", kind, type_name))
+        for path in (LOG_TIME, PUBLISH_TIME):
+            fields.setdefault(path, Field(f"{topic}.{path}", TIME, "time"))
+    return [Topic(name, tuple(fields.values()), counts[name], f"{name}.") for name, fields in sorted(fields_of.items())]
+
+
+def _getter_of(path: str) -> tuple[bool, Callable[[Any], Any]]:
+    """Return a function that gets a field, and whether of the `Received`, not of its content."""
+    if path in (LOG_TIME, PUBLISH_TIME):
+        return True, lambda received: getattr(received, path[1:])
+    return False, _getter(path)
+
+
+def _block(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Block:
+    return {name: _column(values) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
+
+
+def _column(values: Sequence[Any]) -> Any:
+    """Return values as a column: integers stay exact, a missing value becomes NaN, texts an Arrow array."""
+    if any(isinstance(value, str) for value in values):
+        return pa.array([value if isinstance(value, str) else None for value in values], pa.string())
+    if all(type(value) is int for value in values):
+        return np.array(values, dtype=np.int64)
+    return np.array([math.nan if value is None else float(value) for value in values], dtype=np.float64)
 
 
 # --- content ----------------------------------------------------------------------------------------------------------
 
 
-def members(value: Any) -> Mapping[str, Any] | None:
+def _members(value: Any) -> Mapping[str, Any] | None:
     """Return the fields of a message by name, or None if the value is no message."""
     if isinstance(value, Mapping):
         return value
@@ -56,7 +166,7 @@ def members(value: Any) -> Mapping[str, Any] | None:
     return None
 
 
-def stamp_of(parts: Mapping[str, Any]) -> int | None:
+def _stamp_of(parts: Mapping[str, Any]) -> int | None:
     """Return the ns of a time, or None if the fields are not those of one."""
     for seconds, fraction in (("sec", "nanosec"), ("seconds", "nanos"), ("sec", "nsec"), ("secs", "nsecs")):
         if parts.keys() == {seconds, fraction}:
@@ -64,61 +174,56 @@ def stamp_of(parts: Mapping[str, Any]) -> int | None:
     return None
 
 
-def leaves(value: Any, path: str = "", names: Sequence[str] = ()) -> Iterator[tuple[str, str, Any]]:
+def _leaves(value: Any, path: str = "", names: Sequence[str] = ()) -> Iterator[tuple[str, str, Any]]:
     """Yield (path, kind, value) of each field of a message, down to numbers."""
-    parts = members(value)
+    parts = _members(value)
     if parts is not None:
-        stamp = stamp_of(parts)
+        stamp = _stamp_of(parts)
         if stamp is not None:
             yield path, TIME, stamp
             return
-        inner_names = names_of(parts) or names
+        inner_names = _names_of(parts) or names
         for name, inner in parts.items():
-            yield from leaves(inner, f"{path}.{name}" if path else name, inner_names)
+            yield from _leaves(inner, f"{path}.{name}" if path else name, inner_names)
     elif isinstance(value, str | bytes):
         yield path, TEXT, value
     elif isinstance(value, bool | int | float | np.number | np.bool_):
         yield path, NUMBER, value
     elif isinstance(value, np.ndarray | Sequence) or hasattr(value, "__getitem__"):
-        yield from _elements(value, path, names)
+        if len(value) > LONGEST:
+            yield path, OTHER, f"array of {len(value)}"
+            return
+        has_names = len(names) == len(value) and len(set(names)) == len(names)
+        for k, inner in enumerate(value):
+            if not isinstance(inner, str):
+                yield from _leaves(inner, f"{path}[{names[k] if has_names else k + 1}]", names)
 
 
-def _elements(value: Any, path: str, names: Sequence[str]) -> Iterator[tuple[str, str, Any]]:
-    if len(value) > LONGEST:
-        yield path, OTHER, f"array of {len(value)}"
-        return
-    by_name = len(names) == len(value) and len(set(names)) == len(names)
-    for k, inner in enumerate(value):
-        if isinstance(inner, str):
-            continue
-        yield from leaves(inner, f"{path}[{names[k] if by_name else k + 1}]", names)
-
-
-def names_of(parts: Mapping[str, Any]) -> list[str]:
+def _names_of(parts: Mapping[str, Any]) -> list[str]:
     """Return the list of names in a message, or an empty one."""
     for key in NAME_LISTS:
-        found = parts.get(key)
-        if found is not None and not isinstance(found, str) and len(found) and all(isinstance(n, str) for n in found):
-            return list(found)
+        names = parts.get(key)
+        if names is not None and not isinstance(names, str) and len(names) and all(isinstance(n, str) for n in names):
+            return list(names)
     return []
 
 
-def getter(path: str) -> Callable[[Any], Any]:
+def _getter(path: str) -> Callable[[Any], Any]:
     """Return a function that gets the field of a path, a number, text or time in ns, or None if it is not there."""
-    steps = [(name, element) for name, element in _STEP.findall(path)]
+    steps = _STEP.findall(path)
 
     def get(message: Any) -> Any:
-        parts = members(message)
+        parts = _members(message)
         if parts is not None and path in parts:  # names in JSON may hold dots and brackets
             return _plain(parts[path])
         value: Any = message
         names: list[str] = []
         for name, element in steps:
             if name:
-                parts = members(value)
+                parts = _members(value)
                 if parts is None or name not in parts:
                     return None
-                names = names_of(parts) or names
+                names = _names_of(parts) or names
                 value = parts[name]
             else:
                 place = int(element) - 1 if element.isdigit() else (names.index(element) if element in names else -1)
@@ -133,107 +238,50 @@ def getter(path: str) -> Callable[[Any], Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, bool | int | float | str | np.number | np.bool_):
         return value
-    parts = members(value)
-    return None if parts is None else stamp_of(parts)
+    parts = _members(value)
+    return None if parts is None else _stamp_of(parts)
 
 
-# --- topics -----------------------------------------------------------------------------------------------------------
+# --- ROS 2 ------------------------------------------------------------------------------------------------------------
 
 
-class FieldLister:
-    """Lists the fields of topics from their first messages."""
+class Ros2Types:
+    """Types of ROS 2 messages in CDR, which the package rosbags decodes without ROS."""
 
-    def __init__(self) -> None:
-        self._found: dict[str, dict[str, Field]] = {}
-        self._seen: dict[str, int] = {}
+    def __init__(self, file: Path) -> None:
+        self._typesys = require_extra("rosbags.typesys", str(file))
+        self._defined = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
 
-    def add(self, received: Received) -> None:
-        """Take the fields of a message, if it is among the first of its topic."""
-        seen = self._seen.get(received.topic, 0)
-        self._seen[received.topic] = seen + 1
-        if seen >= SAMPLES:
+    @cached_property
+    def _common(self) -> Any:
+        """Types that come with ROS."""
+        return self._typesys.get_typestore(self._typesys.Stores.LATEST)
+
+    def decoder(self, name: str, definition: str, encoding: str) -> Decoder | None:
+        """Return a function that decodes messages, or None if the type is not known."""
+        if name.count("/") == 1:
+            name = name.replace("/", "/msg/")
+        if definition.strip():
+            self._define(name, definition, encoding)
+        store = self._defined if definition.strip() else self._common
+        return partial(_decode_cdr, store, name) if name in store.fielddefs else None
+
+    def _define(self, name: str, definition: str, encoding: str) -> None:
+        known = self._defined.fielddefs
+        if name in known:
             return
-        prefix = f"{received.topic}."
-        fields = self._found.setdefault(received.topic, {})
         try:
-            content = received.decode()
-        except ValueError:
+            if encoding == "ros2idl":
+                types = self._typesys.get_types_from_idl(definition)
+            else:
+                types = self._typesys.get_types_from_msg(definition, name)
+            self._defined.register({key: value for key, value in types.items() if key not in known})
+        except Exception:  # the parser of rosbags raises errors of its own for a definition that it cannot read
             return
-        for path, kind, value in leaves(content):
-            name = prefix + path
-            said = str(value) if kind == OTHER else "time" if kind == TIME else type(value).__name__
-            fields.setdefault(name, Field(name, kind, said))
-        for path in (LOG_TIME, PUBLISH_TIME):
-            fields.setdefault(prefix + path, Field(prefix + path, TIME, "time"))
-
-    def topics(self) -> list[Topic]:
-        """Return the topics in alphabetical order."""
-        return [
-            Topic(name, tuple(fields.values()), self._seen[name], f"{name}.")
-            for name, fields in sorted(self._found.items())
-            if fields
-        ]
 
 
-class Collector:
-    """Collects fields of messages as columns."""
-
-    def __init__(self, wanted: Mapping[str, Sequence[str]]) -> None:
-        self._names = wanted
-        self._getters = {
-            topic: [_getter_of(name[len(topic) + 1 :]) for name in names] for topic, names in wanted.items()
-        }
-        self._rows: dict[str, list[list[Any]]] = {topic: [] for topic in wanted}
-        self._damaged = 0
-
-    def blocks(self, messages: Iterable[Received]) -> Iterator[tuple[str, Block]]:
-        """Take all messages; yield the blocks of their topics."""
-        for received in messages:
-            yield from self._add(received)
-        for topic, rows in self._rows.items():
-            if rows:
-                yield topic, self._block(topic)
-
-    def notes(self, file: Path) -> list[str]:
-        """Return what is to be said of the messages of a file: how many were damaged."""
-        out = self._damaged
-        return [f"{file}: {counted(out, 'damaged message')} {are(out)} left out"] if out else []
-
-    def _add(self, received: Received) -> Iterator[tuple[str, Block]]:
-        """Take a message; yield its topic's block if it is full."""
-        getters = self._getters.get(received.topic)
-        if getters is None:
-            return
-        content = None
-        if any(not of_time for of_time, _ in getters):
-            try:
-                content = received.decode()
-            except ValueError:
-                self._damaged += 1
-                return
-        rows = self._rows[received.topic]
-        rows.append([get(received if of_time else content) for of_time, get in getters])
-        if len(rows) >= ROWS:
-            yield received.topic, self._block(received.topic)
-
-    def _block(self, topic: str) -> Block:
-        rows, self._rows[topic] = self._rows[topic], []
-        return {name: _column(values) for name, values in zip(self._names[topic], zip(*rows, strict=True), strict=True)}
-
-
-def _getter_of(path: str) -> tuple[bool, Callable[[Any], Any]]:
-    if path in (LOG_TIME, PUBLISH_TIME):
-        attribute = path[1:]
-        return True, lambda received: getattr(received, attribute)
-    return False, getter(path)
-
-
-def _column(values: Sequence[Any]) -> Any:
-    """Return values as a column: integers stay exact, a missing value becomes NaN, texts an Arrow array."""
-    if any(isinstance(value, str) for value in values):
-        import pyarrow as pa
-
-        return pa.array([value if isinstance(value, str) else None for value in values], pa.string())
-    if all(type(value) is int for value in values):
-        return np.array(values, dtype=np.int64)
-    return np.array([math.nan if value is None else float(value) for value in values], dtype=np.float64)
+def _decode_cdr(store: Any, name: str, data: bytes) -> Any:
+    try:
+        return store.deserialize_cdr(data, name)
+    except Exception as error:  # generated code fails in any way on a damaged message
+        raise ValueError(str(error)) from None

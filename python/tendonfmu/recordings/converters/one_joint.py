@@ -12,22 +12,28 @@ Torque is tendon force:
 So a metre of a sliding axis is a radian, a newton is a newton metre, and a kilogram is a kg·m². If there is no column
 of velocity, it is computed from the angle: central differences, then a Butterworth filter of 2nd order forwards and
 backwards, which adds no delay.
+
+The description starts from a straight line that explains the torque: torque − known load = coulomb·sgn(v) + viscous·v +
+inertia·a + offset, by least squares over the samples in motion. With a known load there is no row `inertia`: a known
+load already contains the torque that accelerates the machine.
 """
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.model import DEFAULTS
-from tendonfmu.recordings.converters.column_map import Joint
-
-Series = NDArray[np.float64]
+from tendonfmu.recordings.converters.column_map import ConvertedLog, Joint
+from tendonfmu.recordings.faults import value_step
+from tendonfmu.recordings.recording import Recording
 
 CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it
@@ -35,8 +41,15 @@ GAP = 10.0  # times the usual step; a longer step interrupts the log, and no fil
 LEAST = 20  # samples
 RESTS = 0.01  # of the largest speed; slower samples before the first motion are a start at rest
 
+STIFFNESS = 1e9  # N/m: the drive is rigid, q = x0
+SLOWEST = 1e-3  # of the largest speed; below, the joint counts as at rest
+THRESHOLD = 5.0  # times the residual of the straight line (rms); `tendonfmu tune` finds better thresholds
+# of the drive's largest torque, where nothing is measured; geared drives lose some 5 to 30 % in all
+COULOMB_SHARE, VISCOUS_SHARE, INERTIA_SHARE, NOISE_SHARE = 0.05, 0.02, 0.01, 0.005
+LEAST_SHARE = 1e-3  # of the torque's rms; starting value of a magnitude for which least squares gives less
 
-def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[dict[str, Series], float, list[str]]:
+
+def joint_columns(file: Path, parts: dict[str, Numbers], joint: Joint) -> tuple[dict[str, Numbers], float, list[str]]:
     """Return the columns of the recording, the cut-off of its velocity in Hz (0: not filtered, or given), and notes."""
     time = parts["time"]
     if len(time) < LEAST:
@@ -69,7 +82,7 @@ def joint_columns(file: Path, parts: dict[str, Series], joint: Joint) -> tuple[d
     return {name: values[begin:] for name, values in columns.items()}, cutoff, notes
 
 
-def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
+def central_velocity(time: Numbers, angle: Numbers, cutoff: float) -> Numbers:
     """Return the velocity [N] of angles [N] at times [N]. Gaps of the log divide it."""
     steps = np.diff(time)
     usual = float(np.median(steps))
@@ -85,7 +98,7 @@ def central_velocity(time: Series, angle: Series, cutoff: float) -> Series:
     return velocity
 
 
-def first_motion(file: Path, velocity: Series) -> int:
+def first_motion(file: Path, velocity: Numbers) -> int:
     """Return the number of samples before the first motion."""
     speed = np.abs(velocity)
     if not speed.max() > 0.0:
@@ -93,7 +106,7 @@ def first_motion(file: Path, velocity: Series) -> int:
     return int(np.argmax(speed > RESTS * np.quantile(speed, 0.99)))
 
 
-def _cutoff(file: Path, time: Series, wanted: float | None) -> float:
+def _cutoff(file: Path, time: Numbers, wanted: float | None) -> float:
     rate = 1.0 / float(np.median(np.diff(time)))
     if wanted is None:
         return min(CUTOFF, SHARE_OF_RATE * rate)
@@ -103,3 +116,142 @@ def _cutoff(file: Path, time: Series, wanted: float | None) -> float:
             f"expected at most {SHARE_OF_RATE * rate:g} Hz, or 0 for none"
         )
     return wanted
+
+
+# --- the description --------------------------------------------------------------------------------------------------
+
+
+def describe_joint(log: ConvertedLog) -> dict[str, Any]:
+    """Make the finger description of the machine in a log."""
+    joint = log.map.joint
+    if joint is None:
+        raise InputError(
+            f'{log.map.path}: joint: missing; expected "joint" instead of "columns" where --finger is to be written'
+        )
+    return _measured(joint.name, log.columns, log.velocity_cutoff or CUTOFF, 1.0)
+
+
+def describe_recorded_joint(name: str, recording: Recording, moment_arm: float) -> dict[str, Any]:
+    """Make the finger description of a one-joint machine, with starting numbers from its recording."""
+    # moment_arm: (m)
+    recording.require(1, 1, ())
+    groups = {f"{group}[1]": values[:, 0] for group, values in recording.groups.items()}
+    torque = moment_arm * groups["tendon_force[1]"]
+    angle = groups.get("joint_position[1]", groups["tendon_position[1]"] / moment_arm)
+    velocity = groups.get("joint_velocity[1]")
+    if velocity is None:
+        rate = 1.0 / float(np.median(np.diff(recording.time)))
+        velocity = central_velocity(recording.time, angle, min(CUTOFF, SHARE_OF_RATE * rate))
+    if not np.abs(velocity).max() > 0.0:
+        raise InputError(f"{recording.path}: the joint does not move; expected a recording of motion")
+    columns = {"time": recording.time, "tendon_force[1]": torque, "joint_position[1]": angle}
+    columns["joint_velocity[1]"] = velocity
+    known = groups.get("external_torque[1]")
+    if known is not None:
+        columns["external_torque[1]"] = known
+    return _measured(name, columns, CUTOFF, moment_arm)
+
+
+def joint_description(
+    name: str,
+    torque: float,
+    speed: float,
+    *,
+    coulomb: float | None = None,
+    viscous: float | None = None,
+    inertia: float = 0.0,
+    moment_arm: float = 1.0,
+) -> dict[str, Any]:
+    """Make the finger description of a one-joint machine from what its data sheet says."""
+    # speed: (rad/s); moment_arm: (m)
+    numbers = {
+        "coulomb": COULOMB_SHARE * torque if coulomb is None else coulomb,
+        "viscous": VISCOUS_SHARE * torque / speed if viscous is None else viscous,
+        "inertia": inertia or INERTIA_SHARE * torque / speed,
+        "offset": 0.0,
+        "missed": NOISE_SHARE * torque,
+    }
+    numbers = {key: float(f"{value:.6g}") for key, value in numbers.items()}
+    return _description(name, numbers, SLOWEST * speed, speed / 10, CUTOFF, moment_arm, known=False)
+
+
+def _measured(name: str, columns: dict[str, Numbers], cutoff: float, moment_arm: float) -> dict[str, Any]:
+    """Return the description whose numbers are those of the straight line."""
+    velocity = columns["joint_velocity[1]"]
+    slowest = slowest_motion(velocity, columns["joint_position[1]"], cutoff)
+    numbers = starting_numbers(columns, slowest)
+    known = "external_torque[1]" in columns
+    return _description(name, numbers, slowest, float(np.abs(velocity).max()) / 10, cutoff, moment_arm, known)
+
+
+def _description(
+    name: str,
+    numbers: dict[str, float],
+    slowest: float,
+    stribeck_velocity: float,
+    cutoff: float,
+    moment_arm: float,
+    known: bool,
+) -> dict[str, Any]:
+    """Return a description. known: the recordings hold the known load, which includes the torque of inertia."""
+    law = {
+        "static": numbers["coulomb"],
+        "coulomb": numbers["coulomb"],
+        "stribeck_velocity": float(f"{stribeck_velocity:.3g}"),
+        "viscous": numbers["viscous"],
+    }
+    inertia = {"effect": "inertia", "joint": 1, "inertia": numbers["inertia"]}
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": name,
+        "joints": [{"name": name, "friction": law}],
+        "tendons": [{"name": "drive", "bidirectional": True, "stiffness": STIFFNESS, "moment_arms": [moment_arm]}],
+        "velocity_threshold": {"tendon": float(f"{slowest * moment_arm:.3g}"), "joint": float(f"{slowest:.3g}")},
+        "velocity_filter_cutoff": cutoff,
+        # one offset for a recording: a bias that learns would follow the friction that is to be estimated
+        "bias": {
+            "drift_variance": 0.0,
+            "noise_std": numbers["missed"],
+            "initial_variance": 0.0,
+            "forget_rate": 0.0,
+            "initial_torque": [numbers["offset"]],
+        },
+        "contact": {"threshold": [float(f"{THRESHOLD * numbers['missed']:.4g}")]},
+        "extensions": [] if known else [inertia],
+    }
+
+
+def description_text(description: dict[str, Any]) -> str:
+    """Return the text of a description's file."""
+    return json.dumps(description, indent=1) + "\n"
+
+
+def slowest_motion(velocity: Numbers, angle: Numbers, cutoff: float) -> float:
+    """Return the speed (rad/s) below which the joint is at rest."""
+    step = 2 * np.pi * cutoff * value_step(angle)
+    return float(f"{max(step, value_step(velocity), SLOWEST * np.abs(velocity).max()):.3g}")
+
+
+def starting_numbers(columns: dict[str, Numbers], slowest: float) -> dict[str, float]:
+    """Return the numbers of the straight line."""
+    velocity = columns["joint_velocity[1]"]
+    known = columns.get("external_torque[1]")
+    torque = columns["tendon_force[1]"] - (0.0 if known is None else known)
+    acceleration = np.gradient(velocity, columns["time"])
+    moving = np.abs(velocity) > slowest
+    regressors = [np.sign(velocity), velocity, np.ones_like(velocity)] + ([acceleration] if known is None else [])
+    matrix = np.column_stack(regressors)[moving]
+    # normalised columns: for a motion at one speed, where two columns are equal, this gives the smallest numbers
+    sizes = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
+    found = np.linalg.lstsq(matrix / sizes, torque[moving], rcond=1e-9)[0] / sizes
+    missed = float(np.sqrt(np.mean((torque[moving] - matrix @ found) ** 2)))
+    least = LEAST_SHARE * float(np.sqrt(np.mean(torque**2)))
+    speed = float(np.sqrt(np.mean(velocity[moving] ** 2)))
+    numbers = {
+        "coulomb": max(float(found[0]), least),
+        "viscous": max(float(found[1]), least / speed),
+        "inertia": float(found[3]) if known is None else 0.0,
+        "offset": float(found[2]),
+        "missed": max(missed, least),
+    }
+    return {name: float(f"{value:.6g}") for name, value in numbers.items()}

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.column_map import LogFormat
-from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Block, Field, Topic, as_numbers
-
-ROWS = 1 << 18  # of a block
+from tendonfmu.recordings.converters.log import NUMBER, OTHER, ROWS, TEXT, TIME, Block, Field, Topic, as_numbers
 
 
 class ParquetLog:
@@ -29,9 +29,6 @@ class ParquetLog:
         self.topics = [Topic("", tuple(fields), rows)]
 
     def _opened(self) -> Any:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         try:
             return pq.ParquetFile(self.file)
         except (pa.ArrowException, OSError) as error:
@@ -45,42 +42,25 @@ class ParquetLog:
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read columns; see `log.Log`."""
-        import pyarrow as pa
-
-        names = list(wanted.get("", ()))
-        places = {name: self._place(name) for name in names}
+        places = {name: self.topics[0].place(name) for name in wanted.get("", ())}
         row = 0
         with self._opened() as parquet:
-            schema = parquet.schema_arrow
-            columns = sorted({schema.field(place).name for place in places.values()})
-            unique = len(set(schema.names)) == len(schema.names)
+            names = parquet.schema_arrow.names
+            is_unique = len(set(names)) == len(names)  # otherwise columns cannot be chosen by name, and all are read
+            chosen = sorted({names[place] for place in places.values()}) if is_unique else None
             try:
-                for batch in parquet.iter_batches(ROWS, columns=columns if unique else None):
-                    yield (
-                        "",
-                        {
-                            name: self._values(
-                                schema.field(place).name,
-                                batch.column(schema.field(place).name) if unique else batch.column(place),
-                                row,
-                            )
-                            for name, place in places.items()
-                        },
-                    )
+                for batch in parquet.iter_batches(ROWS, columns=chosen):
+                    block = {}
+                    for name, place in places.items():
+                        column = batch.column(names[place] if is_unique else place)
+                        block[name] = self._values(names[place], column, row)
+                    yield "", block
                     row += batch.num_rows
             except (pa.ArrowException, OSError) as error:
                 raise self._cut_off(error) from None
 
-    def _place(self, name: str) -> int:
-        names = [field.name for field in self.topics[0].fields]
-        if name.startswith(NUMBERED) and name not in names:
-            return int(name[len(NUMBERED) :]) - 1
-        return names.index(name)
-
     def _values(self, name: str, column: Any, row: int) -> Any:
         """Return a column as numbers or texts. A missing number becomes NaN."""
-        import pyarrow as pa
-
         kind = _kind(column.type)
         if kind == TEXT:
             return column
@@ -97,8 +77,6 @@ class ParquetLog:
 
 
 def _kind(kind: Any) -> str:
-    import pyarrow as pa
-
     if pa.types.is_timestamp(kind):
         return TIME
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):

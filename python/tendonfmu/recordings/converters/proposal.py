@@ -1,23 +1,42 @@
-"""Which map fits a log: what each field likely is, by its name and unit, and how sure that is.
+"""Which map fits a log, and what `convert inspect` reports: what each field likely is, and how sure that is.
 
 What cannot be decided becomes "?" in the map, which `convert table` refuses.
 """
 
 from __future__ import annotations
 
+import datetime
 import re
-from collections.abc import Container, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from tendonfmu.files import are, counted
+from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import FORMAT, UNDECIDED
-from tendonfmu.recordings.converters.element_order import Order, in_order, matched, order_of
-from tendonfmu.recordings.converters.field_groups import KNOWN, Member, field_groups, words_of
-from tendonfmu.recordings.converters.inspection import FieldSummary, Inspection
-from tendonfmu.recordings.converters.unit_guess import GUESS, LIKELY, SURE, Guess, stated, unit_of, unit_of_time
-from tendonfmu.recordings.converters.unit_guess import UNDECIDED as NOT_SURE
+from tendonfmu.recordings.converters.guesses import (
+    GUESS,
+    KNOWN,
+    LIKELY,
+    SI,
+    SURE,
+    Guess,
+    Member,
+    Order,
+    field_groups,
+    in_order,
+    matched,
+    order_of,
+    unit_of,
+    unit_of_time,
+    words_of,
+)
+from tendonfmu.recordings.converters.guesses import UNDECIDED as NOT_SURE
+from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummary, Inspection, TopicSummary
+from tendonfmu.recordings.converters.log import TIME
 
+REPORT_FORMAT = "tendonfmu-inspection-1"
+LONGEST_NAME = 40  # characters in a table
 QUANTITY = {
     "tendon_force": "force",
     "tendon_position": "length",
@@ -26,7 +45,6 @@ QUANTITY = {
     "external_torque": "torque",
     "torque": "torque",
 }
-SI = {"force": "N", "length": "m", "angle": "rad", "angular speed": "rad/s", "torque": "N.m"}
 
 
 @dataclass(frozen=True)
@@ -51,24 +69,23 @@ class Proposal:
     undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
 
 
-def propose(found: Inspection) -> Proposal:
+def propose(inspection: Inspection) -> Proposal:
     """Propose a map."""
-    groups, by_name = field_groups(found)
-    one_joint = "tendon_force" not in groups and "torque" in groups
+    groups, by_name = field_groups(inspection)
+    is_one_joint = "tendon_force" not in groups and "torque" in groups
     slots, orders = _numbered(groups)
-    if one_joint:
-        lines = _joint(found, groups)
+    if is_one_joint:
+        lines, orders = _joint(inspection, groups), []
     else:
-        lines = [_doubtful(line, orders) for line in _finger(found, slots, by_name)]
-        lines += _contact(found, groups.get("contact", []))
+        lines = [_doubtful(line, orders) for line in _finger(inspection, slots, by_name)]
+        lines += _contact(groups.get("contact", []))
     used = {line.source for line in lines}
-    names = [f.field.name for topic in found.topics for f in topic.fields]
-    log = _log_settings(found, lines)
+    names = [summary.field.name for topic in inspection.topics for summary in topic.fields]
+    log = _log_settings(inspection, lines)
     undecided = [f"log.{key}" for key, value in log.items() if value == UNDECIDED]
     undecided += [line.column for line in lines if UNDECIDED in (line.source, line.unit)]
-    shown = [] if one_joint else orders
-    document = _document(found, log, lines, shown, one_joint)
-    return Proposal(document, lines, [name for name in names if name not in used], shown, undecided)
+    document = _document(inspection, log, lines, orders, is_one_joint)
+    return Proposal(document, lines, [name for name in names if name not in used], orders, undecided)
 
 
 # --- order ------------------------------------------------------------------------------------------------------------
@@ -83,30 +100,28 @@ def _numbered(groups: dict[str, list[Member]]) -> tuple[Slots, list[Order]]:
     slots: Slots = {}
     orders = []
     for of, names in (("tendons", OF_TENDONS), ("joints", OF_JOINTS)):
-        here = [name for name in names if groups.get(name)]
-        if not here:
+        present = [name for name in names if groups.get(name)]
+        if not present:
             continue
-        most = max(len(groups[name]) for name in here)
-        first = next(name for name in here if len(groups[name]) == most)
+        first = max(present, key=lambda name: len(groups[name]))
         leading, by_number = in_order(groups[first], _name)
-        for name in here:
-            if name == first:
-                slots[name] = list(leading)
-                continue
-            slots[name], known = _beside(leading, groups[name])
-            by_number &= known
-        if most > 1:
-            listed = [[_name(each) if each else "" for each in slots[name]] for name in here]
+        slots[first] = list(leading)
+        for name in present:
+            if name != first:
+                slots[name], is_matched = _beside(leading, groups[name])
+                by_number &= is_matched
+        if len(leading) > 1:
+            listed = [[_name(member) if member else "" for member in slots[name]] for name in present]
             orders.append(order_of(of, by_number, listed))
     return slots, orders
 
 
 def _beside(leading: Sequence[Member], members: Sequence[Member]) -> tuple[list[Member | None], bool]:
     """Return members at the indices of those with the same number or name, or else in an order of their own."""
-    places = matched([_name(each) for each in leading], [_name(each) for each in members])
+    places = matched([_name(member) for member in leading], [_name(member) for member in members])
     if places is None:
-        own, numbered = in_order(members, _name)
-        return list(own), numbered
+        ordered, by_number = in_order(members, _name)
+        return list(ordered), by_number
     return [members[places.index(k)] if k in places else None for k in range(max(places) + 1)], True
 
 
@@ -124,41 +139,38 @@ def _doubtful(line: Line, orders: Sequence[Order]) -> Line:
 # --- lines ------------------------------------------------------------------------------------------------------------
 
 
-def _looking(number: int, name: str) -> str:
-    return f"{counted(number, 'field')} look{'s' if number == 1 else ''} like {name}"
+def _undecided(column: str, why: str) -> Line:
+    return Line(column, UNDECIDED, UNDECIDED, NOT_SURE, why)
 
 
-def _finger(found: Inspection, slots: Slots, by_name: Container[str]) -> list[Line]:
+def _finger(inspection: Inspection, slots: Slots, by_name: Container[str]) -> list[Line]:
     """Return the lines of a finger. by_name: tendon positions that are known only by names like those of the forces."""
-    present = {name: [each for each in members if each] for name, members in slots.items()}
-    forces, positions = (present.get(name, []) for name in OF_TENDONS)
-    lines = [_time(found, next(iter(forces or positions), None))]
+    present = {name: [member for member in members if member] for name, members in slots.items()}
+    lines = [_time(inspection, next((present[name][0] for name in OF_TENDONS if present.get(name)), None))]
     count = max(*(len(slots.get(name, [])) for name in OF_TENDONS), 1)
-    for name in OF_TENDONS:
+    for name in (*OF_TENDONS, *OF_JOINTS):
+        of_tendons = name in OF_TENDONS
         members = slots.get(name, [])
-        for k in range(count):
-            member = members[k] if k < len(members) else None
-            if member is not None:
-                line = _line(found, f"{name}[{k + 1}]", name, member[1], count > len(present[name]))
-                lines.append(_by_name(line) if _name(member) in by_name else line)
-            else:
-                seen = len(present.get(name, []))
-                why = f"{_looking(seen, name)}, and {counted(count, 'tendon')} {are(count)} needed"
-                lines.append(Line(f"{name}[{k + 1}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
-    for name in OF_JOINTS:
-        for k, each in enumerate(slots.get(name, []), start=1):
-            if each is not None:
-                lines.append(_line(found, f"{name}[{k}]", name, each[1], False))
-            else:
-                why = f"{_looking(len(present[name]), name)}, and the log has more joints"
-                lines.append(Line(f"{name}[{k}]", UNDECIDED, UNDECIDED, NOT_SURE, why))
+        seen = len(present.get(name, []))
+        if of_tendons:
+            members = [*members, *[None] * (count - len(members))]
+            reason = f"{counted(count, 'tendon')} {are(count)} needed"
+        else:
+            reason = "the log has more joints"
+        for k, member in enumerate(members, start=1):
+            if member is None:
+                looks = f"{counted(seen, 'field')} look{'s' if seen == 1 else ''} like {name}"
+                lines.append(_undecided(f"{name}[{k}]", f"{looks}, and {reason}"))
+                continue
+            line = _line(inspection, f"{name}[{k}]", name, member[1], of_tendons and count > seen)
+            lines.append(_by_name(line) if of_tendons and _name(member) in by_name else line)
     return lines
 
 
-def _contact(found: Inspection, members: Sequence[Member]) -> list[Line]:
+def _contact(members: Sequence[Member]) -> list[Line]:
     if len(members) != 1:
         return []
-    return [Line("contact", _source(found, members[0][1]), "1", "likely", "its name, and it is only 0 or 1")]
+    return [Line("contact", _source(members[0][1]), "1", LIKELY, "its name, and it is only 0 or 1")]
 
 
 def _by_name(line: Line) -> Line:
@@ -167,97 +179,204 @@ def _by_name(line: Line) -> Line:
     return replace(line, sure=sure, why=f"as many as forces, with the same names or numbers; {line.why}")
 
 
-def _joint(found: Inspection, groups: dict[str, list[Member]]) -> list[Line]:
+def _joint(inspection: Inspection, groups: dict[str, list[Member]]) -> list[Line]:
     """Return the lines of a machine with one joint. Of several joints the user has to choose one."""
-    lines = [_time(found, groups["torque"][0])]
+    lines = [_time(inspection, groups["torque"][0])]
     for key, group in (("torque", "torque"), ("angle", "joint_position"), ("velocity", "joint_velocity")):
         members = groups.get(group, [])
         if len(members) == 1:
-            line = _line(found, key, group, members[0][1], False)
-            lines.append(line)
+            lines.append(_line(inspection, key, group, members[0][1], False))
         elif key != "velocity":
-            names = ", ".join(str(each.field.name) for _, each in members[:8])
+            names = ", ".join(_name(member) for member in members[:8])
             why = f"{counted(len(members), 'field')} may be it: {names}" if members else "no field looks like it"
-            lines.append(Line(key, UNDECIDED, UNDECIDED, NOT_SURE, why))
+            lines.append(_undecided(key, why))
     return lines
 
 
-def _line(found: Inspection, column: str, group: str, summary: FieldSummary, short: bool) -> Line:
-    named = summary.field
-    words = set(words_of(named.name))
-    said = stated(named.name, named.unit)
-    if re.search(rf"(^|[./]){re.escape(column)}$", named.name) and not named.unit:
-        return Line(
-            column, _source(found, summary), SI[QUANTITY[group]], SURE, "the name of a recording's column, in SI"
-        )
-    if group == "tendon_position" and said is not None and said[1] == "angle":
-        guess = Guess(
-            UNDECIDED,
-            NOT_SURE,
-            f'{said[2]}, an angle: write "unit": "m" and "scale", the radius of the spool times rad',
-        )
+def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary, is_short: bool) -> Line:
+    """Return the line of a field. is_short: its group has fewer fields than the finger has tendons."""
+    name, source = summary.field.name, _source(summary)
+    statement = units.stated(name, summary.field.unit)
+    if re.search(rf"(^|[./]){re.escape(column)}$", name) and not summary.field.unit:
+        return Line(column, source, SI[QUANTITY[group]], SURE, "the name of a recording's column, in SI")
+    if group == "tendon_position" and statement is not None and statement[1] == "angle":
+        advice = f'{statement[2]}, an angle: write "unit": "m" and "scale", the radius of the spool times rad'
+        guess = Guess(UNDECIDED, NOT_SURE, advice)
     else:
-        guess = unit_of(named.name, named.unit, QUANTITY[group], summary.low, summary.high, found.messages)
-    sure, why = guess.sure, f"named like {group}; {guess.why}"
-    if not words & KNOWN:
-        sure, why = ("likely" if guess.sure == SURE else guess.sure), guess.why
-    if short and sure == SURE:
-        sure = "likely"
+        guess = unit_of(name, summary.field.unit, QUANTITY[group], summary.low, summary.high, inspection.messages)
+    is_named = bool(set(words_of(name)) & KNOWN)
+    why = f"named like {group}; {guess.why}" if is_named else guess.why
+    sure = LIKELY if guess.sure == SURE and (is_short or not is_named) else guess.sure
     if summary.missing:
         values = f"{summary.missing} of {counted(summary.count, 'value')} {are(summary.missing)} missing"
         why += f'; {values}: see "missing" in "log"'
-    return Line(column, _source(found, summary), guess.unit, sure, why)
+    return Line(column, source, guess.unit, sure, why)
 
 
-def _time(found: Inspection, beside: Member | None) -> Line:
+def _time(inspection: Inspection, beside: Member | None) -> Line:
     """Return the line of time: the clock of the topic with the forces."""
-    topic = beside[0] if beside else next((each for each in found.topics if each.clock), found.topics[0])
+    with_clock = (topic for topic in inspection.topics if topic.clock)
+    topic = beside[0] if beside else next(with_clock, inspection.topics[0])
     clock = topic.clock
     if clock is None:
-        return Line("time", UNDECIDED, UNDECIDED, NOT_SURE, "no field looks like a time")
-    summary = next(each for each in topic.fields if each.field.name == clock.name)
-    source = _source(found, summary)
+        return _undecided("time", "no field looks like a time")
+    summary = next(summary for summary in topic.fields if summary.field.name == clock.name)
     faults = ""
     if clock.backwards or clock.repeated:
         faults = (
             f"; it goes back {counted(clock.backwards, 'time')} and stands still {counted(clock.repeated, 'time')}: "
             'see "disorder" in "log"'
         )
-    if clock.stamp:
-        return Line("time", source, clock.stamp, SURE, f"its values are points in time{faults}")
-    guess = unit_of_time(clock.name, summary.field.unit, clock.first, clock.step)
-    return Line("time", source, guess.unit, guess.sure, f"{guess.why}{faults}")
+    guess = Guess(clock.stamp, SURE, "its values are points in time")
+    if not clock.stamp:
+        guess = unit_of_time(clock.name, summary.field.unit, clock.first, clock.step)
+    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}")
 
 
-def _source(found: Inspection, summary: FieldSummary) -> str | int:
+def _source(summary: FieldSummary) -> str | int:
     return summary.field.name if summary.key == summary.field.name else int(summary.key[1:])
 
 
 # --- the map ----------------------------------------------------------------------------------------------------------
 
 
-def _log_settings(found: Inspection, lines: Sequence[Line]) -> dict[str, Any]:
+def _log_settings(inspection: Inspection, lines: Sequence[Line]) -> dict[str, Any]:
     """Return the key `log` of the map. What to do with missing numbers of its columns is left to the user."""
-    settings = dict(found.settings)
+    settings = dict(inspection.settings)
     used = {line.source for line in lines}
-    if any(each.missing and _source(found, each) in used for topic in found.topics for each in topic.fields):
+    summaries = [summary for topic in inspection.topics for summary in topic.fields]
+    if any(summary.missing and _source(summary) in used for summary in summaries):
         settings["missing"] = UNDECIDED
     return settings
 
 
 def _document(
-    found: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], one_joint: bool
+    inspection: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], is_one_joint: bool
 ) -> dict[str, Any]:
-    columns = {}
-    for line in lines:
-        columns[line.column] = {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"}
+    columns = {
+        line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"} for line in lines
+    }
     document: dict[str, Any] = {"format": FORMAT}
     if orders:
         document["comment"] = "; ".join(order.line() for order in orders)
     if log:
         document["log"] = log
-    if one_joint:
-        document["joint"] = {"name": re.sub(r"\W+", "_", found.file.name.split(".")[0]) or "joint", **columns}
+    if is_one_joint:
+        document["joint"] = {"name": re.sub(r"\W+", "_", inspection.file.name.split(".")[0]) or "joint", **columns}
     else:
         document["columns"] = columns
     return document
+
+
+# --- what is reported -------------------------------------------------------------------------------------------------
+
+
+def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str, Any]:
+    """Return all results as JSON values."""
+    return {
+        "format": REPORT_FORMAT,
+        "log": str(inspection.file),
+        "topics": [_topic(topic, time_factor(proposal, topic)) for topic in inspection.topics],
+        "proposal": [asdict(line) for line in proposal.lines],
+        "orders": [{**asdict(order), "line": order.line()} for order in proposal.orders],
+        "undecided": proposal.undecided,
+        "unused": proposal.unused,
+        "map": proposal.document,
+        "notes": inspection.notes,
+    }
+
+
+def time_factor(proposal: Proposal, topic: TopicSummary) -> float | None:
+    """Return the factor of a topic's clock to s, if the proposal knows its unit."""
+    unit = next((line.unit for line in proposal.lines if line.column == "time"), "?")
+    if unit in units.STAMPS:
+        return 1e-9 * units.STAMPS[unit]
+    return units.TIME.get(unit)
+
+
+def _topic(topic: TopicSummary, factor: float | None) -> dict[str, Any]:
+    fields = [
+        {
+            "name": summary.field.name,
+            "type": summary.field.type,
+            "unit": summary.field.unit,
+            "count": summary.count,
+            "missing": summary.missing,
+            "range": [summary.low, summary.high] if summary.low <= summary.high else None,
+            "example": summary.example or None,
+        }
+        for summary in topic.fields
+    ]
+    clock = None if topic.clock is None else _clock(topic.clock, factor)
+    return {"name": topic.topic.name, "clock": clock, "fields": fields}
+
+
+def _clock(clock: ClockSummary, factor: float | None) -> dict[str, Any]:
+    step = clock.seconds(clock.step, factor)
+    return {
+        "field": clock.name,
+        "rows": clock.rows,
+        "first": clock.first,
+        "last": clock.last,
+        "rate": 1.0 / step if step else None,
+        "duration": clock.seconds(clock.last - clock.first, factor),
+        "largest_step": clock.seconds(clock.largest, factor),
+        "gaps": clock.gaps,
+        "repeated": clock.repeated,
+        "backwards": clock.backwards,
+    }
+
+
+def field_rows(topic: TopicSummary) -> Iterator[list[str]]:
+    """Yield the cells of each field: name, type, unit, values, missing, least, most."""
+    for summary in topic.fields:
+        if summary.low > summary.high:
+            span = [_short(summary.example), ""]
+        elif summary.field.kind == TIME:
+            span = [_moment(summary.low), _moment(summary.high)]
+        else:
+            span = [f"{summary.low:.6g}", f"{summary.high:.6g}"]
+        yield [
+            _short(summary.field.name),
+            summary.field.type,
+            summary.field.unit,
+            str(summary.count - summary.missing) if summary.count else "",
+            str(summary.missing) if summary.missing else "",
+            *span,
+        ]
+
+
+def clock_line(topic: TopicSummary, factor: float | None) -> str:
+    """Return a sentence about a topic's clock."""
+    name, clock = topic.topic.name or "the log", topic.clock
+    if clock is None:
+        return f"{name}: no field looks like a time"
+    first, last = (_moment(time) if clock.stamp else f"{time:.10g}" for time in (clock.first, clock.last))
+    parts = [f"{counted(clock.rows, 'row')} by {clock.name}, from {first} to {last}"]
+    step = clock.seconds(clock.step, factor)
+    duration = clock.seconds(clock.last - clock.first, factor)
+    if step and duration is not None:
+        parts.append(f"{duration:.6g} s at {1.0 / step:.4g} Hz")
+        parts.append(f"largest step {1e3 * (clock.seconds(clock.largest, factor) or 0.0):.4g} ms")
+    if clock.gaps:
+        parts.append(f"{counted(clock.gaps, 'gap')} of more than ten steps")
+    if clock.repeated:
+        parts.append(counted(clock.repeated, "repeated time"))
+    if clock.backwards:
+        parts.append(f"goes back {counted(clock.backwards, 'time')}")
+    return f"{name}: {', '.join(parts)}"
+
+
+def _moment(nanoseconds: float) -> str:
+    moment = datetime.datetime.fromtimestamp(nanoseconds * 1e-9, datetime.timezone.utc)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def proposal_rows(proposal: Proposal) -> Iterator[list[str]]:
+    """Yield the cells of each line of the map: our column, the log's, unit, how sure, why."""
+    for line in proposal.lines:
+        yield [line.column, _short(str(line.source)), line.unit, line.sure, line.why]
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else f"...{name[-(LONGEST_NAME - 3) :]}"

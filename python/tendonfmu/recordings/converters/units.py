@@ -7,10 +7,10 @@ numbers, and no unit is both a length and an angle. A metre of a sliding axis st
 
 from __future__ import annotations
 
-import difflib
 import functools
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Mapping
 from typing import Any
 
 from tendonfmu.files import require_extra
@@ -49,22 +49,35 @@ OF_COLUMN = {
     "contact": NONE,
 }
 
-# what loggers and engineers write, and the name in the tables
-ALIASES = {
-    **{"sec": "s", "secs": "s", "second": "s", "seconds": "s", "[s]": "s", "msec": "ms", "millisecond": "ms"},
-    **{"milliseconds": "ms", "usec": "us", "µs": "us", "μs": "us", "microseconds": "us", "nsec": "ns"},
-    **{"nanoseconds": "ns", "minutes": "min", "newton": "N", "newtons": "N", "Newton": "N", "kg-force": "kgf"},
-    **{"Nm": "N.m", "N*m": "N.m", "N·m": "N.m", "N-m": "N.m", "N m": "N.m", "mNm": "mN.m", "mN*m": "mN.m"},
-    **{"mN·m": "mN.m", "Nmm": "N.mm", "N*mm": "N.mm", "N·mm": "N.mm", "Ncm": "N.cm", "N*cm": "N.cm"},
-    **{"kgfcm": "kgf.cm", "kgcm": "kgf.cm", "kg.cm": "kgf.cm", "inlbf": "lbf.in", "in.lbf": "lbf.in"},
-    **{"meter": "m", "metre": "m", "meters": "m", "metres": "m", "millimeter": "mm", "millimetre": "mm"},
-    **{"millimeters": "mm", "millimetres": "mm", "µm": "um", "μm": "um", "in": "inch", "inches": "inch"},
-    **{"radian": "rad", "radians": "rad", "°": "deg", "degree": "deg", "degrees": "deg", "rev": "turn"},
-    **{"revolution": "turn", "revolutions": "turn", "turns": "turn", "rps": "turn/s", "rev/s": "turn/s"},
-    **{"°/s": "deg/s", "degree/s": "deg/s", "degrees/s": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s"},
-    **{"RPM": "rpm", "1/min": "rpm", "rev/min": "rpm", "mps": "m/s"},
+# name in the tables: what loggers and engineers write
+_SPELLINGS = {
+    "s": "sec secs second seconds [s]",
+    "ms": "msec millisecond milliseconds",
+    "us": "usec µs μs microseconds",
+    "ns": "nsec nanoseconds",
+    "min": "minutes",
+    "N": "newton newtons Newton",
+    "kgf": "kg-force",
+    "N.m": "Nm N*m N·m N-m",
+    "mN.m": "mNm mN*m mN·m",
+    "N.mm": "Nmm N*mm N·mm",
+    "N.cm": "Ncm N*cm",
+    "kgf.cm": "kgfcm kgcm kg.cm",
+    "lbf.in": "inlbf in.lbf",
+    "m": "meter metre meters metres",
+    "mm": "millimeter millimetre millimeters millimetres",
+    "um": "µm μm",
+    "inch": "in inches",
+    "rad": "radian radians",
+    "deg": "° degree degrees",
+    "turn": "rev revolution revolutions turns",
+    "turn/s": "rps rev/s",
+    "deg/s": "°/s degree/s degrees/s deg/sec",
+    "rad/s": "rad/sec",
+    "rpm": "RPM 1/min rev/min",
+    "m/s": "mps",
 }
-
+ALIASES = {"N m": "N.m"} | {alias: name for name, aliases in _SPELLINGS.items() for alias in aliases.split()}
 
 QUANTITIES = {
     "time": TIME,
@@ -84,7 +97,12 @@ def factor(name: str, known: Mapping[str, float]) -> float | None:
         return known[usual]
     if known is NONE or any(usual in table for table in QUANTITIES.values()):
         return None
-    return _factor_by_pint(name, next(unit for unit, value in known.items() if value == 1.0))
+    return _factor_by_pint(name, si_of(known))
+
+
+def si_of(known: Mapping[str, float]) -> str:
+    """Return the name of the SI unit in a table."""
+    return next(unit for unit, value in known.items() if value == 1.0)
 
 
 def quantity(name: str) -> tuple[str, str] | None:
@@ -93,6 +111,21 @@ def quantity(name: str) -> tuple[str, str] | None:
     for what, table in QUANTITIES.items():
         if usual in table:
             return usual, what
+    return None
+
+
+def stated(name: str, unit: str) -> tuple[str, str, str] | None:
+    """Return (unit, quantity, where) that a log states for a field, in its unit or its name, or None."""
+    if unit and (known := quantity(unit.strip(" []()"))):
+        return (*known, f"the log states {unit!r}")
+    for text in re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", name):
+        if known := quantity(text):
+            return (*known, f"the name says [{text}]")
+    for text in reversed(re.split(r"[_ /]|(?<=[a-z])\.(?=[a-z])", name)[1:]):
+        known = quantity(text)
+        # single letters and words such as "in" and "min" mean many things; N and s at the end of a name do not
+        if known and (len(text) > 1 or text in ("N", "s", "m")) and text not in ("in", "min", "us", "s2"):
+            return (*known, f"the name ends in {text}") if name.endswith(text) else None
     return None
 
 
@@ -116,12 +149,3 @@ def _factor_by_pint(name: str, reference: str) -> float | None:
         return None
     value = float(found.magnitude / wanted.magnitude)
     return value if math.isfinite(value) and value > 0.0 else None
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the known names for a message, the most similar first, at most six."""
-    names = list(known)
-    folded = {each.casefold(): each for each in names}
-    alike = [folded[each] for each in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
-    listed = [*alike, *(each for each in names if each not in alike)]
-    return ", ".join(listed[:6]) + (", ..." if len(listed) > 6 else "")
