@@ -21,7 +21,7 @@ from repository_paths import ROOT
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
 from tendonfmu.model.output_dependencies import Dependencies, dependencies, structure_of
-from tendonfmu.model.signals import FLAGS, INPUTS, NUMBERS
+from tendonfmu.model.output_names import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"

@@ -18,7 +18,7 @@ from random_fingers import random_case
 from tendonfmu.fmu.model_variables import describe_model, read_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
-from tendonfmu.model.signals import NUMBERS
+from tendonfmu.model.output_names import NUMBERS
 
 SEEDS = range(12)
 TORQUES = ("compensated_torque", "friction_torque", "bias_torque")

@@ -19,8 +19,7 @@ from rig_cases import EXAMPLES, FINGER, INDEX_RIGS, RIGS, changed, index_rig, wi
 from tendonfmu.cli import main
 from tendonfmu.errors import InputError
 from tendonfmu.simulate import plant
-from tendonfmu.simulate.rig import Rig, read_rig
-from tendonfmu.simulate.rig_format import is_rig
+from tendonfmu.simulate.rig import Rig, is_rig, read_rig
 from tendonfmu.simulate.simulation import plant_of
 
 # --- reading ----------------------------------------------------------------------------------------------------------

@@ -7,7 +7,10 @@ import errno
 import os
 import re
 import shutil
+import stat
+import struct
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError, OutputError
-from tendonfmu.fmu.archive_check import check_members, is_whole, one_line
+from tendonfmu.files import counted
 from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
 from tendonfmu.recordings import Recording
 
@@ -28,6 +31,8 @@ KINDS = ("Real", "Boolean", "Integer")
 FOR_READERS = ("sources/", "documentation/")  # no run needs these folders; with them unpacking takes five times as long
 # Types of FMI 3.0 by the names that they have in FMI 2.0.
 KIND_OF = {"Float64": "Real", "Int32": "Integer"}
+# An FMU of `tendonfmu build` has some 4 MB in 200 files; what is larger by far is no FMU and would fill the disk.
+LARGEST_UNPACKED, MOST_MEMBERS = 1 << 30, 10_000
 
 
 @dataclass(frozen=True)
@@ -72,21 +77,49 @@ def _unpack(path: Path, folder: Path) -> None:
     from fmpy import extract
 
     try:
-        check_members(path)
+        _check_members(path)
         extract(os.fspath(path), unzipdir=str(folder), include=lambda name: not name.startswith(FOR_READERS))
     except (InputError, MemoryError):
         raise
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
             raise OutputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
-        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
     except Exception as error:
-        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
     if not (folder / "modelDescription.xml").is_file():
         raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
     for library in folder.glob("binaries/*/*.so"):
-        if not is_whole(library.read_bytes()):
+        if not _is_whole(library.read_bytes()):
             raise InputError(f"{path}: {library.name} ends early; expected a whole library")
+
+
+def _is_whole(library: bytes) -> bool:
+    """Return whether a 64-bit ELF library has all its sections: loading one without ends the process (SIGBUS)."""
+    if library[:6] != b"\x7fELF\x02\x01" or len(library) < 64:
+        return True  # of another kind: the loader refuses what it does not know
+    (table,) = struct.unpack_from("<Q", library, 40)
+    size, count = struct.unpack_from("<HH", library, 58)
+    return bool(len(library) >= table + size * count)
+
+
+def _one_line(error: Exception) -> str:
+    """Return what an error says, in one line."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _check_members(path: Path) -> None:
+    """Check an archive before any of it is unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+    if len(members) > MOST_MEMBERS:
+        raise InputError(f"{path}: {counted(len(members), 'file')} in it; expected an FMU, of at most {MOST_MEMBERS}")
+    size = sum(member.file_size for member in members)  # no more is unpacked, whatever the data hold
+    if size > LARGEST_UNPACKED:
+        raise InputError(f"{path}: {size / 1e9:.3g} GB when unpacked; expected an FMU, of at most 1.07 GB")
+    for member in members:
+        if ".." in member.filename.split("/") or stat.S_ISLNK(member.external_attr >> 16):
+            raise InputError(f"{path}: {member.filename!r} is a link or leads out of it; expected an FMU")
 
 
 def _description_of(path: Path, folder: Path) -> Any:
@@ -98,7 +131,7 @@ def _description_of(path: Path, folder: Path) -> Any:
     except MemoryError:
         raise
     except Exception as error:
-        reason = f"modelDescription.xml: {one_line(error)}"
+        reason = f"modelDescription.xml: {_one_line(error)}"
         raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
@@ -248,7 +281,7 @@ class _Run:
             raise
         # no library for this system, or none that can be loaded: fmpy raises bare exceptions
         except Exception as error:
-            raise InputError(f"{path}: not an FMU ({one_line(error).replace(str(folder), '')})") from None
+            raise InputError(f"{path}: not an FMU ({_one_line(error).replace(str(folder), '')})") from None
         finally:
             os.chdir(before)  # fmpy loads a library in its folder, and stays there if that fails
 

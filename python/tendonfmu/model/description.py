@@ -17,11 +17,9 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, write_text
 from tendonfmu.model import native
+from tendonfmu.model.description_numbers import extension_numbers, extension_rows
 from tendonfmu.model.description_path import with_values_at
-from tendonfmu.model.description_text import description_text
-from tendonfmu.model.extensions import extension_numbers, extension_rows
-from tendonfmu.model.finger_html import finger_html
-from tendonfmu.model.routing_geometry import finger_drawing
+from tendonfmu.model.routing_geometry import finger_drawing, finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
 FORMAT = "tendonfmu-finger-1"
@@ -32,6 +30,7 @@ _OTHER_FORMATS = {
     "tendonfmu-score-": "report of a score",
     "tendonfmu-excitation-": "report of a plan",
 }
+_WIDTH = 160  # longest line of JSON that is not broken: a law with all digits fits
 Law = Mapping[str, Any]
 
 
@@ -243,6 +242,25 @@ def finger_from_text(path: Path, text: bytes) -> Finger:
     except native.NativeError as refused:
         raise InputError(f"{path}: {refused}") from None
     return Finger(path=path, text=text, data=json.loads(text), image=image)
+
+
+def description_text(data: Mapping[str, Any]) -> str:
+    """Return a description as JSON with each law, or list of numbers, on one line."""
+    return _laid_out(data, "") + "\n"
+
+
+def _laid_out(value: Any, indent: str) -> str:
+    flat = json.dumps(value, ensure_ascii=False)
+    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    leaf = not any(isinstance(each, dict | list) for each in inner)
+    if not inner or (leaf and len(indent) + len(flat) <= _WIDTH):
+        return flat
+    deeper = indent + "  "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key, ensure_ascii=False)}: {_laid_out(each, deeper)}" for key, each in value.items()]
+        return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
+    parts = [_laid_out(each, deeper) for each in value]
+    return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
 
 
 class _NoJson(InputError):

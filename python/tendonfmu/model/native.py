@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import _native
 from tendonfmu.arrays import Array
-from tendonfmu.model.signals import INPUTS
+from tendonfmu.model.output_names import INPUTS
 
 
 class NativeError(ValueError):

@@ -126,6 +126,16 @@ class Rig:
         return np.asarray(np.arange(samples) / self.rate)
 
 
+def is_rig(path: Path) -> bool:
+    """Return whether a file claims to be a rig, even an invalid one."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            data = json.load(file)
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
+
+
 def description_files(path: Path) -> list[Path]:
     """Return the files that describe a rig: itself, its bases and its finger."""
     # A motion file is not included, since it is a result that may be made again.

@@ -8,17 +8,94 @@ each fold; leaving a fold out is a subtraction. The numbers of the nominal model
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.statistics.column_products import PIECE, Products
+from tendonfmu.arrays import Array, Indices, Numbers
+from tendonfmu.statistics.blocks import Folds
+from tendonfmu.statistics.splines import Span, Splines
 
 MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
+_PIECE = 4096  # rows at a time
 _SMALLEST = 1e-100  # of a scale; its square does not underflow
+
+
+class Products:
+    """Columns without a slow bias, and their products by fold: the part that does not depend on a target."""
+
+    def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
+        """Project the bias out, and multiply."""
+        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        rows, joints = folds.rows, nominal.shape[1]
+        self.span = Span(splines[rows])
+        self.table = np.empty((len(rows), joints, self.nominal_count + self.count), dtype=np.float32)
+        for j in range(joints):
+            self.table[:, j, : self.nominal_count] = self.span.without(nominal[rows, j])
+            self.table[:, j, self.nominal_count :] = self.span.without(values[rows, j])
+        self.by_fold = [self._of(np.flatnonzero(folds.fold == number)) for number in range(folds.folds)]
+
+    def _of(self, rows: Indices) -> Numbers:
+        """Return the products [u + c]² of some rows."""
+        size, joints = self.table.shape[2], self.table.shape[1]
+        total = np.zeros((size, size))
+        for begin in range(0, len(rows), _PIECE):
+            part = rows[begin : begin + _PIECE]
+            columns = self.table[part].reshape(len(part) * joints, size).astype(np.float64)
+            total += columns.T @ columns
+        return total
+
+    def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
+        """Return the products with other columns."""
+        # shared: [c, k]
+        u = self.nominal_count
+        mixed = np.zeros((self.count, 0)) if shared is None else shared
+        kept = np.arange(self.count) if candidates is None else candidates
+        if not mixed.shape[1] and len(kept) == self.count:
+            return self
+        found = copy(self)
+        found.nominal_count, found.count = u + mixed.shape[1], len(kept)
+        added = self.table[:, :, u:] @ mixed.astype(np.float32)
+        found.table = np.concatenate([self.table[:, :, :u], added, self.table[:, :, u + kept]], axis=2)
+        found.by_fold = [self._turned(each, mixed, u + kept) for each in self.by_fold]
+        return found
+
+    def _turned(self, products: Numbers, mixed: Numbers, kept: Indices) -> Numbers:
+        """Return products [u + k + kept]² from [u + c]². kept: indices among all columns."""
+        u = self.nominal_count
+        cross = products[:, u:] @ mixed
+        own = np.concatenate([np.arange(u), kept])
+        count = mixed.shape[1]
+        found = np.empty((len(own) + count, len(own) + count))
+        place = np.concatenate([np.arange(u), u + count + np.arange(len(kept))])
+        found[np.ix_(place, place)] = products[np.ix_(own, own)]
+        found[place, u : u + count] = cross[own]
+        found[u : u + count, place] = cross[own].T
+        found[u : u + count, u : u + count] = mixed.T @ cross[u:]
+        return found
+
+    def with_own(self, values: Array) -> Products:
+        """Return the products with other candidates."""
+        # values: [r, n, k]
+        u = self.nominal_count
+        found = copy(self)
+        found.count = values.shape[2]
+        found.table = np.concatenate([self.table[:, :, :u], values.astype(np.float32)], axis=2)
+        found.by_fold = []
+        for number, products in enumerate(self.by_fold):
+            rows = self.folds.fold == number
+            part = found.table[rows]
+            own = part.reshape(part.shape[0] * part.shape[1], u + found.count).astype(np.float64)
+            cross = own.T @ own[:, u:]
+            both = np.empty((u + found.count, u + found.count))
+            both[:u, :u] = products[:u, :u]
+            both[:, u:] = cross
+            both[u:, :u] = cross[:u].T
+            found.by_fold.append(both)
+        return found
 
 
 @dataclass(frozen=True)
@@ -128,8 +205,8 @@ class Grams:
         if not hasattr(self, "_raw"):
             values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
             self._raw = np.zeros((self.count, self.count))
-            for begin in range(0, len(values), PIECE):
-                part = values[begin : begin + PIECE].astype(np.float64)
+            for begin in range(0, len(values), _PIECE):
+                part = values[begin : begin + _PIECE].astype(np.float64)
                 self._raw += part.T @ part
         return self._raw
 

@@ -24,6 +24,15 @@ _MOST = 500  # blocks; more are joined with their neighbours, so that memory sta
 
 
 @dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float  # the value
+    low: float  # ends of the interval
+    high: float
+
+
+@dataclass(frozen=True)
 class Estimate:
     """A value and the 95 % interval of the true value."""
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
 LEVEL = 0.95
