@@ -13,11 +13,10 @@ import agreement
 import oracle
 from random_fingers import Description, Recording, random_case
 from repetitions import repeated
-from runners import ORACLE, RUNNERS, Runner
+from runners import OTHERS, SLOW, Runner, assert_agreement
 
 FINGERS, FEWER = 50, 15
 SOURCES = (1, 2, 3)
-SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
 DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each
 SOME = DETECTION_FINGERS[::2]  # these take every branch, too
 DETECTION_SAMPLES = 250
@@ -165,24 +164,12 @@ def test_positions_fit_the_kinematics() -> None:
 
 
 @pytest.mark.parametrize("sources", repeated([1, len(SOURCES)], 0))
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle_on_random_fingers(runner: Runner, sources: int) -> None:
     """sources: how many of the kinematics each finger has; with one, it is the fewer fingers, of them some if slow."""
-    results = []
-    wrong = []
-    for seed in range(FINGERS) if sources > 1 else range(0, FEWER, 6 if runner.name in SLOW else 1):
-        for source in ((seed + k) % 3 + 1 for k in range(sources)):
-            description, recording = case(seed)
-            outputs = runner(description, recording, source)
-            found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed, source))
-            results.append(found)
-            if not found.agrees:
-                wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
-    left_out = sum(len(each.left_out) for each in results)
-    samples = sum(each.samples for each in results)
-    print(f"{runner.name}: {samples} samples, {left_out} left out, worst {max(each.worst for each in results):.3g}")
+    seeds = range(FINGERS) if sources > 1 else range(0, FEWER, 6 if runner in SLOW else 1)
+    chosen = ((seed, (seed + k) % 3 + 1) for seed in seeds for k in range(sources))
+    assert_agreement(runner, ((seed, *case(seed), source, oracle_run(seed, source)) for seed, source in chosen))
 
 
 # --- the optional keys of the detection
@@ -239,22 +226,12 @@ def test_detection_fingers_have_every_key() -> None:
 
 
 @pytest.mark.parametrize("seeds", repeated([SOME, DETECTION_FINGERS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle_on_detection(runner: Runner, seeds: range) -> None:
-    results = []
-    wrong = []
-    for seed in seeds[:: 6 if runner.name in SLOW else 1]:
-        description, recording = detection_case(seed)
-        source = 1 + seed % 3
-        outputs = runner(description, recording, source)
-        given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
-        assert set(given) <= set(outputs)
-        found = agreement.agree_with_oracle(description, recording, source, outputs, detection_oracle_run(seed))
-        results.append(found)
-        if not found.agrees:
-            wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
+    chosen = seeds[:: 6 if runner in SLOW else 1]
+    cases = ((seed, *detection_case(seed), 1 + seed % 3, detection_oracle_run(seed)) for seed in chosen)
+    given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
+    assert_agreement(runner, cases, *given)
 
 
 # --- the agreement rule itself
