@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -333,32 +332,7 @@ def test_experiments_tolerance(plant_fmu: UnpackedFmu) -> None:
             assert tolerance(instance) == used
 
 
-# --- several instances ------------------------------------------------------------------------------------------------
-
-
-def test_interleaved_instances_equal_instances_alone(plant_fmu: UnpackedFmu) -> None:
-    with Instance(plant_fmu) as instance:
-        instance.initialise()
-        alone = play(instance, 150)
-    with Instance(plant_fmu) as first, Instance(plant_fmu) as second:
-        for each in (first, second):
-            each.initialise()
-        both: list[list[list[float]]] = [[], []]
-        for k in range(150):
-            for rows, each in zip(both, (first, second), strict=True):
-                rows += play(each, 1, begin=k)
-    assert both == [alone, alone]
-
-
-def test_instances_in_threads(plant_fmu: UnpackedFmu) -> None:
-    def run(_: int) -> list[list[float]]:
-        with Instance(plant_fmu, logger=False) as instance:
-            instance.initialise()
-            return play(instance, 150)
-
-    expected = run(0)
-    with ThreadPoolExecutor(4) as pool:
-        assert list(pool.map(run, range(4))) == [expected] * 4
+# --- in a host -------------------------------------------------------------------------------------------------------
 
 
 def test_many_instances_leak_no_handle(plant_fmu: UnpackedFmu) -> None:
