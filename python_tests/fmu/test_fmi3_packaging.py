@@ -110,15 +110,6 @@ def test_dependencies_are_those_of_fmi2(small_fmu3: UnpackedFmu3, small_fmu: Unp
     assert kinds["joint_torque"] == {"fixed"} and kinds["compensated_torque"] == {"dependent"}
 
 
-def test_odd_names_survive(tmp_path: Path) -> None:
-    (tmp_path / "odd.json").write_text(json.dumps({**FINGER, "name": ODD}), encoding="utf-8")
-    fmu = tf.build(tmp_path / "odd.json", tmp_path / "odd.fmu", fmi=3)
-    assert model_of(fmu).attrib["modelName"] == ODD
-
-
-ODD = 'Zeigefinger <rechts> & "links", größer'
-
-
 def test_command_and_function(call: Call, tmp_path: Path) -> None:
     (tmp_path / "finger.json").write_text(json.dumps(FINGER))
     answer = call("build", tmp_path / "finger.json", "-o", tmp_path / "command.fmu", "--fmi", "3", "--json")

@@ -136,10 +136,11 @@ def test_model_identifier(name: str, identifier: str) -> None:
     assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier)
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.filterwarnings("error")
-def test_names_of_any_text_survive(packed: Pack) -> None:
+def test_names_of_any_text_survive(tmp_path: Path, fmi: int) -> None:
     joint = TINY["joints"][0] | {"name": "$\\frac{$ 関節 <i>"}
-    fmu = packed(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]})
+    fmu = build_fmu(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]}, tmp_path / "odd.fmu", fmi=fmi)
     description = fmpy.read_model_description(str(fmu))
     assert description.modelName == "für <b>&\"';?"
     assert b"<title>f\xc3\xbcr &lt;b&gt;" in members(fmu)["documentation/index.html"]

@@ -367,17 +367,6 @@ def test_the_page_names_every_variable_and_the_floor(plant_fmu: UnpackedFmu) -> 
         assert named and contents.glibc_floor <= tuple(map(int, named[1].split(".")))
 
 
-def test_the_page_names_the_sizes(plant_fmu: UnpackedFmu, tmp_path: Path) -> None:
-    """Within 30 %: compilers differ, and a build of an old page is off by more."""
-    named = re.search(
-        r"the Python package: ([\d.]+) MB; the FMU of the index finger ([\d.]+) MB", PAGE.read_text("utf-8")
-    )
-    sizes = plant_binary(plant_fmu.folder), build_plant_fmu(INDEX_FINGER, tmp_path / "index.fmu")
-    assert named
-    for shown, file in zip(named.groups(), sizes, strict=True):
-        assert file.stat().st_size / 1e6 == pytest.approx(float(shown), rel=0.3)
-
-
 def test_the_snippets_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "rig.json").write_text(json.dumps(fmu_rig()))
     monkeypatch.chdir(tmp_path)
