@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import re
 import shutil
 import stat
 import struct
@@ -15,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,28 +134,22 @@ def _description_of(path: Path, folder: Path) -> Any:
         raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
-class _Slave(Protocol):
-    """An instance of a version of FMI, as `_Run` uses it. fmpy raises bare exceptions when the FMU refuses a call."""
+class _Slave:
+    """What instances of both versions of FMI have. fmpy raises bare exceptions when the FMU refuses a call."""
 
-    numbers: ClassVar[Mapping[str, type[np.generic]]]  # C type of the values by kind
+    _slave: Any
 
-    def instantiate(self, log: Callable[[int, bytes], None]) -> None: ...
-    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
-        """Write settings by value reference, and enter the initialisation mode."""
+    def exit_initialisation(self) -> None:
+        self._slave.exitInitializationMode()
 
-    def exit_initialisation(self) -> None: ...
-    def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
-        """Return a function that writes `count` numbers to Real variables."""
+    def terminate(self) -> None:
+        self._slave.terminate()
 
-    def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
-        """Return a function that reads `count` values."""
-
-    def step(self, time: float, step: float) -> None: ...
-    def terminate(self) -> None: ...
-    def free(self) -> None: ...
+    def free(self) -> None:
+        self._slave.freeInstance()
 
 
-class _Slave2:
+class _Slave2(_Slave):
     """FMI 2.0."""
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.int32, "Integer": np.int32}
@@ -182,33 +175,27 @@ class _Slave2:
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
 
     def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
+        """Write settings by value reference, and enter the initialisation mode."""
         self._slave.setupExperiment(startTime=start)
         self._slave.setInteger(list(whole), list(whole.values()))
         self._slave.setReal(list(real), list(real.values()))
         self._slave.enterInitializationMode()
 
-    def exit_initialisation(self) -> None:
-        self._slave.exitInitializationMode()
-
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that writes `count` numbers to Real variables."""
         vr, write, component = _references(references), self._slave.fmi2SetReal, self._slave.component
         return lambda values: write(component, vr, count, values)
 
     def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that reads `count` values."""
         vr, read, component = _references(references), getattr(self._slave, f"fmi2Get{kind}"), self._slave.component
         return lambda values: read(component, vr, count, values)
 
     def step(self, time: float, step: float) -> None:
         self._slave.fmi2DoStep(self._slave.component, time, step, 1)
 
-    def terminate(self) -> None:
-        self._slave.terminate()
 
-    def free(self) -> None:
-        self._slave.freeInstance()
-
-
-class _Slave3:
+class _Slave3(_Slave):
     """FMI 3.0."""
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.bool_, "Integer": np.int32}
@@ -228,9 +215,6 @@ class _Slave3:
         self._slave.setFloat64(list(real), list(real.values()))
         self._slave.enterInitializationMode(startTime=start)
 
-    def exit_initialisation(self) -> None:
-        self._slave.exitInitializationMode()
-
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
         vr, write, component = _references(references), self._slave.fmi3SetFloat64, self._slave.component
         return lambda values: write(component, vr, len(vr), values, count)
@@ -243,24 +227,17 @@ class _Slave3:
     def step(self, time: float, step: float) -> None:
         self._slave.fmi3DoStep(self._slave.component, time, step, True, *self._answers)
 
-    def terminate(self) -> None:
-        self._slave.terminate()
-
-    def free(self) -> None:
-        self._slave.freeInstance()
-
 
 class _Run:
     """One instance of an FMU. Its arrays are laid out once, so that a step is a few calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
-
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
         description = _description_of(path, folder)
-        slaves: dict[str, Callable[..., _Slave]] = {"2": _Slave2, "3": _Slave3}
+        slaves: dict[str, type[_Slave2 | _Slave3]] = {"2": _Slave2, "3": _Slave3}
         slave = slaves.get(str(description.fmiVersion).partition(".")[0])
         if slave is None or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected a co-simulation FMU of FMI 2.0 or 3.0")
@@ -271,7 +248,7 @@ class _Run:
         self._inputs = {group: self._group(group) for group in INPUTS}
         before = Path.cwd()
         try:
-            self._slave: _Slave = slave(
+            self._slave: _Slave2 | _Slave3 = slave(
                 guid=description.guid,
                 unzipDirectory=str(folder),
                 modelIdentifier=description.coSimulation.modelIdentifier,
@@ -307,14 +284,13 @@ class _Run:
             sizes = [int(dimension.start) for dimension in variable.dimensions or ()]
             names = tuple(f"{group}[{i}]" for i in range(1, sizes[0] + 1)) if sizes else (group,)
             return Group(names, (variable.valueReference,), kind)
-        found = {}
-        for name, variable in self._all.items():
-            if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
-                found[int(match[1])] = variable
-        if not found:
+        count = 0
+        while f"{group}[{count + 1}]" in self._all:
+            count += 1
+        if not count:
             raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
-        names = tuple(f"{group}[{i}]" for i in sorted(found))
-        return Group(names, tuple(found[i].valueReference for i in sorted(found)), str(found[min(found)].type))
+        names = tuple(f"{group}[{i}]" for i in range(1, count + 1))
+        return Group(names, tuple(self._all[name].valueReference for name in names), str(self._all[names[0]].type))
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:

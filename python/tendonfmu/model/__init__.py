@@ -24,10 +24,13 @@ if TYPE_CHECKING:
         read_finger,
         sides,
     )
-    from .description_defaults import DEFAULTS, EFFECT_NUMBERS, LIMITS, RANGES
     from .description_numbers import (
+        DEFAULTS,
+        EFFECT_NUMBERS,
         LEFT_OUT,
+        LIMITS,
         MAGNITUDES,
+        RANGES,
         extended_row,
         extension_numbers,
         extension_rows,

@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any
 
-from tendonfmu.model.description_defaults import DEFAULTS, EFFECT_NUMBERS
+# Generated from the tables in runtime/description by `python tools/tables/generate.py`; SI units.
+_TABLE = json.loads((files("tendonfmu") / "schema" / "description_numbers.json").read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class EffectNumber:
+    """A number of an extension, in SI units."""
+
+    least: float  # its range
+    most: float
+    missing: float | None  # its value where it is left out; None if it is required
+    scale: float  # its expected magnitude
+
+
+DEFAULTS: Mapping[str, float] = _TABLE["defaults"]  # by path
+RANGES: Mapping[str, tuple[float, float]] = {path: (least, most) for path, (least, most) in _TABLE["ranges"].items()}
+LIMITS: Mapping[str, int] = _TABLE["limits"]  # largest number of each in one description
+# By effect, in the order of the FMU's parameters.
+EFFECT_NUMBERS: Mapping[str, Mapping[str, EffectNumber]] = {
+    effect: {key: EffectNumber(**number) for key, number in numbers.items()}
+    for effect, numbers in _TABLE["effects"].items()
+}
 
 # By effect, in the order of the FMU's parameters: magnitudes that matter on a hand of human size, SI units.
 MAGNITUDES: Mapping[str, Mapping[str, float]] = {
