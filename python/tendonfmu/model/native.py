@@ -7,7 +7,7 @@ caller that passes user input to the runtime adds the name of the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -136,12 +136,6 @@ class Instance:
         """Return all parameter values."""
         # returns [p], in canonical order
         return np.array(self._finger.get_parameters(range(self._finger.parameter_count)))
-
-    def set_values(self, values: Sequence[float] | NDArray[np.float64]) -> None:
-        """Write all parameters."""
-        # values: [p]
-        with _refusals():
-            self._finger.set_parameters(range(self._finger.parameter_count), [float(value) for value in values])
 
     def reset(self) -> None:
         """Return to the image: its parameters, kinematics source 1, no sample taken."""
