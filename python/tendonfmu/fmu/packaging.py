@@ -191,15 +191,15 @@ def _sources(folder: str) -> dict[str, bytes]:
 def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
     """Read the binaries of all platforms."""
     root: Traversable = package_file(installed) if folder is None else folder
-    found = {}
+    libraries = {}
     for platform in root.iterdir() if root.is_dir() else []:
         for file in platform.iterdir() if platform.is_dir() else []:
             suffix = Path(file.name).suffix
             if Path(file.name).stem == stem and suffix in BINARY_SUFFIXES:
-                found[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
-    if not found:
+                libraries[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
+    if not libraries:
         raise InputError(f"{root}: no binary; expected <FMI platform>/{stem}.so, .dll or .dylib in it")
-    return found
+    return libraries
 
 
 def model_description(context: Mapping[str, Any], fmi: int = 2) -> bytes:

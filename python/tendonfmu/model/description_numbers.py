@@ -76,8 +76,8 @@ def place_of(row: Mapping[str, Any]) -> str:
 
 def extended_row(data: Mapping[str, Any], effect: str, place: Any) -> Mapping[str, Any] | None:
     """Return the last extension of an effect at a place."""
-    own = [row for row in extension_rows(data) if row["effect"] == effect]
-    at = [row for row in own if (row.get("joint"), row.get("tendon")) == (place.joint, place.tendon)]
+    rows = [row for row in extension_rows(data) if row["effect"] == effect]
+    at = [row for row in rows if (row.get("joint"), row.get("tendon")) == (place.joint, place.tendon)]
     return at[-1] if at else None
 
 

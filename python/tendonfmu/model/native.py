@@ -172,7 +172,7 @@ class Instance:
         """Return the arrays that `step` writes."""
         # returns [n] [m]
         arrays = self._finger.step_outputs()
-        return {name: each.view(bool) if each.dtype == np.uint8 else each for name, each in arrays.items()}
+        return {name: array.view(bool) if array.dtype == np.uint8 else array for name, array in arrays.items()}
 
     def step(
         self,

@@ -122,10 +122,10 @@ def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
         return {}
     tendons = list(range(structure.tendons))
     watched = {"tendon_force": tendons, "tendon_position": tendons}
-    found: Dependencies = {
+    contacts: Dependencies = {
         name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
     }
-    return found | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
+    return contacts | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
 
 
 def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
@@ -134,12 +134,12 @@ def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
         return {}
     tendons, joints = list(range(structure.tendons)), list(range(structure.joints))
     watched = {"tendon_force": tendons, "tendon_position": tendons, "joint_position": joints}
-    found: Dependencies = {
+    extended: Dependencies = {
         name: [element | watched for element in elements]
         for name, elements in others.items()
         if name in ("joint_contact", "contact", *PLACE, *REST)
     }
-    return found | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
+    return extended | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:

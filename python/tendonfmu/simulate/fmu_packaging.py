@@ -62,7 +62,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     }
     page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
     pictures, icon = draw_pictures(rig.finger)
-    found = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     return {
         "modelDescription.xml": model_description(context),
         **pictures,
@@ -70,7 +70,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "resources/rig.json": text,
         **terminals_and_icons(context["variables"], icon),
         **licenses("license.txt", "third_party.txt"),
-        **{f"binaries/{path}": data for path, data in found.items()},
+        **{f"binaries/{path}": data for path, data in libraries.items()},
     }
 
 

@@ -52,7 +52,7 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
     # times: [N] (s); length: (s)
     if not length > 0:
         raise InputError(f"length of a block = {length:g} s: expected above 0")
-    found, count = [], 0
+    blocks, count = [], 0
     for time, slices in zip(times, parts, strict=True):
         block = np.full(len(time), NO_BLOCK, dtype=np.int64)
         for part in slices:
@@ -61,8 +61,8 @@ def regular_blocks(times: Sequence[Numbers], parts: Sequence[Sequence[slice]], l
             new = np.cumsum(np.diff(number, prepend=number[0]) > 0)
             block[part] = count + new
             count += int(new[-1]) + 1
-        found.append(block)
-    return SampleBlocks(tuple(found), count)
+        blocks.append(block)
+    return SampleBlocks(tuple(blocks), count)
 
 
 class BlockSums:
@@ -132,9 +132,9 @@ def make_folds(series: BlockSeries) -> Folds:
     stretch = np.zeros(len(rows), dtype=np.int64)
     count = 0
     for number in range(int(run[-1]) + 1 if len(run) else 0):
-        own = np.flatnonzero(run == number)
-        pieces = max(1, round(len(own) / length))
-        stretch[own] = count + np.arange(len(own)) * pieces // len(own)
+        members = np.flatnonzero(run == number)
+        pieces = max(1, round(len(members) / length))
+        stretch[members] = count + np.arange(len(members)) * pieces // len(members)
         count += pieces
     folds = max(1, min(MOST_FOLDS, count // 2))
     return Folds(rows, run, stretch, stretch * folds // max(count, 1), count, folds)
