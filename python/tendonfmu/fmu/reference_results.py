@@ -69,7 +69,7 @@ class ReferenceRun:
 
 def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False) -> ReferenceRun:
     """Run a finger over a recording; inputs, outputs and tolerance become files."""
-    # arrays: [2]
+    # arrays: as FMI 3.0 has them, the elements of a signal in one column
     grid, step = _on_grid(finger, recording)
     outputs = run_model(finger, grid)
     # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
