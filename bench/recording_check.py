@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from tendonfmu.model.description import Finger, read_finger
-from tendonfmu.model.findings import Finding
+from tendonfmu.model.plausibility import Finding
 from tendonfmu.recordings.match import belongs
 from tendonfmu.recordings.recording import GROUPS, Recording
 

@@ -7,6 +7,7 @@ import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 # Before numpy is imported. The matrices of the tests are small: a second thread of its linear algebra mostly waits, at
 # full speed, and takes the processor from the tests beside it (twice the CPU time of the estimation's).
@@ -20,6 +21,9 @@ from fmu_binary import FINGER, UnpackedFmu, unpack
 from made_once import made_once
 from plant_fmu_rig import fmu_rig
 from real_browser import BROWSERS, find_browser
+
+if TYPE_CHECKING:
+    from runners import Runner
 
 pytest_plugins = ["processor_time"]
 
@@ -98,6 +102,14 @@ def browser() -> str:
     if found is None:
         pytest.skip(f"SKIPPED: no browser to read the page in (looked for {', '.join(BROWSERS)})")
     return found
+
+
+@pytest.fixture(params=["oracle", "native"])
+def runner(request: pytest.FixtureRequest) -> Runner:
+    """The oracle and the C core, for cases that are known by hand."""
+    from runners import NATIVE, ORACLE
+
+    return {"oracle": ORACLE, "native": NATIVE}[request.param]
 
 
 @pytest.fixture

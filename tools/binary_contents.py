@@ -36,6 +36,23 @@ class Contents:
         return max((number_of(version) for version in self.glibc), default=())
 
 
+def broken_promises(
+    contents: Contents, exports: re.Pattern[str], libraries: re.Pattern[str], glibc: tuple[int, ...]
+) -> list[str]:
+    """What a library exports or needs beyond what it may; empty for a good one."""
+    found = []
+    foreign = sorted(name for name in contents.exports if not exports.fullmatch(name))
+    if foreign:
+        more = f" and {len(foreign) - 5} more" if len(foreign) > 5 else ""
+        found.append(f"exports {', '.join(foreign[:5])}{more}; expected {exports.pattern} only")
+    others = [name for name in contents.libraries if not libraries.fullmatch(name)]
+    if others:
+        found.append(f"needs {', '.join(others)}; expected the system's C library only")
+    if contents.glibc_floor > glibc:
+        found.append(f"needs GLIBC {contents.glibc[-1]}; expected at most {'.'.join(map(str, glibc))}")
+    return found
+
+
 def number_of(version: str) -> tuple[int, ...]:
     return tuple(int(part) for part in version.split("."))
 

@@ -24,7 +24,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from binary_contents import Contents, read_contents
+from binary_contents import Contents, broken_promises, read_contents
 
 ROOT = Path(__file__).resolve().parent.parent
 STEMS = {2: "tendonfmu", 3: "tendonfmu_fmi3"}  # by the version of FMI
@@ -175,18 +175,10 @@ def universal(libraries: Iterable[bytes]) -> bytes:
 
 def findings(contents: Contents, fmi: int = 2) -> list[str]:
     """What makes a library less portable than promised; empty for a good one."""
-    found = []
-    foreign = {name for name in contents.exports - LINKER_MARKS if not name.startswith(f"fmi{fmi}")}
-    if foreign:
-        found.append(f"exports {', '.join(sorted(foreign))}; expected fmi{fmi}* only")
+    exports = re.compile(rf"fmi{fmi}\w+|{'|'.join(sorted(LINKER_MARKS))}")
+    found = broken_promises(contents, exports, SYSTEM_LIBRARIES[contents.format], GLIBC)
     if f"fmi{fmi}DoStep" not in contents.exports:
         found.append(f"does not export fmi{fmi}DoStep")
-    allowed = SYSTEM_LIBRARIES[contents.format]
-    others = [name for name in contents.libraries if not allowed.fullmatch(name)]
-    if others:
-        found.append(f"needs {', '.join(others)}; expected the system's C library only")
-    if contents.glibc_floor > GLIBC:
-        found.append(f"needs GLIBC {contents.glibc[-1]}; expected at most {_GLIBC_NAME}")
     return found
 
 

@@ -34,20 +34,9 @@ from reference_files import SAME_TIME, BadFile, Trace, carried_traces, cross_che
 
 Array = NDArray[Any]
 FMI_TYPES: dict[str, Any] = {
-    "Real": np.float64,
-    "Integer": np.int32,
-    "Enumeration": np.int32,
-    "Boolean": np.bool_,
-    "Float32": np.float32,
-    "Float64": np.float64,
-    "Int8": np.int8,
-    "UInt8": np.uint8,
-    "Int16": np.int16,
-    "UInt16": np.uint16,
-    "Int32": np.int32,
-    "UInt32": np.uint32,
-    "Int64": np.int64,
-    "UInt64": np.uint64,
+    **{"Real": np.float64, "Integer": np.int32, "Enumeration": np.int32, "Boolean": np.bool_},  # FMI 2.0
+    **{f"Float{bits}": np.dtype(f"float{bits}").type for bits in (32, 64)},
+    **{f"{sign}Int{bits}": np.dtype(f"{sign.lower()}int{bits}").type for sign in ("", "U") for bits in (8, 16, 32, 64)},
 }
 
 

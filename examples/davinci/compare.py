@@ -64,12 +64,7 @@ def print_table(runs: dict[str, Comparison]) -> None:
 def figure_of(runs: dict[str, Comparison]) -> ReferenceFigure:
     return ReferenceFigure(
         title="da Vinci instrument, one jaw: compensated torque and the sensor at the jaw",
-        drawn=[
-            ReferenceCurves(
-                f"run {name}, {load}", runs[name].time, runs[name].measured, runs[name].compensated, runs[name].external
-            )
-            for name, load in DRAWN.items()
-        ],
+        drawn=[runs[name].curves(f"run {name}, {load}") for name, load in DRAWN.items()],
         names=list(SLOW),
         error=np.array([runs[name].error() for name in SLOW]),
         error_without=np.array([runs[name].error_without() for name in SLOW]),

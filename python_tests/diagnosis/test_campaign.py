@@ -28,7 +28,7 @@ from tendonfmu.diagnosis.result import (
     Where,
 )
 from tendonfmu.errors import InputError
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 from tendonfmu.tasks.jobs import workers_of
 
 ERRORS = ModelErrors((0.002,), (0.002,))

@@ -28,7 +28,7 @@ from tendonfmu.model.balance import balanced_forces, moment_arms
 from tendonfmu.model.description import Finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.block_averages import BlockSums, SampleBlocks, regular_blocks
+from tendonfmu.statistics.blocks import BlockSums, SampleBlocks, regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]

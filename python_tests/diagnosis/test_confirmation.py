@@ -12,7 +12,7 @@ from repetitions import repeated
 from synthetic_series import make_series, nuisance_of, with_effect
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.blocks import make_folds
 from tendonfmu.statistics.splines import TRENDS, basis, bias_splines, constant_bias, without
 from tendonfmu.statistics.whitening import valid_rows, whitener
 

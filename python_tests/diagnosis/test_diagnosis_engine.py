@@ -38,7 +38,7 @@ from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance, image_from_json
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 from tendonfmu.statistics.splines import residual_of
 from tendonfmu.tasks.phases import Phases
 

@@ -26,7 +26,7 @@ from tendonfmu.files.json_node import finite
 from tendonfmu.report.diagnosis_text import Names
 from tendonfmu.report.history_files import history_report, write_history
 from tendonfmu.report.history_text import headline, trend_sentence
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 from tendonfmu.tasks.jobs import workers_of
 from worn_finger import WELL, Worn, record, write_files
 

@@ -13,7 +13,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from archive_cases import ARCHIVES, HARMLESS, with_member
 from fmu_binary import FINGER
 from tendonfmu.errors import InputError
-from tendonfmu.fmu import archive_check, fmpy_client
+from tendonfmu.fmu import fmpy_client
 from tendonfmu.recordings import Recording
 
 SLOW = {"bomb of 2 GiB", "70,000 members"}  # to make; others are refused by the same checks
@@ -57,7 +57,7 @@ def test_nothing_is_unpacked_of_an_archive_that_would_fill_the_disk(
     small_fmu_path: Path, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fmpy.extract", lambda *_, **__: pytest.fail("unpacked"))
-    monkeypatch.setattr(archive_check, "LARGEST_UNPACKED", 1 << 24)
+    monkeypatch.setattr(fmpy_client, "LARGEST_UNPACKED", 1 << 24)
     file = tmp_path / "model.fmu"
     with_member("resources/zeros", bytes(1 << 24))(small_fmu_path, file)
     with pytest.raises(InputError, match=r"GB when unpacked; expected an FMU"):

@@ -11,14 +11,17 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from fmi2_headers import FMPY_HEADERS
-from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, motion, unpack
+from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, unpack
+from fmu_kinds import MAKERS
 from leak_count import least_growth, needs_count
+from plant_rigs import needs_plant
 from repository_paths import SUPPORT
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="SKIPPED: nm, objdump and /proc are those of Linux")
@@ -113,26 +116,41 @@ def test_the_count_finds_what_one_instance_in_ten_leaves(small_fmu: UnpackedFmu)
 
 SECOND = {**FINGER, "name": "other finger", "tendons": FINGER["tendons"][:2]}
 
-GLOBAL_HOST = """
-import ctypes, json, sys
+# Rows of each FMU, and what it says of a number that it refuses.
+HOST = """
+import ctypes, json, locale, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmu_binary import OK, Instance, UnpackedFmu, motion
-
-def play(instances):
-    rows = [[] for _ in instances]
-    for instance in instances:
-        instance.initialise(motion(instance.fmu, 0.0))
-    for k in range(1, 50):
-        for row, instance in zip(rows, instances):
-            assert instance.set_real(motion(instance.fmu, 0.01 * k)) == OK and instance.step(0.01 * k) == OK
-            row.append(instance.outputs())
-    return rows
-
-folders = [Path(name) for name in sys.argv[3:]]
-fmus = [UnpackedFmu(folder, getattr(ctypes, sys.argv[2])) for folder in folders]
-print(json.dumps(play([Instance(fmu) for fmu in fmus])))
+from fmu_binary import ERROR, UnpackedFmu
+from fmu_kinds import MAKERS
+mode, language, *fmus = sys.argv[2:]
+if language:
+    locale.setlocale(locale.LC_ALL, language)
+    assert locale.localeconv()["decimal_point"] == ","
+kinds = []
+for name, folder in zip(fmus[::2], fmus[1::2]):
+    kinds.append(MAKERS[name][1](UnpackedFmu(Path(folder), getattr(ctypes, mode))))
+found = []
+for kind in kinds:
+    instance = kind.make(kind.fmu)
+    instance.initialise()
+    rows = kind.advance(instance, 0, 60)
+    assert instance.write({next(iter(kind.tuned)): -1e9 - 0.25}) == ERROR
+    found.append([rows, instance.last_message])
+assert not language or locale.localeconv()["decimal_point"] == ","
+print(json.dumps(found))
 """
+
+
+def in_host(*fmus: tuple[str, UnpackedFmu], mode: str = "RTLD_LOCAL", language: str = "", **options: Any) -> list[Any]:
+    """What FMUs give that run in a process of their own. fmus: name of the kind, and the FMU."""
+    arguments = [str(each) for name, fmu in fmus for each in (name, fmu.folder)]
+    command = [sys.executable, "-c", HOST, str(SUPPORT), mode, language, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert isinstance(found, list)
+    return found
 
 
 @pytest.fixture(scope="session")
@@ -145,18 +163,15 @@ def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
     return unpack(folder / "other.fmu", folder / "unpacked")
 
 
-def test_two_fmus_in_a_process_that_shares_all_symbols(small_fmu: UnpackedFmu, other_fmu: UnpackedFmu) -> None:
-    assert small_fmu.binary.name != other_fmu.binary.name
-
-    def play(mode: str, *fmus: UnpackedFmu) -> list[object]:
-        here = SUPPORT
-        rows = json.loads(run(sys.executable, "-c", GLOBAL_HOST, here, mode, *(fmu.folder for fmu in fmus)))
-        assert isinstance(rows, list)
-        return rows
-
-    alone = play("RTLD_LOCAL", small_fmu) + play("RTLD_LOCAL", other_fmu)
-    assert play("RTLD_GLOBAL", small_fmu, other_fmu) == alone
-    assert play("RTLD_GLOBAL", other_fmu, small_fmu) == alone[::-1]
+@pytest.mark.parametrize("second", ["friction", pytest.param("plant", marks=needs_plant)])
+def test_two_fmus_in_a_process_that_shares_all_symbols(second: str, request: pytest.FixtureRequest) -> None:
+    """They have functions of the same names inside."""
+    one = "friction", request.getfixturevalue("small_fmu")
+    other = second, request.getfixturevalue({"friction": "other_fmu", "plant": "plant_fmu"}[second])
+    assert one[1].binary.name != other[1].binary.name
+    alone = in_host(one) + in_host(other)
+    assert in_host(one, other, mode="RTLD_GLOBAL") == alone
+    assert in_host(other, one, mode="RTLD_GLOBAL") == alone[::-1]
 
 
 def test_state_of_another_fmu_is_refused(small_fmu: UnpackedFmu, other_fmu: UnpackedFmu) -> None:
@@ -186,29 +201,15 @@ def test_blocks_of_another_fmu_are_neither_read_nor_written(small_fmu: UnpackedF
             assert ctypes.string_at(block, len(before)) == before
 
 
-def test_the_hosts_floating_point_stays(small_fmu: UnpackedFmu) -> None:
+FMUS = [("friction", "small_fmu"), pytest.param("plant", "plant_fmu", marks=needs_plant)]
+
+
+@pytest.mark.parametrize(("kind", "fixture"), FMUS)
+def test_the_hosts_floating_point_stays(kind: str, fixture: str, request: pytest.FixtureRequest) -> None:
     """Subnormal numbers are still there, and rounding is to nearest."""
-    with Instance(small_fmu) as instance:
-        instance.initialise(motion(small_fmu, 0.0))
-        assert instance.step(0.5) == OK
-    assert np.float64(5e-324) / 1 > 0 and np.float64(2.3e-308) / 4 > 0
-    assert np.float64(1) + np.float64(2) ** -53 == 1 and np.float64(-1) - np.float64(2) ** -53 == -1
-
-
-LOCALE_HOST = """
-import locale, sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from fmu_binary import ERROR, Instance, UnpackedFmu
-locale.setlocale(locale.LC_ALL, sys.argv[3])
-assert locale.localeconv()["decimal_point"] == ","
-with Instance(UnpackedFmu(Path(sys.argv[2]))) as instance:
-    instance.initialise({"tendon_force[1]": 1.5})
-    assert instance.get_real(["joint_torque[1]"]) == [1.5 * 0.009]
-    assert instance.set_real({"contact.threshold[1]": -0.25}) == ERROR
-    print(instance.last_message)
-assert locale.localeconv()["decimal_point"] == ","
-"""
+    with MAKERS[kind][1](request.getfixturevalue(fixture)).brought_to("s"):
+        assert np.float64(5e-324) / 1 > 0 and np.float64(2.3e-308) / 4 > 0
+        assert np.float64(1) + np.float64(2) ** -53 == 1 and np.float64(-1) - np.float64(2) ** -53 == -1
 
 
 @pytest.fixture
@@ -225,12 +226,13 @@ def comma_locale(tmp_path: Path) -> Iterator[tuple[str, dict[str, str]]]:
     yield found[0], dict(os.environ)
 
 
-def test_decimal_comma(small_fmu: UnpackedFmu, comma_locale: tuple[str, dict[str, str]]) -> None:
-    name, environment = comma_locale
-    command = [sys.executable, "-c", LOCALE_HOST, str(SUPPORT), str(small_fmu.folder), name]
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.startswith("fmi2SetReal: contact.threshold[1] = -0.25: expected 0 to")
+@pytest.mark.parametrize(("kind", "fixture"), FMUS)
+def test_decimal_comma(
+    kind: str, fixture: str, request: pytest.FixtureRequest, comma_locale: tuple[str, dict[str, str]]
+) -> None:
+    language, environment = comma_locale
+    fmu = kind, request.getfixturevalue(fixture)
+    assert in_host(fmu, language=language, env=environment) == in_host(fmu)
 
 
 # --- in fmpy ----------------------------------------------------------------------------------------------------------

@@ -19,17 +19,20 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmu_binary import FINGER, Instance, fmi_platform, unpack
+from command import Call
+from fmi3_binary import UnpackedFmu3
+from fmu_binary import FINGER, Instance, UnpackedFmu, fmi_platform, unpack
 from random_fingers import random_finger
 from repetitions import repeated
 from repository_paths import ROOT
+from tendonfmu import build, read_finger
 from tendonfmu.errors import InputError
 from tendonfmu.fmu.packaging import build_fmu, model_identifier
 from tendonfmu.model import native
-from tendonfmu.model.description import read_finger
 from tendonfmu.model.output_dependencies import dependencies, structure_of
 
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+CALIBRATED = ROOT / "examples" / "demo_recording" / "index_finger_calibrated.json"
 LAW = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005}
 # Fewest parameters with something of each kind: fmpy's validation takes its time per variable.
 TINY: dict[str, Any] = {
@@ -136,13 +139,65 @@ def test_model_identifier(name: str, identifier: str) -> None:
     assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier)
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.filterwarnings("error")
-def test_names_of_any_text_survive(packed: Pack) -> None:
+def test_names_of_any_text_survive(tmp_path: Path, fmi: int) -> None:
     joint = TINY["joints"][0] | {"name": "$\\frac{$ 関節 <i>"}
-    fmu = packed(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]})
+    fmu = build_fmu(TINY | {"name": "für <b>&\"';\ufffe", "joints": [joint]}, tmp_path / "odd.fmu", fmi=fmi)
     description = fmpy.read_model_description(str(fmu))
     assert description.modelName == "für <b>&\"';?"
     assert b"<title>f\xc3\xbcr &lt;b&gt;" in members(fmu)["documentation/index.html"]
+
+
+def test_fmi_3_0_has_the_same_files(small_fmu3: UnpackedFmu3, small_fmu: UnpackedFmu) -> None:
+    """As of FMI 2.0 but for binary, sources and their descriptions; one table, so one identifier."""
+    of_both = []
+    for fmu in (small_fmu3, small_fmu):
+        names = [path.relative_to(fmu.folder).as_posix() for path in fmu.folder.rglob("*") if path.is_file()]
+        of_both.append({name for name in names if not name.startswith(("binaries/", "sources/"))})
+    assert of_both[0] == of_both[1] and small_fmu3.token == small_fmu.guid
+    sources = {path.name for path in (small_fmu3.folder / "sources").iterdir()}
+    build_description = ElementTree.parse(small_fmu3.folder / "sources" / "buildDescription.xml").getroot()
+    configuration = build_description.find("BuildConfiguration")
+    assert configuration is not None and configuration.attrib["modelIdentifier"] == "small_finger"
+    listed = [file.attrib["name"] for file in build_description.iter("SourceFile")]
+    assert len(listed) > 60 and set(listed) == {name for name in sources if name.endswith(".c")}
+    assert not [name for name in sources if name.startswith(("fmi2", "fmi3Func", "fmi3Plat"))]
+    page = (small_fmu3.folder / "documentation" / "index.html").read_text()
+    assert "FMI3_FUNCTION_PREFIX" in page and "tendon_force" in page and "FMI 2" not in page
+
+
+def test_arrays_say_that_elements_count_from_1(small_fmu3: UnpackedFmu3) -> None:
+    root = ElementTree.parse(small_fmu3.folder / "modelDescription.xml").getroot()
+    arrays = [variable for variable in root.find("ModelVariables") or () if variable.find("Dimension") is not None]
+    assert len(arrays) > 12
+    for array in arrays:
+        dimension = array.find("Dimension")
+        assert dimension is not None
+        text = array.attrib["description"]
+        assert text.endswith(f". Element i of {dimension.attrib['start']}, counted from 1") and "{i}" not in text
+        assert len(array.attrib.get("start", "0.0").split()) in (1, int(dimension.attrib["start"]))
+
+
+def test_dependencies_of_arrays_are_those_of_fmi2(small_fmu3: UnpackedFmu3, small_fmu: UnpackedFmu) -> None:
+    """An array depends on another where an element depends on an element."""
+    two = ElementTree.parse(small_fmu.folder / "modelDescription.xml").getroot()
+    names = [scalar.attrib["name"].partition("[")[0] for scalar in two.iter("ScalarVariable")]
+    outputs = two.find("ModelStructure/Outputs")
+    assert outputs is not None
+    expected: dict[str, set[str]] = {}
+    for unknown in outputs:
+        known = expected.setdefault(names[int(unknown.attrib["index"]) - 1], set())
+        known |= {names[int(index) - 1] for index in unknown.attrib["dependencies"].split()}
+    three = ElementTree.parse(small_fmu3.folder / "modelDescription.xml").getroot()
+    name_of = {str(variable.vr): name for name, variable in small_fmu3.variables.items()}
+    found, kinds = {}, {}
+    for output in three.iter("Output"):
+        name = name_of[output.attrib["valueReference"]]
+        found[name] = {name_of[reference] for reference in output.attrib["dependencies"].split()}
+        kinds[name] = set(output.attrib["dependenciesKind"].split())
+    assert found == expected and len(found) > 8
+    assert kinds["joint_torque"] == {"fixed"} and kinds["compensated_torque"] == {"dependent"}
 
 
 # --- the archive ------------------------------------------------------------------------------------------------------
@@ -209,6 +264,33 @@ def test_binaries_of_a_folder_take_the_place_of_the_installed_ones(tmp_path: Pat
     }
 
 
+def test_command_and_function_build_fmi_3_0(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER))
+    answer = call("build", tmp_path / "finger.json", "-o", tmp_path / "command.fmu", "--fmi", "3", "--json")
+    assert answer.status == 0, answer.err
+    report = json.loads(answer.out)
+    assert (report["fmi_version"], report["inputs"], report["name"]) == ("3.0", 10, "small_finger")
+    three = build(read_finger(tmp_path / "finger.json"), tmp_path / "three.fmu", fmi=3)
+    assert three.read_bytes() == (tmp_path / "command.fmu").read_bytes()
+    assert fmpy.read_model_description(str(three), validate=False).fmiVersion == "3.0"
+
+
+def test_other_versions_are_refused(call: Call, tmp_path: Path) -> None:
+    for version in ("1", "4", "three"):
+        answer = call("build", INDEX_FINGER, "-o", tmp_path / "out.fmu", "--fmi", version)
+        assert answer.status == 2 and "--fmi" in answer.err
+    answer = call("build", ROOT / "examples/rigs/index_finger.json", "-o", tmp_path / "out.fmu", "--fmi", "3")
+    assert answer.status == 2 and "the simulated finger of a rig is an FMI 2.0 FMU; expected 2" in answer.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_binary_of_the_other_version_does_not_do(tmp_path: Path) -> None:
+    (tmp_path / "binaries" / "linux64").mkdir(parents=True)
+    (tmp_path / "binaries" / "linux64" / "tendonfmu.so").write_bytes(b"of FMI 2.0")
+    with pytest.raises(InputError, match=r"no binary; expected <FMI platform>/tendonfmu_fmi3\.so, \.dll or \.dylib"):
+        build(FINGER, tmp_path / "out.fmu", binaries=tmp_path / "binaries", fmi=3)
+
+
 @pytest.mark.parametrize("problem", ["finger", "folder", "binaries", "directory"])
 def test_a_failure_is_one_line_and_leaves_nothing(problem: str, tmp_path: Path) -> None:
     (tmp_path / "finger.json").write_text(json.dumps(FINGER | ({"tendons": []} if problem == "finger" else {})))
@@ -243,14 +325,26 @@ def test_the_texts_of_variables_stand_alone() -> None:
         assert len(texts) > 10 and not [text for text in texts if re.search(r"\b(eqs?|fig)\. ", text)]
 
 
+def findings(fmu: Path, version: int) -> list[str]:
+    """What FMI's schemas and fmpy's rules of names, units, start values and structure find."""
+    description = fmpy.read_model_description(str(fmu), validate=True)
+    assert description.fmiVersion == f"{version}.0"
+    if version == 3:
+        assert len(description.buildConfigurations[0].sourceFileSets[0].sourceFiles) > 60
+    found: list[str] = validate_fmu(str(fmu))
+    return found
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("description", repeated([TINY, FINGER], 0), ids=["tiny", "small"])
-def test_fmpy_finds_nothing(description: dict[str, Any], packed: Pack) -> None:
-    assert validate_fmu(str(packed(description))) == []
+def test_fmpy_finds_nothing(description: dict[str, Any], fmi: int, tmp_path: Path) -> None:
+    assert findings(build(description, tmp_path / "finger.fmu", fmi=fmi), fmi) == []
 
 
-@pytest.mark.long
-def test_fmpy_finds_nothing_in_the_index_finger(tmp_path: Path) -> None:
-    assert validate_fmu(str(build_fmu(INDEX_FINGER, tmp_path / "index.fmu"))) == []
+@pytest.mark.long  # fmpy takes half a minute for the names of 800 variables
+@pytest.mark.parametrize(("finger", "fmi"), [(INDEX_FINGER, 2), (INDEX_FINGER, 3), (CALIBRATED, 3)])
+def test_fmpy_finds_nothing_in_large_fingers(finger: Path, fmi: int, tmp_path: Path) -> None:
+    assert findings(build(finger, tmp_path / "finger.fmu", fmi=fmi), fmi) == []
 
 
 def test_fmpy_simulates(packed: Pack) -> None:

@@ -119,9 +119,12 @@ def test_a_finding_for_each_promise_that_is_broken() -> None:
     assert changed(glibc=("2.4", "2.17")) == []
     assert changed(glibc=("2.4", "2.18")) == ["needs GLIBC 2.18; expected at most 2.17"]
     assert changed(libraries=("libc.so.6", "libstdc++.so.6"))[0].startswith("needs libstdc++.so.6; expected")
-    assert changed(exports=frozenset({"fmi2DoStep", "malloc"})) == ["exports malloc; expected fmi2* only"]
+    assert changed(exports=frozenset({"fmi2DoStep", "malloc"}))[0].startswith("exports malloc; expected fmi2")
     assert changed(exports=frozenset({"fmi2Reset"})) == ["does not export fmi2DoStep"]
-    assert portable.findings(good, 3) == ["exports fmi2DoStep; expected fmi3* only", "does not export fmi3DoStep"]
+    assert [line.split(";")[0] for line in portable.findings(good, 3)] == [
+        "exports fmi2DoStep",
+        "does not export fmi3DoStep",
+    ]
 
 
 @pytest.mark.parametrize("data", [b"", b"#!/bin/sh\n", b"\x7fELF\x01" + bytes(60)])

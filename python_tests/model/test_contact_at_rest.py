@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import agreement
 import oracle
 from analytic_cases import ARM, NO_UPDATE, Array, Outputs, close, finger
 from analytic_cases import recording as at_times
 from random_fingers import random_case
 from repetitions import repeated
-from runners import NATIVE, ORACLE, RUNNERS, Runner, product
+from runners import NATIVE, OTHERS, SLOW, Runner, assert_agreement, assert_state_continues, product
 
 DT = 0.125
 TRAVEL = 1e-5  # m
@@ -28,13 +27,6 @@ QUICK = {"travel": TRAVEL, "settle_time": 2 * DT, "averaging_time": 0.0, "thresh
 LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}  # K = 0.92 and more
 SEEDS = range(300, 312)
 SOME = SEEDS[::3]  # these take every branch, too
-SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
-
-
-@pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
-def runner(request: pytest.FixtureRequest) -> Runner:
-    chosen: Runner = request.param
-    return chosen
 
 
 def run(
@@ -268,20 +260,11 @@ def test_random_fingers_take_every_branch_of_the_rest() -> None:
 
 
 @pytest.mark.parametrize("seeds", repeated([SOME, SEEDS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
-    results, wrong = [], []
-    for seed in seeds[:: 4 if runner.name in SLOW else 1]:
-        description, recording = resting_case(seed)
-        source = 1 + seed % 3
-        outputs = runner(description, recording, source)
-        assert {"contact_change", "contact_at_rest"} <= set(outputs)
-        found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed))
-        results.append(found)
-        if not found.agrees:
-            wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
+    chosen = seeds[:: 4 if runner in SLOW else 1]
+    cases = ((seed, *resting_case(seed), 1 + seed % 3, oracle_run(seed)) for seed in chosen)
+    assert_agreement(runner, cases, "contact_change", "contact_at_rest")
 
 
 # --- the FMU and the saved state
@@ -305,16 +288,6 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     assert names["rest"]["contact.rest.travel"].unit == "m"
 
 
-def test_a_saved_rest_goes_on(tmp_path: Path) -> None:
+def test_a_saved_rest_goes_on() -> None:
     """Saved in contact at rest, in the middle of a load that has been carried, and anywhere else."""
-    native = product("model.native")
-    description, recording = resting_case(303)
-    whole = NATIVE(description, recording, 1)
-    for k in (30, 60, 61, 75, 100, 140, 200, 300):
-        head, tail = ({name: values[part] for name, values in recording.items()} for part in (slice(k), slice(k, None)))
-        one, other = (native.Instance.from_description(description, 1) for _ in range(2))
-        one.run(head)
-        other.restore_state(one.save_state())
-        found = other.run(tail)
-        for name in ("contact_change", "contact_at_rest", "contact", "bias_torque"):
-            np.testing.assert_array_equal(found[name], whole[name][k:], err_msg=f"{name} from {k}")
+    assert_state_continues(*resting_case(303), 1, (30, 60, 61, 75, 100, 140, 200, 300))

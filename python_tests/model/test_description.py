@@ -23,7 +23,7 @@ from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.model.description import count, read_finger
-from tendonfmu.model.extensions import MAGNITUDES, extension_numbers
+from tendonfmu.model.description_numbers import MAGNITUDES, extension_numbers
 from tendonfmu.model.native import Instance, NativeError, image_from_json
 
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"

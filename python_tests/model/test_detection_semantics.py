@@ -15,18 +15,12 @@ import pytest
 
 from analytic_cases import ARM, ASYMMETRIC, LAW, NO_UPDATE, V_MIN, Array, Outputs, close, finger, law_value, one_edge
 from analytic_cases import recording as at_times
-from runners import NATIVE, ORACLE, Runner
+from runners import Runner
 
 DT = 0.125
 FREE = {"moment_arms": [ARM]}  # a tendon without friction
 NEVER = {"threshold": [1e6]}
 HALF = {"drift_variance": 0.0, "noise_std": 0.1, "initial_variance": 0.03}  # after n updates Π(1 − K) = 1/(1 + 3 n)
-
-
-@pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
-def runner(request: pytest.FixtureRequest) -> Runner:
-    chosen: Runner = request.param
-    return chosen
 
 
 def run(runner: Runner, description: Any, force: Any, speed: Any = 0.0, **others: Any) -> Outputs:

@@ -9,127 +9,28 @@ import shutil
 import subprocess
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from fit_finger import made_recording, moved_start, write_recording
-from repository_paths import ROOT
+from repository_paths import ROOT, TESTS
 
 pytestmark = pytest.mark.xdist_group("installed library")  # one worker builds for all of them
 
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
-CONSUMER_CMAKE = """\
-cmake_minimum_required(VERSION 3.22)
-project(consumer LANGUAGES C CXX)
-find_package(tendonfmu {version} REQUIRED)
-add_executable(version version.c)
-target_link_libraries(version PRIVATE tendonfmu::tendonfmu)
-add_executable(sizes sizes.cpp)
-target_link_libraries(sizes PRIVATE tendonfmu::description)
-add_executable(cpp_sizes cpp_sizes.cpp)
-target_link_libraries(cpp_sizes PRIVATE tendonfmu::description)
-target_compile_features(cpp_sizes PRIVATE cxx_std_17)
-if(TARGET tendonfmu::estimation)
-  add_executable(estimation estimation.c)
-  target_link_libraries(estimation PRIVATE tendonfmu::estimation)
-  set_target_properties(estimation PROPERTIES LINKER_LANGUAGE CXX)
-endif()
-if(TARGET tendonfmu::plant)
-  add_executable(plant plant.c)
-  target_link_libraries(plant PRIVATE tendonfmu::plant)
-  set_target_properties(plant PROPERTIES LINKER_LANGUAGE CXX)
-endif()
-"""
-
-VERSION_C = """\
-#include <stdio.h>
-#include <tendonfmu.h>
-
-int main(void) { return puts(tendonfmu_version()) < 0; }
-"""
-
-# Reads the rig, which takes the JSON readers, and would settle it, which takes SUNDIALS.
-PLANT_C = """\
-#include <stdio.h>
-#include <string.h>
-#include <tendonfmu_plant.h>
-
-int main(void) {
-  const char* rig = "{\\"format\\": \\"tendonfmu-rig-0\\"}";
-  char message[512] = "";
-  tendonfmu_plant* plant = tendonfmu_plant_create(rig, strlen(rig), message, sizeof message);
-  if (plant) tendonfmu_plant_initialise(plant);
-  tendonfmu_plant_destroy(plant);
-  return puts(message) < 0;
-}
-"""
-
+CONSUMER = TESTS / "model" / "consumer"  # programs of another project
 REFUSED = 'format = "tendonfmu-rig-0": expected "tendonfmu-rig-1"'
-
-# Would estimate and learn, which takes Eigen and threads, if the image were one.
-ESTIMATION_C = """\
-#include <stdio.h>
-#include <tendonfmu_estimation.h>
-#include <tendonfmu_learner.h>
-
-int main(void) {
-  char fit[512] = "", learn[512] = "";
-  tendonfmu_estimator* estimator = tendonfmu_estimator_create("x", 1, NULL, NULL, fit, sizeof fit);
-  tendonfmu_learner* learner = tendonfmu_learner_create("x", 1, NULL, NULL, NULL, learn, sizeof learn);
-  if (estimator) tendonfmu_estimator_fit(estimator, NULL, NULL, NULL, NULL, NULL);
-  tendonfmu_estimator_destroy(estimator);
-  tendonfmu_learner_destroy(learner);
-  return puts(fit) < 0 || puts(learn) < 0;
-}
-"""
-
 NO_IMAGE = 'not a model image: it does not begin with "TFMUIMG"'
-
-SIZES_CPP = """\
-#include <tendonfmu_description.h>
-
-#include <fstream>
-#include <iostream>
-#include <iterator>
-#include <string>
-
-int main(int, char** arguments) {
-  std::ifstream file(arguments[1]);
-  const std::string json{std::istreambuf_iterator<char>(file), {}};
-  char message[512] = "";
-  void* image = nullptr;
-  size_t size = 0;
-  if (tendonfmu_image_from_json(json.data(), json.size(), &image, &size, message, sizeof message) != TENDONFMU_OK) {
-    std::cerr << message << '\\n';
-    return 1;
-  }
-  tendonfmu_finger* finger = tendonfmu_create(image, size, message, sizeof message);
-  tendonfmu_free_image(image);
-  if (!finger) return 1;
-  std::cout << tendonfmu_joint_count(finger) << ' ' << tendonfmu_tendon_count(finger) << '\\n';
-  tendonfmu_destroy(finger);
+# Optional parts: their headers, and what their program prints.
+PARTS = {
+    "plant": (["tendonfmu_plant.h"], REFUSED),
+    "estimation": (["tendonfmu_estimation.h", "tendonfmu_learner.h"], f"{NO_IMAGE}\n{NO_IMAGE}"),
 }
-"""
-
-# The C++ interface: no library of its own.
-CPP_SIZES = """\
-#include <fstream>
-#include <iostream>
-#include <iterator>
-#include <string>
-#include <tendonfmu.hpp>
-
-int main(int, char** arguments) {
-  std::ifstream file(arguments[1]);
-  const std::string json{std::istreambuf_iterator<char>(file), {}};
-  const tendonfmu::finger finger = tendonfmu::finger::from_json(json).value();
-  std::cout << finger.joint_count() << ' ' << finger.tendon_count() << '\\n';
-}
-"""
+needs_pkg_config = pytest.mark.skipif(shutil.which("pkg-config") is None, reason="pkg-config is not installed")
 
 
 def call(*command: str | Path, env: Mapping[str, str] | None = None) -> str:
@@ -162,104 +63,68 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return (folder / "made here").rename(folder / "moved")
 
 
-def has_plant(prefix: Path) -> bool:
-    """Whether the simulated finger was built: header and library are installed together, or not at all."""
-    there = (prefix / "lib" / "libtendonfmu_plant.a").exists()
-    assert (prefix / "include" / "tendonfmu_plant.h").exists() == there
-    assert (prefix / "lib" / "pkgconfig" / "tendonfmu-plant.pc").exists() == there
+def has(prefix: Path, part: str) -> bool:
+    """Whether an optional part was built: headers and library are installed together, or not at all."""
+    there = (prefix / "lib" / f"libtendonfmu_{part}.a").exists()
+    files = [prefix / "include" / name for name in PARTS[part][0]]
+    for file in (*files, prefix / "lib" / "pkgconfig" / f"tendonfmu-{part}.pc"):
+        assert file.exists() == there
     return there
 
 
-def has_estimation(prefix: Path) -> bool:
-    """Whether the estimation of parameters was built: headers and library are installed together, or not at all."""
-    there = (prefix / "lib" / "libtendonfmu_estimation.a").exists()
-    for name in ("tendonfmu_estimation.h", "tendonfmu_learner.h"):
-        assert (prefix / "include" / name).exists() == there
-    assert (prefix / "lib" / "pkgconfig" / "tendonfmu-estimation.pc").exists() == there
-    return there
+def configure(prefix: Path, build: Path, version: str) -> subprocess.CompletedProcess[str]:
+    options = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DWANTED_VERSION={version}"]
+    command = ["cmake", "-G", "Ninja", "-S", str(CONSUMER), "-B", str(build), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.fixture(scope="module")
-def consumer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("consumer")
-    (folder / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version=project_version()), encoding="utf-8")
-    (folder / "version.c").write_text(VERSION_C, encoding="utf-8")
-    (folder / "sizes.cpp").write_text(SIZES_CPP, encoding="utf-8")
-    (folder / "cpp_sizes.cpp").write_text(CPP_SIZES, encoding="utf-8")
-    (folder / "plant.c").write_text(PLANT_C, encoding="utf-8")
-    (folder / "estimation.c").write_text(ESTIMATION_C, encoding="utf-8")
-    return folder
+def test_find_package_gives_the_libraries(prefix: Path, tmp_path: Path) -> None:
+    configured = configure(prefix, tmp_path, project_version())
+    assert configured.returncode == 0, configured.stderr
+    call("cmake", "--build", tmp_path)
+    assert call(tmp_path / "version") == project_version()
+    assert call(tmp_path / "sizes", FINGER) == call(tmp_path / "cpp_sizes", FINGER) == "4 8"
+    for part, (_, printed) in PARTS.items():
+        assert (tmp_path / part).exists() == has(prefix, part)
+        assert not has(prefix, part) or call(tmp_path / part) == printed
 
 
-def test_find_package_gives_the_libraries(prefix: Path, consumer: Path) -> None:
-    build = consumer / "build"
-    call("cmake", "-G", "Ninja", "-S", consumer, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
-    call("cmake", "--build", build)
-    assert call(build / "version") == project_version()
-    assert call(build / "sizes", FINGER) == call(build / "cpp_sizes", FINGER) == "4 8"
-    assert (build / "plant").exists() == has_plant(prefix)
-    if has_plant(prefix):
-        assert call(build / "plant") == REFUSED
-    assert (build / "estimation").exists() == has_estimation(prefix)
-    if has_estimation(prefix):
-        assert call(build / "estimation").splitlines() == [NO_IMAGE, NO_IMAGE]
+def test_find_package_refuses_a_newer_version(prefix: Path, tmp_path: Path) -> None:
+    configured = configure(prefix, tmp_path, "999.0")
+    assert configured.returncode != 0
+    assert 'requested version "999.0"' in " ".join(configured.stderr.split())
 
 
-def test_find_package_refuses_a_newer_version(prefix: Path, consumer: Path, tmp_path: Path) -> None:
-    (tmp_path / "CMakeLists.txt").write_text(CONSUMER_CMAKE.format(version="999.0"), encoding="utf-8")
-    command = ["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "build"), f"-DCMAKE_PREFIX_PATH={prefix}"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert result.returncode != 0
-    assert 'requested version "999.0"' in " ".join(result.stderr.split())
+def flags_of(prefix: Path, *modules: str) -> list[str]:
+    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
+    for module in modules:
+        assert call("pkg-config", "--modversion", module, env=search) == project_version()
+    return call("pkg-config", "--cflags", "--libs", *modules, env=search).split()
 
 
+@needs_pkg_config
 @pytest.mark.parametrize(
-    ("module", "source", "compiler", "arguments", "expected"),
+    ("module", "source", "expected"),
     [
-        ("tendonfmu", "version.c", "cc", [], project_version()),
-        ("tendonfmu-description", "sizes.cpp", "c++", [FINGER], "4 8"),
-        ("tendonfmu-description", "cpp_sizes.cpp", "c++", [FINGER], "4 8"),
+        ("tendonfmu", "version.c", project_version()),
+        ("tendonfmu-description", "sizes.cpp", "4 8"),
+        ("tendonfmu-description", "cpp_sizes.cpp", "4 8"),
+        *((f"tendonfmu-{part}", f"{part}.c", printed) for part, (_, printed) in PARTS.items()),
     ],
 )
-def test_pkg_config(
-    prefix: Path,
-    consumer: Path,
-    tmp_path: Path,
-    module: str,
-    source: str,
-    compiler: str,
-    arguments: list[Path],
-    expected: str,
-) -> None:
-    if not shutil.which("pkg-config"):
-        pytest.skip("pkg-config is not installed")
-    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
-    assert call("pkg-config", "--modversion", module, env=search) == project_version()
-    flags = call("pkg-config", "--cflags", "--libs", module, env=search).split()
-    call(compiler, consumer / source, "-o", tmp_path / "program", *flags)
-    assert call(tmp_path / "program", *arguments) == expected
-
-
-@pytest.mark.parametrize(
-    ("part", "there", "printed"),
-    [("plant", has_plant, REFUSED), ("estimation", has_estimation, f"{NO_IMAGE}\n{NO_IMAGE}")],
-)
-def test_pkg_config_of_optional_parts(
-    prefix: Path, consumer: Path, tmp_path: Path, part: str, there: Callable[[Path], bool], printed: str
-) -> None:
-    if not there(prefix):
+def test_pkg_config(prefix: Path, tmp_path: Path, module: str, source: str, expected: str) -> None:
+    part = module.removeprefix("tendonfmu-")
+    if part in PARTS and not has(prefix, part):
         pytest.skip(f"SKIPPED: built without the {part}")
-    if not shutil.which("pkg-config"):
-        pytest.skip("pkg-config is not installed")
-    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
-    flags = call("pkg-config", "--cflags", "--libs", f"tendonfmu-{part}", env=search).split()
-    call("cc", consumer / f"{part}.c", "-o", tmp_path / "program", *flags)
-    assert call(tmp_path / "program") == printed
+    compiler = "c++" if source.endswith(".cpp") else "cc"
+    call(compiler, CONSUMER / source, "-o", tmp_path / "program", *flags_of(prefix, module))
+    assert call(tmp_path / "program", FINGER) == expected
 
 
+@needs_pkg_config
 def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_path: Path) -> None:
-    if not has_estimation(prefix) or not shutil.which("pkg-config"):
-        pytest.skip("SKIPPED: built without the estimation of parameters, or pkg-config is not installed")
+    if not has(prefix, "estimation"):
+        pytest.skip("SKIPPED: built without the estimation of parameters")
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: the package is built without Eigen")
     from tendonfmu.estimate.fitting import FrictionFit
 
@@ -270,10 +135,7 @@ def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_
     made = made_recording(duration=10.0)
     made.groups.pop("external_torque", None)  # the program takes none
     recording = write_recording(made, tmp_path / "recording.csv")
-    search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
-    flags = call(
-        "pkg-config", "--cflags", "--libs", "tendonfmu-estimation", "tendonfmu-description", env=search
-    ).split()
+    flags = flags_of(prefix, "tendonfmu-estimation", "tendonfmu-description")
     call("cc", "-std=c11", "-Wall", "-Wextra", "-Werror", tmp_path / "learn.c", "-o", tmp_path / "learn", *flags)
     lines = [line.split() for line in call(tmp_path / "learn", tmp_path / "finger.json", recording).splitlines()]
     with warnings.catch_warnings():

@@ -21,7 +21,7 @@ from tendonfmu.fmu.model_variables import read_table
 from tendonfmu.fmu.packaging import build_fmu, package_file
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance, NativeError, image_from_json
-from tendonfmu.model.signals import PLACE
+from tendonfmu.model.output_names import PLACE
 from tendonfmu.recordings.recording import read_recording
 
 Array = NDArray[Any]

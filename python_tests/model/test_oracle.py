@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import analytic_cases
-import analytic_extension_cases
-import analytic_force_cases
+import analytic_extension_cases  # noqa: F401  adds cases
+import analytic_force_cases  # noqa: F401
 import oracle
-from analytic_cases import DRY, LAW, Case, finger, one_edge, recording
+from analytic_cases import CASES, DRY, LAW, finger, one_edge, recording
 from random_fingers import random_case, random_law, random_moment_arms
 from repetitions import repeated
-from runners import NATIVE, ORACLE, RUNNERS, Runner
-
-CASES = analytic_cases.CASES + analytic_force_cases.CASES + analytic_extension_cases.CASES
+from runners import NATIVE, ORACLE, RUNNERS, SLOW, Runner
 
 
 @pytest.fixture(params=RUNNERS, ids=lambda runner: runner.name)
@@ -29,20 +26,21 @@ def runner(request: pytest.FixtureRequest) -> Runner:
 
 # Calls from Python for each sample, and packed FMUs, take their time.
 RUNS = [
-    pytest.param(runner, case, id=f"{runner.name}-{case.name}", marks=pytest.mark.long if k % 4 and slow else [])
+    pytest.param(runner, name, id=f"{runner.name}-{name}", marks=pytest.mark.long if k % 4 and runner in SLOW else [])
     for runner in RUNNERS
-    for slow in [runner.name in ("single_steps", "fmu")]
-    for k, case in enumerate(CASES)
+    for k, name in enumerate(CASES)
 ]
 
 
-@pytest.mark.parametrize(("runner", "case"), RUNS)
-def test_case(runner: Runner, case: Case) -> None:
-    if case.repeated_time and not runner.repeated_time:
+@pytest.mark.parametrize(("runner", "name"), RUNS)
+def test_case(runner: Runner, name: str) -> None:
+    if name == "same_time_step" and not runner.repeated_time:
         pytest.skip(f"{runner.name} takes recordings of strictly increasing time only")
-    if case.extensions and not runner.extensions:
-        pytest.skip(f"{runner.name} has no extensions yet")
-    case.check([runner(case.description, each, case.source) for each in case.recordings])
+
+    def run(description: Any, samples: Any, source: int = 3) -> Any:
+        return runner(description, samples, source)
+
+    CASES[name](run)
 
 
 def slow_crossings(step: float) -> dict[str, Any]:

@@ -5,18 +5,18 @@ from __future__ import annotations
 import copy
 import functools
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-import agreement
 import oracle
 import oracle_derivatives
 from random_extensions import MAGNITUDES, MAKE
 from random_fingers import Description, Recording, random_case
 from repetitions import repeated
-from runners import ORACLE, RUNNERS, Runner, product
+from runners import OTHERS, SLOW, Runner, assert_agreement, assert_state_continues, product
 
 FINGERS = range(600, 640)
 SOME = FINGERS[2::3]  # these take every branch, too
@@ -71,9 +71,6 @@ def run_sse2(description: Description, recording: Recording, source: int) -> dic
     return outputs
 
 
-EVERY_RUNNER = [*(each for each in RUNNERS if each is not ORACLE), Runner("sse2_kernel", run_sse2)]
-
-
 @pytest.mark.long
 def test_fingers_have_every_effect_at_every_place_and_take_every_branch() -> None:
     branches: Counter[str] = Counter()
@@ -119,39 +116,18 @@ def test_each_row_matters() -> None:
 
 
 @pytest.mark.parametrize("seeds", repeated([SOME, FINGERS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", EVERY_RUNNER, ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", [*OTHERS, Runner("sse2_kernel", run_sse2)], ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
-    results, wrong = [], []
-    for seed in seeds[:: FMU_STRIDE if runner.name in ("single_steps", "fmu") else 1]:
-        # of every source, whatever the stride
-        chosen = seed + seed // FMU_STRIDE % FMU_STRIDE if runner.name == "fmu" else seed
-        description, recording = case(chosen)
-        outputs = runner(description, recording, source_of(chosen))
-        found = agreement.agree_with_oracle(description, recording, source_of(chosen), outputs, oracle_run(chosen))
-        results.append(found)
-        if not found.agrees:
-            wrong.append(f"finger {chosen}, source {source_of(chosen)}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
+    chosen: Sequence[int] = seeds[:: FMU_STRIDE if runner in SLOW else 1]
+    if runner.name == "fmu":  # of every source, whatever the stride
+        chosen = [seed + seed // FMU_STRIDE % FMU_STRIDE for seed in chosen]
+    assert_agreement(runner, ((seed, *case(seed), source_of(seed), oracle_run(seed)) for seed in chosen))
 
 
 def test_a_restored_state_gives_the_same_bits() -> None:
     """Saved at any sample, continued elsewhere and again: what every effect remembers is in it."""
-    native = product("model.native")
     for seed in FINGERS:
-        description, recording = case(seed)
-        whole = native.Instance.from_description(description, source_of(seed)).run(recording, parts=True)
-        at = 1 + (37 * seed) % (SAMPLES - 1)
-        parts = [{name: series[part] for name, series in recording.items()} for part in (slice(at), slice(at, None))]
-        finger = native.Instance.from_description(description, source_of(seed))
-        finger.run(parts[0])
-        state = finger.save_state()
-        other = native.Instance.from_description(description)
-        for fresh in (finger, other, other):
-            fresh.restore_state(state)
-            rest = fresh.run(parts[1], parts=True)
-            for name, series in whole.items():
-                np.testing.assert_array_equal(rest[name], series[at:], err_msg=f"finger {seed}, {name}")
+        assert_state_continues(*case(seed), source_of(seed), [1 + (37 * seed) % (SAMPLES - 1)])
 
 
 def test_kernels_give_the_same_bits() -> None:

@@ -13,11 +13,10 @@ import agreement
 import oracle
 from random_fingers import Description, Recording, random_case
 from repetitions import repeated
-from runners import ORACLE, RUNNERS, Runner
+from runners import OTHERS, SLOW, Runner, assert_agreement
 
 FINGERS, FEWER = 50, 15
 SOURCES = (1, 2, 3)
-SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
 DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each
 SOME = DETECTION_FINGERS[::2]  # these take every branch, too
 DETECTION_SAMPLES = 250
@@ -119,70 +118,13 @@ def test_random_fingers_take_every_branch(fingers: int) -> None:
     assert set(branches) == BRANCHES
 
 
-def test_fifty_fingers_have_every_structure() -> None:
-    seen: Counter[str] = Counter()
-    for seed in range(FINGERS):
-        description, recording = case(seed)
-        joints, tendons = description["joints"], description["tendons"]
-        edges = [edge for tendon in tendons for edge in tendon.get("edge_friction", [])]
-        grids = [edge["angles"] for edge in edges if edge and "angles" in edge]
-        bias = description.get("bias", {})
-        seen[f"{len(joints)} joints"] += 1
-        seen["8 tendons"] += len(tendons) == 8
-        seen["as many tendons as joints"] += len(tendons) == len(joints)
-        seen["null edge"] += None in edges
-        seen["single edge law"] += any(edge and "angles" not in edge for edge in edges)
-        seen["short list"] += any(len(t.get("edge_friction", joints)) < len(joints) for t in tendons)
-        seen["key left out"] += any("edge_friction" not in t or "pulley_friction" not in t for t in tendons)
-        seen["pulleys"] += any(any(t.get("pulley_friction", [])) for t in tendons)
-        seen["cover"] += any("cover" in joint for joint in joints)
-        seen["bidirectional"] += any(t.get("bidirectional", False) for t in tendons)
-        seen["v_min 0"] += description.get("velocity_threshold", {}).get("tendon") == 0.0
-        seen["cutoff 0"] += description.get("velocity_filter_cutoff") == 0.0
-        seen["no bias table"] += "bias" not in description
-        for key in ("noise_time", "initial_torque", "initial_variance", "noise_std_per_force"):
-            seen[key] += key in bias
-        for key in ("drift_variance", "noise_std", "initial_variance", "forget_rate"):
-            seen[f"{key} 0"] += bias.get(key) == 0.0
-        for grid in grids:
-            seen[f"{len(grid)} working points"] += 1
-            seen["uneven grid"] += len(grid) > 2 and np.ptp(np.diff(grid)) > 0.05
-        seen["jittered steps"] += np.ptp(np.diff(recording["time"])) > 1e-3
-        seen["threshold per force"] += "threshold_per_force" in description["contact"]
-    assert all(seen.values()), [name for name, count in seen.items() if not count]
-    assert {f"{k} joints" for k in range(1, 5)} | {f"{k} working points" for k in range(1, 6)} <= set(seen)
-
-
-def test_positions_fit_the_kinematics() -> None:
-    """x0 = R q + f0/k but for the sensors' noise: the three sources see the same motion."""
-    for seed in range(FINGERS):
-        description, recording = case(seed)
-        R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
-        k = np.array([tendon["stiffness"] for tendon in description["tendons"]])
-        expected = recording["joint_position"] @ R.T + recording["tendon_force"] / k
-        np.testing.assert_allclose(recording["tendon_position"], expected, rtol=0.0, atol=1e-6)
-        assert (np.diff(recording["time"]) > 0.0).all()
-
-
 @pytest.mark.parametrize("sources", repeated([1, len(SOURCES)], 0))
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle_on_random_fingers(runner: Runner, sources: int) -> None:
     """sources: how many of the kinematics each finger has; with one, it is the fewer fingers, of them some if slow."""
-    results = []
-    wrong = []
-    for seed in range(FINGERS) if sources > 1 else range(0, FEWER, 6 if runner.name in SLOW else 1):
-        for source in ((seed + k) % 3 + 1 for k in range(sources)):
-            description, recording = case(seed)
-            outputs = runner(description, recording, source)
-            found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed, source))
-            results.append(found)
-            if not found.agrees:
-                wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
-    left_out = sum(len(each.left_out) for each in results)
-    samples = sum(each.samples for each in results)
-    print(f"{runner.name}: {samples} samples, {left_out} left out, worst {max(each.worst for each in results):.3g}")
+    seeds = range(FINGERS) if sources > 1 else range(0, FEWER, 6 if runner in SLOW else 1)
+    chosen = ((seed, (seed + k) % 3 + 1) for seed in seeds for k in range(sources))
+    assert_agreement(runner, ((seed, *case(seed), source, oracle_run(seed, source)) for seed, source in chosen))
 
 
 # --- the optional keys of the detection
@@ -199,62 +141,13 @@ def test_detection_fingers_take_every_branch() -> None:
     assert set().union(*(detection_oracle_run(seed).branches for seed in SOME)) >= DETECTION_BRANCHES
 
 
-def test_detection_fingers_have_every_key() -> None:
-    seen: Counter[str] = Counter()
-    for seed in DETECTION_FINGERS:
-        description = detection_case(seed)[0]
-        contact = description["contact"]
-        places = {
-            "velocity_threshold": description.get("velocity_threshold", {}),
-            "bias": description.get("bias", {}),
-            "contact": contact,
-            "innovation": contact.get("innovation", {}),
-            "friction_bound": contact.get("friction_bound", {}),
-        }
-        for place, keys in places.items():
-            seen.update(f"{place}.{key}" for key in keys)
-        seen["release_time 0"] += contact.get("release_time") == 0.0
-        seen["release_time null"] += "release_time" in contact and contact["release_time"] is None
-        seen["uncertainty null"] += None in contact.get("uncertainty", [])
-        for directions in contact.get("uncertainty", []):
-            seen[f"{len(directions or [])} directions"] += 1
-        seen["extension"] += bool(description.get("extensions"))
-        seen["no method"] += "method" not in contact
-        seen["position_filter"] += "position_filter" in description
-        seen["jerk_density"] += "jerk_density" in description.get("position_filter", {})
-        seen["full hysteresis"] += places["velocity_threshold"].get("hysteresis") == 1.0
-    expected = {
-        "velocity_threshold.hysteresis", "bias.forgetting", "bias.entry_load", "bias.start_share",
-        "contact.method", "contact.innovation",
-        "innovation.time", "innovation.threshold", "innovation.threshold_per_force", "innovation.evidence_time",
-        "contact.friction_bound", "friction_bound.stuck_share", "friction_bound.jump_share", "friction_bound.jump_time",
-        "friction_bound.stuck_time",
-        "contact.uncertainty", "contact.uncertainty_level", "contact.deviation", "contact.deviation_per_force",
-        "contact.drift", "contact.release_ratio", "contact.hold_time", "contact.release_time", "release_time 0",
-        "release_time null",
-        "uncertainty null", "extension", "no method", "full hysteresis", "position_filter",
-        "jerk_density", *(f"{k} directions" for k in range(5)),
-    }  # fmt: skip
-    assert not [name for name in expected if not seen[name]]
-
-
 @pytest.mark.parametrize("seeds", repeated([SOME, DETECTION_FINGERS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle_on_detection(runner: Runner, seeds: range) -> None:
-    results = []
-    wrong = []
-    for seed in seeds[:: 6 if runner.name in SLOW else 1]:
-        description, recording = detection_case(seed)
-        source = 1 + seed % 3
-        outputs = runner(description, recording, source)
-        given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
-        assert set(given) <= set(outputs)
-        found = agreement.agree_with_oracle(description, recording, source, outputs, detection_oracle_run(seed))
-        results.append(found)
-        if not found.agrees:
-            wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
+    chosen = seeds[:: 6 if runner in SLOW else 1]
+    cases = ((seed, *detection_case(seed), 1 + seed % 3, detection_oracle_run(seed)) for seed in chosen)
+    given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
+    assert_agreement(runner, cases, *given)
 
 
 # --- the agreement rule itself

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import agreement
 import oracle
 from analytic_cases import ARM, NO_UPDATE, Array, Outputs, close, finger
 from random_fingers import random_case
 from repetitions import repeated
-from runners import NATIVE, ORACLE, RUNNERS, Runner, product
+from runners import NATIVE, OTHERS, SLOW, Runner, assert_agreement, assert_state_continues, product
 
 DT = 0.125
 STIFFNESS, TENSION = 1000.0, 20.0
@@ -34,13 +33,6 @@ FAULT = {
 LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}
 SEEDS = range(512, 524)
 SOME = SEEDS[::2]  # these take every branch, too
-SLOW = ("single_steps", "fmu")  # a call from Python for each sample; packing
-
-
-@pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
-def runner(request: pytest.FixtureRequest) -> Runner:
-    chosen: Runner = request.param
-    return chosen
 
 
 def pair(fault: Any = None, bias: Any = NO_UPDATE, tendons: int = 2, **contact: Any) -> dict[str, Any]:
@@ -358,20 +350,11 @@ def test_random_fingers_take_every_branch_of_the_watch() -> None:
 
 
 @pytest.mark.parametrize("seeds", repeated([SOME, SEEDS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", [each for each in RUNNERS if each is not ORACLE], ids=lambda runner: runner.name)
+@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
 def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
-    results, wrong = [], []
-    for seed in seeds[:: 4 if runner.name in SLOW else 1]:
-        description, recording = failing_case(seed)
-        source = 1 + seed % 3
-        outputs = runner(description, recording, source)
-        assert {"sensor_fault", "contact_observable"} <= set(outputs)
-        found = agreement.agree_with_oracle(description, recording, source, outputs, oracle_run(seed))
-        results.append(found)
-        if not found.agrees:
-            wrong.append(f"finger {seed}, source {source}: {found}")
-    assert not wrong, "\n".join(wrong[:10])
-    assert agreement.few_left_out(results)
+    chosen = seeds[:: 4 if runner in SLOW else 1]
+    cases = ((seed, *failing_case(seed), 1 + seed % 3, oracle_run(seed)) for seed in chosen)
+    assert_agreement(runner, cases, "sensor_fault", "contact_observable")
 
 
 # --- the FMU, the saved state, the derivative
@@ -412,18 +395,9 @@ def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
 
 
 def test_a_saved_fault_goes_on() -> None:
-    native = product("model.native")
     description, recording = failing_case(504)
-    whole = NATIVE(description, recording, 1)
-    assert whole["sensor_fault"].any()
-    for k in (30, 41, 60, 100, 125, 140, 200, 300):
-        head, tail = ({name: values[part] for name, values in recording.items()} for part in (slice(k), slice(k, None)))
-        one, other = (native.Instance.from_description(description, 1) for _ in range(2))
-        one.run(head)
-        other.restore_state(one.save_state())
-        found = other.run(tail)
-        for name in ("sensor_fault", "contact_observable", "contact", "joint_angle", "bias_torque"):
-            np.testing.assert_array_equal(found[name], whole[name][k:], err_msg=f"{name} from {k}")
+    assert NATIVE(description, recording, 1)["sensor_fault"].any()
+    assert_state_continues(description, recording, 1, (30, 41, 60, 100, 125, 140, 200, 300))
 
 
 def test_the_derivative_is_that_of_the_rows_in_use() -> None:

@@ -13,14 +13,7 @@ import pytest
 from test_detection_semantics import DT, FREE, contact_of, run
 
 from analytic_cases import ARM, NO_UPDATE, close, finger
-from runners import NATIVE, ORACLE, Runner
-
-
-@pytest.fixture(params=[ORACLE, NATIVE], ids=lambda runner: runner.name)
-def runner(request: pytest.FixtureRequest) -> Runner:
-    chosen: Runner = request.param
-    return chosen
-
+from runners import Runner
 
 # --- step 4a: how friction stood at the start
 

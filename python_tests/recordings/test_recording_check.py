@@ -60,7 +60,7 @@ def test_a_sound_finger_has_no_errors(table: Any, case: Any) -> None:
 
 def test_the_judge_takes_no_wrong_answer(table: Any) -> None:
     """Another column, another factor, one column too many."""
-    from tendonfmu.model.findings import Finding
+    from tendonfmu.model.plausibility import Finding
 
     def said(entries: dict[str, dict[str, float]]) -> list[Any]:
         return [Finding("error", "sign", Path("x"), tuple(entries), "seen", "probably", "write", entries)]

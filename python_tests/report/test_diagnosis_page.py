@@ -38,7 +38,7 @@ from tendonfmu.report.diagnosis_text import (
     title_of,
 )
 from tendonfmu.report.diagnosis_waterfall import waterfall_of
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 
 THRESHOLDS = (5e-4, 0.01)  # m/s, rad/s
 LARGEST = 5_000_000  # bytes

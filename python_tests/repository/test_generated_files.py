@@ -18,7 +18,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 
 from repository_paths import ROOT
 from tendonfmu.model import native
-from tendonfmu.model.description_defaults import DEFAULTS, RANGES
+from tendonfmu.model.description_numbers import DEFAULTS, RANGES
 
 TABLES = ROOT / "tools" / "tables"
 
@@ -56,7 +56,7 @@ def test_a_default_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.of_item("FILTER_CUTOFF")[0].update(row))
     assert found == {
         "docs/reference/description_keys.md",
-        "python/tendonfmu/model/description_defaults.py",
+        "python/tendonfmu/schema/description_numbers.json",
         "python/tendonfmu/schema/finger.schema.json",
         "runtime/core/key_table.c",
     }
@@ -79,7 +79,7 @@ def test_an_output_is_a_fact_of_one_table(generator: ModuleType) -> None:
 
 def test_the_size_of_an_effect_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.effects["effects"][0]["numbers"][0].update(scale=0.06))
-    assert found == {"python/tendonfmu/model/description_defaults.py", "runtime/core/effects/effect_facts.c"}
+    assert found == {"python/tendonfmu/schema/description_numbers.json", "runtime/core/effects/effect_facts.c"}
 
 
 @pytest.mark.parametrize(

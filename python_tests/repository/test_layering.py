@@ -176,7 +176,7 @@ def test_native_knows_no_other_part() -> None:
     names = set(imports_of(ast.parse((PACKAGE / "model/native.py").read_text(encoding="utf-8"))))
     own = {name for name in names if name.startswith("tendonfmu.")}
     assert all(
-        name.startswith(("tendonfmu._native", "tendonfmu.arrays", "tendonfmu.errors", "tendonfmu.model.signals"))
+        name.startswith(("tendonfmu._native", "tendonfmu.arrays", "tendonfmu.errors", "tendonfmu.model.output_names"))
         for name in own
     ), own
 

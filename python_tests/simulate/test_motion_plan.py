@@ -231,14 +231,8 @@ def with_value(name: str, row: int, value: float) -> dict[str, Any]:
         (with_value("joint_acceleration[3]", 1, 0.2), r"column joint_acceleration\[3\], row 1: 0\.2; expected 0 in"),
         (with_value("joint_position[1]", 1, 0.5), r"column joint_position\[1\], row 1: 0\.5; expected a start within"),
         (with_value("joint_position[1]", 2, 500.0), r"column joint_position\[1\], row 2: 500; expected -100 to 100"),
-        (
-            with_value("joint_position[1]", 2, np.nan),
-            r"column joint_position\[1\], row 2: .*; expected a finite number",
-        ),
-        (
-            motion_table() | {"pretension": -np.ones(5)},
-            r"motion\.pretension = 10\.0: expected nothing|column pretension",
-        ),
+        (with_value("joint_position[1]", 2, np.nan), r"column joint_position\[1\], row 2: .*; expected"),
+        (motion_table() | {"pretension": -np.ones(5)}, r"column pretension, row 1: -1; expected"),
     ],
 )
 def test_bad_motion_files_are_refused_by_column_and_row(tmp_path: Path, table: dict[str, Any], line: str) -> None:

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -333,32 +332,7 @@ def test_experiments_tolerance(plant_fmu: UnpackedFmu) -> None:
             assert tolerance(instance) == used
 
 
-# --- several instances ------------------------------------------------------------------------------------------------
-
-
-def test_interleaved_instances_equal_instances_alone(plant_fmu: UnpackedFmu) -> None:
-    with Instance(plant_fmu) as instance:
-        instance.initialise()
-        alone = play(instance, 150)
-    with Instance(plant_fmu) as first, Instance(plant_fmu) as second:
-        for each in (first, second):
-            each.initialise()
-        both: list[list[list[float]]] = [[], []]
-        for k in range(150):
-            for rows, each in zip(both, (first, second), strict=True):
-                rows += play(each, 1, begin=k)
-    assert both == [alone, alone]
-
-
-def test_instances_in_threads(plant_fmu: UnpackedFmu) -> None:
-    def run(_: int) -> list[list[float]]:
-        with Instance(plant_fmu, logger=False) as instance:
-            instance.initialise()
-            return play(instance, 150)
-
-    expected = run(0)
-    with ThreadPoolExecutor(4) as pool:
-        assert list(pool.map(run, range(4))) == [expected] * 4
+# --- in a host -------------------------------------------------------------------------------------------------------
 
 
 def test_many_instances_leak_no_handle(plant_fmu: UnpackedFmu) -> None:
@@ -391,17 +365,6 @@ def test_the_page_names_every_variable_and_the_floor(plant_fmu: UnpackedFmu) -> 
     if contents.format == "ELF":
         named = re.search(r"\*\*GLIBC ([\d.]+)\*\*", page)
         assert named and contents.glibc_floor <= tuple(map(int, named[1].split(".")))
-
-
-def test_the_page_names_the_sizes(plant_fmu: UnpackedFmu, tmp_path: Path) -> None:
-    """Within 30 %: compilers differ, and a build of an old page is off by more."""
-    named = re.search(
-        r"the Python package: ([\d.]+) MB; the FMU of the index finger ([\d.]+) MB", PAGE.read_text("utf-8")
-    )
-    sizes = plant_binary(plant_fmu.folder), build_plant_fmu(INDEX_FINGER, tmp_path / "index.fmu")
-    assert named
-    for shown, file in zip(named.groups(), sizes, strict=True):
-        assert file.stat().st_size / 1e6 == pytest.approx(float(shown), rel=0.3)
 
 
 def test_the_snippets_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

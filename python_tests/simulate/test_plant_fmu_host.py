@@ -1,112 +1,19 @@
-"""TendonFinger.fmu in its host: beside the friction FMU, in another locale, many instances, random calls."""
+"""TendonFinger.fmu in its host: many instances, random calls."""
 
 from __future__ import annotations
 
 import ctypes
-import json
 import math
-import os
 import random
-import shutil
-import subprocess
-import sys
 from ctypes import c_int
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from fmu_binary import ERROR, OK, Instance, UnpackedFmu
 from leak_count import least_growth, needs_count
-from plant_fmu_rig import play
 from plant_rigs import needs_plant
-from repository_paths import SUPPORT
 
 pytestmark = needs_plant
-
-HERE = str(SUPPORT)
-
-SHARED_HOST = """
-import ctypes, json, sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from fmu_binary import OK, Instance, UnpackedFmu, motion
-from plant_fmu_rig import play
-fmus = [UnpackedFmu(Path(name), getattr(ctypes, sys.argv[2])) for name in sys.argv[3:]]
-found = {}
-for fmu in fmus:
-    instance = Instance(fmu)
-    if "truth.contact" in fmu.variables:
-        instance.initialise()
-        found["plant"] = play(instance, 100)
-    else:
-        instance.initialise(motion(fmu, 0.0))
-        found["friction"] = []
-        for k in range(1, 50):
-            assert instance.set_real(motion(fmu, 0.01 * k)) == OK and instance.step(0.01 * k) == OK
-            found["friction"].append(instance.outputs())
-print(json.dumps(found))
-"""
-
-
-def test_both_fmus_in_a_process_that_shares_all_symbols(plant_fmu: UnpackedFmu, small_fmu: UnpackedFmu) -> None:
-    """They have functions of the same names inside."""
-
-    def found(mode: str, *fmus: UnpackedFmu) -> dict[str, object]:
-        command = [sys.executable, "-c", SHARED_HOST, HERE, mode, *(str(fmu.folder) for fmu in fmus)]
-        rows = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
-        assert isinstance(rows, dict)
-        return rows
-
-    alone = found("RTLD_LOCAL", plant_fmu) | found("RTLD_LOCAL", small_fmu)
-    assert found("RTLD_GLOBAL", plant_fmu, small_fmu) == alone
-    assert found("RTLD_GLOBAL", small_fmu, plant_fmu) == alone
-
-
-LOCALE_HOST = """
-import json, locale, sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from fmu_binary import ERROR, OK, Instance, UnpackedFmu
-from plant_fmu_rig import play
-locale.setlocale(locale.LC_ALL, sys.argv[3])
-assert locale.localeconv()["decimal_point"] == ","
-with Instance(UnpackedFmu(Path(sys.argv[2]))) as instance:
-    instance.initialise()
-    print(json.dumps(play(instance, 100)[-1]))
-    assert instance.call("Reset") == OK
-    assert instance.set_real({"step": 0.25}) == ERROR
-    print(instance.last_message)
-"""
-
-
-@pytest.fixture
-def comma_locale(tmp_path: Path) -> tuple[str, dict[str, str]]:
-    """Name of a locale with a decimal comma, made here, and the environment to find it in."""
-    if not shutil.which("localedef") or not Path("/usr/share/i18n/locales/de_DE").exists():
-        pytest.skip("SKIPPED: no locale with a decimal comma can be made (Debian: locales)")
-    subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", tmp_path / "de_DE.UTF-8"], capture_output=True)
-    return "de_DE.UTF-8", {**os.environ, "LOCPATH": str(tmp_path)}
-
-
-@pytest.mark.long
-def test_decimal_comma(plant_fmu: UnpackedFmu, comma_locale: tuple[str, dict[str, str]]) -> None:
-    name, environment = comma_locale
-    command = [sys.executable, "-c", LOCALE_HOST, HERE, str(plant_fmu.folder), name]
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert answer.returncode == 0, answer.stderr
-    outputs, message = answer.stdout.splitlines()
-    with Instance(plant_fmu) as instance:
-        instance.initialise()
-        assert json.loads(outputs) == play(instance, 100)[-1]
-    assert message == "fmi2SetReal: step = 0.25: expected 1e-06 to 0.01 s"
-
-
-def test_the_hosts_floating_point_stays(plant_fmu: UnpackedFmu) -> None:
-    with Instance(plant_fmu) as instance:
-        instance.initialise()
-        play(instance, 50)
-    assert np.float64(5e-324) / 1 > 0 and np.float64(2.3e-308) / 4 > 0
 
 
 @pytest.mark.long

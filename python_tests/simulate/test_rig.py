@@ -19,8 +19,7 @@ from rig_cases import EXAMPLES, FINGER, INDEX_RIGS, RIGS, changed, index_rig, wi
 from tendonfmu.cli import main
 from tendonfmu.errors import InputError
 from tendonfmu.simulate import plant
-from tendonfmu.simulate.rig import Rig, read_rig
-from tendonfmu.simulate.rig_format import is_rig
+from tendonfmu.simulate.rig import Rig, is_rig, read_rig
 from tendonfmu.simulate.simulation import plant_of
 
 # --- reading ----------------------------------------------------------------------------------------------------------
@@ -196,11 +195,7 @@ def test_bad_json_is_refused(tmp_path: Path, text: str, line: str) -> None:
             r"physics\.links\[2\]\.offset = \[0\.0, 1\.0\]: expected a list of 3",
         ),
         (("physics", "links", 1, "axis"), "y", r'physics\.links\[2\]\.axis = "y": expected a list of 3, x, y and z'),
-        (
-            ("physics", "links", 2, "limits", "upper"),
-            -1.0,
-            r"links\[3\]\.limits\.upper = -1\.0: expected an angle above",
-        ),
+        (("physics", "links", 2, "limits", "upper"), -1.0, r"links\[3\]\.limits\.upper = -1\.0: expected"),
         (("physics", "tip"), [0.0, 0.0, True], r"physics\.tip\[3\] = true: expected a number in m"),
         (("sensors", "rate"), 0, r"sensors\.rate = 0: expected a number in Hz, at least 1 and at most 100000"),
         (("motion",), None, r"motion: missing; expected an object with the key kind"),
@@ -212,11 +207,7 @@ def test_bad_json_is_refused(tmp_path: Path, text: str, line: str) -> None:
         (("motion", "position", 1), 1.5, r"motion\.position\[2\] = 1\.5: expected an angle within the joint's range"),
         (("pushes",), "tip", r'pushes = "tip": expected a list of pushes, or an object with count'),
         (("recording", "duration"), 0.0, r"recording\.duration = 0\.0: expected a number in s, above 0"),
-        (
-            ("recording", "duration"),
-            1e6,
-            r"recording\.duration = 1000000\.0: expected at most 50000000 samples at 500 Hz",
-        ),
+        (("recording", "duration"), 1e6, r"recording\.duration = 1000000\.0: expected at most 50000000"),
         (("recording", "columns"), ["torque"], r'recording\.columns\[1\] = "torque": expected "joint_position" or'),
         (("recording", "columns"), ["contact"] * 2, r'recording\.columns\[1\] = "contact": expected each column once'),
         (("recording", "rate"), 500, r"recording\.rate = 500: unknown key; expected one of duration, columns"),

@@ -284,49 +284,8 @@ def index_finger(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_ssp(rig, tmp_path_factory.mktemp("index") / "finger.ssp")
 
 
-def table_of_page(heading: str) -> list[list[str]]:
-    """Cells of the rows of the table whose first heading this is."""
-    rows = PAGE[PAGE.index(f"| {heading} |") :].partition("\n\n")[0].splitlines()[2:]
-    return [[cell.strip() for cell in row.replace("−", "-").strip("|").split("|")] for row in rows]
-
-
-@pytest.mark.long
-def test_the_tables_of_the_page(index_finger: Path) -> None:
-    """Torques at the begin of a push within 0.05 mN·m; false contacts within 20 ms; largest errors within 2 mN·m."""
-    runs = {
-        name: example().run(index_finger, 9040, **{name: True} if name else {})
-        for name in ("", "sequential", "blind_start")
-    }
-    ours, there, blind = runs.values()
-    rows = table_of_page("time s")
-    assert len(rows) == 5
-    for time, *shown in rows:
-        k = round(float(time) / STEP) - 1
-        found = [
-            ours["plant.truth.joint_torque[2]"][k],
-            *(table["friction.joint_torque[2]"][k] for table in (ours, there)),
-            ours["plant.truth.external_torque[2]"][k],
-            *(table["friction.compensated_torque[2]"][k] for table in (ours, there)),
-        ]
-        np.testing.assert_allclose([float(x) for x in shown], 1e3 * np.array(found), rtol=0, atol=0.05, err_msg=time)
-
-    free = ours["time"] < 9.0
-    starts = table_of_page("first sample of the friction FMU")
-    for (_, contact, largest), table in zip(starts, (ours, blind), strict=False):
-        wrong = table["time"][free][table["friction.contact"][free] > 0.0]
-        begin, end = re.findall(r"[\d.]+", contact)[:2]
-        assert (wrong[0], wrong[-1]) == pytest.approx((float(begin), float(end)), abs=0.02)
-        error = 1e3 * np.abs(table["friction.compensated_torque[2]"][free]).max()
-        assert error == pytest.approx(float(largest), abs=2.0)
-    assert not ours["plant.truth.contact"][free].any()
-    late = (ours["time"] > 8.0) & free
-    for j in range(1, 5):
-        name = f"friction.compensated_torque[{j}]"
-        assert 1e3 * np.abs(ours[name] - blind[name])[late].max() < 0.3
-
-
 def test_a_friction_fmu_that_starts_in_motion_has_no_false_contact(index_finger: Path) -> None:
-    """As the page says: it takes its first sample at 1.5 s."""
+    """It takes its first sample at 1.5 s."""
     hand = example()
     with zipfile.ZipFile(index_finger) as archive:
         archive.extractall(index_finger.parent)
@@ -346,5 +305,4 @@ def test_a_friction_fmu_that_starts_in_motion_has_no_false_contact(index_finger:
     for component in (plant, friction):
         component.close()
     assert not found["contact"].any()
-    largest = float(table_of_page("first sample of the friction FMU")[2][2])
-    assert 1e3 * np.abs(found["compensated_torque[2]"]).max() == pytest.approx(largest, abs=2.0)
+    assert np.abs(found["compensated_torque[2]"]).max() < 0.03

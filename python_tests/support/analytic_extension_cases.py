@@ -17,9 +17,11 @@ from analytic_cases import (  # fmt: skip
     DRY,
     NO_UPDATE,
     V_MIN,
-    Case,
     Description,
     Outputs,
+    Run,
+    case,
+    case_of_sources,
     close,
     finger,
     law_value,
@@ -47,7 +49,8 @@ def of_two(time: Any, force: Any, speed: Any, angle: Any = 0.0) -> Any:
     return recording(time, force, speed, angle, tendons=2, joints=2)
 
 
-def springs_and_weights() -> Case:
+@case
+def springs_and_weights(run: Run) -> None:
     """joint_coupling with rest angles, gravity on the joints before; rows add up."""
     extensions = [
         {"effect": "joint_coupling", "joint": 1, "stiffness": 0.5},
@@ -58,45 +61,37 @@ def springs_and_weights() -> Case:
     ]
     # θ = q_1 + q_2 = π/2 and π/6
     angles = [[0.7, math.pi / 2 - 0.7], [0.2, math.pi / 6 - 0.2]]
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        c = 0.5 * (0.5 - (math.pi / 2 - 0.7))
-        close(torque(out)[0], [c + 0.2 + 0.3 * math.cos(0.7) + 0.125, -c + 0.2])
-        c = 0.5 * (0.0 - (math.pi / 6 - 0.2))
-        weight = 0.2 * 0.5 + 0.1 * math.sqrt(0.75)
-        close(torque(out)[1], [c + weight + 0.3 * math.cos(0.2), -c + weight])
-        close(out["compensated_torque"], out["joint_torque"] - out["friction_torque"])
-
-    return Case("springs_and_weights", two_joints(extensions), [of_two([0, 0.1], 10.0, 0.0, angles)], check)
+    out = run(two_joints(extensions), of_two([0, 0.1], 10.0, 0.0, angles))
+    c = 0.5 * (0.5 - (math.pi / 2 - 0.7))
+    close(torque(out)[0], [c + 0.2 + 0.3 * math.cos(0.7) + 0.125, -c + 0.2])
+    c = 0.5 * (0.0 - (math.pi / 6 - 0.2))
+    weight = 0.2 * 0.5 + 0.1 * math.sqrt(0.75)
+    close(torque(out)[1], [c + weight + 0.3 * math.cos(0.2), -c + weight])
+    close(out["compensated_torque"], out["joint_torque"] - out["friction_torque"])
 
 
-def gravity_of_other_axes() -> Case:
+@case
+def gravity_of_other_axes(run: Run) -> None:
     """An axis against that of the link turns it back, one across leaves it alone."""
     description = two_joints([{"effect": "gravity", "joint": 2, "sine": 0.2, "cosine": 0.1}])
     against = description | {"links": [{"axis": [0, 0, -3]}, {"axis": [0, 0, 1]}], "tip": [0.1, 0, 0]}
     rec = of_two([0.0], 10.0, 0.0, [[0.4, 0.9]])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        weight = 0.2 * math.sin(0.5) + 0.1 * math.cos(0.5)
-        close(torque(out), [[-weight, weight]])
-
-    return Case("gravity_of_other_axes", against, [rec], check)
+    out = run(against, rec)
+    weight = 0.2 * math.sin(0.5) + 0.1 * math.cos(0.5)
+    close(torque(out), [[-weight, weight]])
 
 
-def inertia() -> Case:
+@case
+def inertia(run: Run) -> None:
     """q̇ backwards: 0 first, then (3 − 1)/0.1 and (2 − 3)/0.2."""
     description = one_edge(DRY, extensions=[{"effect": "inertia", "joint": 1, "inertia": 1e-3}])
     rec = recording([0.0, 0.1, 0.3], 10.0, [1.0, 3.0, 2.0])
-
-    def check(runs: list[Outputs]) -> None:
-        close(torque(runs[0])[:, 0], 0.01 + np.array([0.0, 0.02, -0.005]))
-
-    return Case("inertia", description, [rec], check)
+    out = run(description, rec)
+    close(torque(out)[:, 0], 0.01 + np.array([0.0, 0.02, -0.005]))
 
 
-def held_friction() -> Case:
+@case
+def held_friction(run: Run) -> None:
     """preload_friction and load_friction: nothing before the first motion, held at rest, turned by motion alone."""
     extensions = [
         {"effect": "preload_friction", "tendon": 1, "coulomb": 2.0},
@@ -106,22 +101,19 @@ def held_friction() -> Case:
     speed = [[0.0, 0.0], [1.0, -0.1], [1.0, -0.9], [0.01, 0.009], [0.0, 0.0]]
     # ẋ_11 = 0.008, −0.008, 0.00028; ẋ_12 = 0.02 q̇_2; ẋ_22 = −0.01 q̇_2 (0.001 m/s is above 0.0005, 9e-5 is not)
     force = [[10.0, 8.0], [10.0, 8.0], [10.0, -8.0], [10.0, -4.0], [10.0, 4.0]]
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        # tendon 1 before joint 1: both arms; before joint 2: the second one
-        forward = np.array([0.01 * 2.0, 0.02 * 2.0 - 0.02 * 2.0])
-        backward = np.array([-0.01 * 2.0, -0.02 * 2.0 - 0.02 * 2.0])
-        loop = np.array([0.0, -0.01 * 5.0])  # ẋ_22 > 0
-        load = np.array([0.0, -1e-3])  # q̇_2 < 0
-        close(torque(out), [[0.0, 0.0], forward + loop + 8.0 * load, backward + loop + 8.0 * load,
-                            backward + loop + 4.0 * load, backward + loop + 4.0 * load])  # fmt: skip
-        close(out["bias_torque"], out["bias_torque"][:1] + np.zeros((5, 1)))  # it neither sticks nor jumps
-
-    return Case("held_friction", two_joints(extensions), [of_two(np.arange(5) * 0.1, force, speed)], check)
+    out = run(two_joints(extensions), of_two(np.arange(5) * 0.1, force, speed))
+    # tendon 1 before joint 1: both arms; before joint 2: the second one
+    forward = np.array([0.01 * 2.0, 0.02 * 2.0 - 0.02 * 2.0])
+    backward = np.array([-0.01 * 2.0, -0.02 * 2.0 - 0.02 * 2.0])
+    loop = np.array([0.0, -0.01 * 5.0])  # ẋ_22 > 0
+    load = np.array([0.0, -1e-3])  # q̇_2 < 0
+    close(torque(out), [[0.0, 0.0], forward + loop + 8.0 * load, backward + loop + 8.0 * load,
+                        backward + loop + 4.0 * load, backward + loop + 4.0 * load])  # fmt: skip
+    close(out["bias_torque"], out["bias_torque"][:1] + np.zeros((5, 1)))  # it neither sticks nor jumps
 
 
-def corrected_measurements() -> Case:
+@case
+def corrected_measurements(run: Run) -> None:
     """Forces and arms other than described: corrections of the torque, not of joint_torque, the angle or the bounds."""
     extensions = [
         {"effect": "force_gain", "tendon": 1, "correction": 0.1},
@@ -136,43 +128,37 @@ def corrected_measurements() -> Case:
     force = np.array([20.0, -8.0])
     position = np.array([[0.01, 0.02], [0.03, -0.01]]) @ q + force / 1000.0
     rec = of_two([0.0, 0.1], [force, force], 0.0) | {"tendon_position": np.array([position, position])}
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        arm = 1e-3 * 0.5 + 3e-3 * math.sqrt(0.75)
-        first = -0.1 * 0.01 * 20.0 + 0.5 * 0.03 + 2e-3 * 8.0
-        second = -0.1 * 0.02 * 20.0 - 0.5 * 0.01 - 4e-3 * (math.pi / 6) * 20.0 + arm * 8.0
-        close(torque(out), [[first, second]] * 2)
-        close(out["joint_torque"], [[0.2 - 0.24, 0.4 + 0.08]] * 2)
-        close(out["joint_angle"], [q, q])
-        close(out["compensated_torque_std"], 0.0)  # of the friction of section 5, there is none
-
     description = two_joints(extensions, contact=uncertainty)
-    return Case("corrected_measurements", description, [rec], check, source=1)
+    out = run(description, rec, 1)
+    arm = 1e-3 * 0.5 + 3e-3 * math.sqrt(0.75)
+    first = -0.1 * 0.01 * 20.0 + 0.5 * 0.03 + 2e-3 * 8.0
+    second = -0.1 * 0.02 * 20.0 - 0.5 * 0.01 - 4e-3 * (math.pi / 6) * 20.0 + arm * 8.0
+    close(torque(out), [[first, second]] * 2)
+    close(out["joint_torque"], [[0.2 - 0.24, 0.4 + 0.08]] * 2)
+    close(out["joint_angle"], [q, q])
+    close(out["compensated_torque_std"], 0.0)  # of the friction of section 5, there is none
 
 
-def presliding() -> Case:
+@case
+def presliding(run: Run) -> None:
     """ζ: 0, 1/2, 3/4, back over twice the way, held at rest on the side of before; no jump of the bias."""
     law = {"positive": JOINT_DRY, "negative": JOINT_DRY | {"static": 0.3, "coulomb": 0.2}}
     rows = [{"effect": "presliding", "joint": 1, "displacement": 0.1 * HALF}]
     description = finger([{"moment_arms": [ARM]}], [{"name": "j", "friction": law}], extensions=rows)
     speed = [1.0, 1.0, 1.0, -2.0, 0.0, 0.0, -0.005, 1.0]
     rec = recording(np.arange(8) * 0.1, 10.0, speed)
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        back = -1.0 + 1.75 / 4.0
-        slow = 0.2 + 0.1 * math.exp(-0.5)
-        crept = -1.0 + (1.0 + back) * 0.5**0.005
-        forward = 1.0 - (1.0 - crept) / 2.0
-        expected = [0.0, 0.05, 0.075, 0.2 * back, 0.3 * back, 0.3 * back, slow * crept, 0.1 * forward]
-        close(torque(out)[:, 0], expected)
-        close(out["bias_torque"], 0.1)
-
-    return Case("presliding", description, [rec], check)
+    out = run(description, rec)
+    back = -1.0 + 1.75 / 4.0
+    slow = 0.2 + 0.1 * math.exp(-0.5)
+    crept = -1.0 + (1.0 + back) * 0.5**0.005
+    forward = 1.0 - (1.0 - crept) / 2.0
+    expected = [0.0, 0.05, 0.075, 0.2 * back, 0.3 * back, 0.3 * back, slow * crept, 0.1 * forward]
+    close(torque(out)[:, 0], expected)
+    close(out["bias_torque"], 0.1)
 
 
-def presliding_passes_the_force_on() -> Case:
+@case
+def presliding_passes_the_force_on(run: Run) -> None:
     """At a tendon: f_B = f_A·(1 − ζ·|F|), with a factor of friction_drift, beside a joint that sticks as ever."""
     rows = [
         {"effect": "presliding", "tendon": 1, "displacement": 1e-3 * HALF},
@@ -182,20 +168,17 @@ def presliding_passes_the_force_on() -> Case:
     load = {"static": 1e-3, "coulomb": 1e-3, "stribeck_velocity": 1.0}
     description = finger([tendon], [{"name": "j", "load_friction": load}], extensions=rows)
     rec = recording([0.0, 0.1, 0.2], 10.0, [1.0, 1.0, 0.0])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        # ζ = 0, 1/2, 1/2; φ = 1, 3/2, 7/4
-        F = np.array([0.0, 0.1 * 0.5 * 1.5, 0.1 * 0.5 * 1.75])
-        rubs = np.array([1e-3, 1e-3, 0.0]) * 10.0 * (1.0 - F)
-        close(torque(out)[:, 0], 0.1 * F + rubs)
-        entered = 1e-3 * 10.0 * (1.0 - F[2])  # the joint alone came to rest
-        close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, 0.0, entered]))
-
-    return Case("presliding_passes_the_force_on", description, [rec], check)
+    out = run(description, rec)
+    # ζ = 0, 1/2, 1/2; φ = 1, 3/2, 7/4
+    F = np.array([0.0, 0.1 * 0.5 * 1.5, 0.1 * 0.5 * 1.75])
+    rubs = np.array([1e-3, 1e-3, 0.0]) * 10.0 * (1.0 - F)
+    close(torque(out)[:, 0], 0.1 * F + rubs)
+    entered = 1e-3 * 10.0 * (1.0 - F[2])  # the joint alone came to rest
+    close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, 0.0, entered]))
 
 
-def friction_that_drifts() -> Case:
+@case
+def friction_that_drifts(run: Run) -> None:
     """φ = 1 + a·(1 − 2^(−t)) of F and of b, several rows multiply; t counts from the first sample."""
     rows = [
         {"effect": "friction_drift", "amplitude": 0.5, "time_constant": HALF},
@@ -203,52 +186,43 @@ def friction_that_drifts() -> Case:
         {"effect": "friction_drift", "joint": 1, "amplitude": 9.0, "time_constant": HALF},  # no friction there
     ]
     rec = recording([5.0, 6.0, 7.0, 8.0], 10.0, [1.0, 1.0, 0.0, -1.0])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        gone = 1.0 - 0.5 ** np.arange(4)
-        phi = (1.0 + 0.5 * gone) * (1.0 - 0.8 * gone)
-        close(torque(out)[:, 0], 0.01 * phi * np.array([1.0, 1.0, 0.0, -1.0]))
-        # enters with φ_2·F, leaves after one sample with −F(s2)−(F(s1)−F(s2))·1 = −0.1, times φ_3
-        jumps = 0.01 * np.cumsum([0.0, 0.0, phi[2], -phi[3]])
-        close(out["bias_torque"][:, 0], 0.09 + jumps)
-
-    return Case("friction_that_drifts", one_edge(DRY, extensions=rows), [rec], check)
+    out = run(one_edge(DRY, extensions=rows), rec)
+    gone = 1.0 - 0.5 ** np.arange(4)
+    phi = (1.0 + 0.5 * gone) * (1.0 - 0.8 * gone)
+    close(torque(out)[:, 0], 0.01 * phi * np.array([1.0, 1.0, 0.0, -1.0]))
+    # enters with φ_2·F, leaves after one sample with −F(s2)−(F(s1)−F(s2))·1 = −0.1, times φ_3
+    jumps = 0.01 * np.cumsum([0.0, 0.0, phi[2], -phi[3]])
+    close(out["bias_torque"][:, 0], 0.09 + jumps)
 
 
-def drift_and_entry_load() -> Case:
+@case
+def drift_and_entry_load(run: Run) -> None:
     """What entering added, by the factor and force of then, is taken out; what is forgotten counts by those of now."""
     rows = [{"effect": "friction_drift", "amplitude": 1.0, "time_constant": HALF}]
     bias = NO_UPDATE | {"entry_load": True, "forget_rate": math.log(2.0)}
     rec = recording([0.0, 1.0, 2.0, 3.0], [10.0, 20.0, 20.0, 30.0], [1.0, 0.0, 0.0, -1.0])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        e = 0.01 * 20.0 * 0.1 * 1.5
-        leave = -0.5 * e + 0.5 * 0.01 * 30.0 * 0.1 * 1.875  # rested from 1 s to 2 s: κ = 1/2
-        close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, e, e, e + leave]))
-
-    return Case("drift_and_entry_load", one_edge(DRY, bias=bias, extensions=rows), [rec], check)
+    out = run(one_edge(DRY, bias=bias, extensions=rows), rec)
+    e = 0.01 * 20.0 * 0.1 * 1.5
+    leave = -0.5 * e + 0.5 * 0.01 * 30.0 * 0.1 * 1.875  # rested from 1 s to 2 s: κ = 1/2
+    close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, e, e, e + leave]))
 
 
-def stribeck() -> Case:
+@case
+def stribeck(run: Run) -> None:
     """1 + a·exp(−|v|/v_s) of F at a tendon, and of b at the present |v|: friction that rises from rest."""
     rows = [{"effect": "stribeck", "tendon": 1, "amplitude": -0.8, "stribeck_velocity": 0.01 * HALF}]
     rec = recording([0.0, 0.1, 0.2, 0.3], 10.0, [1.0, 2.0, 0.0, -1.0])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        F = np.array([law_value(ASYMMETRIC, v) for v in (0.01, 0.02)])
-        close(torque(out)[:2, 0], 0.1 * F * np.array([0.6, 0.8]))
-        start = 0.1 - 0.1 * 0.6 * F[0]
-        entered = 0.1 * 0.2 * law_value(ASYMMETRIC, V_MIN)  # v = 0
-        left = -0.1 * 0.6 * law_value(ASYMMETRIC, V_MIN)  # κ = 1: one sample of rest
-        close(out["bias_torque"][:, 0], [start, start, start + entered, start + entered + left])
-
-    return Case("stribeck", one_edge(ASYMMETRIC, extensions=rows), [rec], check)
+    out = run(one_edge(ASYMMETRIC, extensions=rows), rec)
+    F = np.array([law_value(ASYMMETRIC, v) for v in (0.01, 0.02)])
+    close(torque(out)[:2, 0], 0.1 * F * np.array([0.6, 0.8]))
+    start = 0.1 - 0.1 * 0.6 * F[0]
+    entered = 0.1 * 0.2 * law_value(ASYMMETRIC, V_MIN)  # v = 0
+    left = -0.1 * 0.6 * law_value(ASYMMETRIC, V_MIN)  # κ = 1: one sample of rest
+    close(out["bias_torque"][:, 0], [start, start, start + entered, start + entered + left])
 
 
-def bounds_of_stuck_friction() -> list[Case]:
+@case
+def bounds_of_stuck_friction(run: Run) -> None:
     """H: |F| times the factors at rest, nothing of what slides; std is c_H·H/√3."""
     rows = [
         {"effect": "stribeck", "tendon": 1, "amplitude": 0.5, "stribeck_velocity": 1.0},
@@ -257,67 +231,52 @@ def bounds_of_stuck_friction() -> list[Case]:
     slides = [*rows, {"effect": "presliding", "tendon": 1, "displacement": 1.0}]
     contact = {"threshold": [1e6], "friction_bound": {"stuck_share": 2.0, "jump_share": 0.0}}
     rec = recording([0.0, 1.0], 10.0, 0.0)
-
-    def check_stuck(runs: list[Outputs]) -> None:
-        close(runs[0]["compensated_torque_std"][:, 0], 2.0 * 0.01 * 1.5 * np.array([1.0, 1.5]) / math.sqrt(3.0))
-
-    def check_sliding(runs: list[Outputs]) -> None:
-        close(runs[0]["compensated_torque_std"], 0.0)
-
-    return [
-        Case(name, one_edge(DRY, contact=contact, extensions=each), [rec], check)
-        for name, each, check in (("stuck_bound", rows, check_stuck), ("sliding_bound", slides, check_sliding))
-    ]
+    stuck, sliding = (run(one_edge(DRY, contact=contact, extensions=each), rec) for each in (rows, slides))
+    close(stuck["compensated_torque_std"][:, 0], 2.0 * 0.01 * 1.5 * np.array([1.0, 1.5]) / math.sqrt(3.0))
+    close(sliding["compensated_torque_std"], 0.0)
 
 
-def progressive_tendon() -> Case:
+@case
+def progressive_tendon(run: Run) -> None:
     """30 N stretch it by 0.02 m where k = 1000 N/m and h = 25000 N/m²; −30 N by −0.02 m; hardening 0 is the spring."""
     rows = [{"effect": "tendon_nonlinearity", "tendon": 1, "hardening": 25000.0}]
     tendons = [{"moment_arms": [ARM], "bidirectional": True}]
     rec = recording([0.0, 0.1, 0.2], [30.0, -30.0, 0.0], 0.0, position=[0.021, 0.001, 0.004])
-
-    def check(runs: list[Outputs]) -> None:
-        close(runs[0]["joint_angle"][:, 0], [0.1, 2.1, 0.4], within=1e-12)
-
-    return Case("progressive_tendon", finger(tendons, extensions=rows), [rec], check, source=1)
+    out = run(finger(tendons, extensions=rows), rec, 1)
+    close(out["joint_angle"][:, 0], [0.1, 2.1, 0.4], within=1e-12)
 
 
-def play_of_a_tendon() -> Case:
+@case
+def play_of_a_tendon(run: Run) -> None:
     """Width 4 mm at r = 1 cm: the angle waits 0.4 rad after a reversal, then follows 0.2 rad behind."""
     rows = [{"effect": "backlash", "tendon": 1, "width": 0.004}]
     description = one_edge(DRY, extensions=rows, velocity_filter_cutoff=0.0)
     position = np.array([0.01, 0.012, 0.015, 0.013, 0.011, 0.008, 0.010])
     rec = recording(np.arange(7) * 0.1, 10.0, 0.0, position=position)
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        z = np.array([0.010, 0.010, 0.013, 0.013, 0.013, 0.010, 0.010])
-        angle = (z - 0.01) / 0.01
-        close(out["joint_angle"][:, 0], angle, within=1e-12)
-        close(out["joint_speed"][:, 0], np.diff(angle, prepend=angle[0]) / 0.1, within=1e-11)
-
-    return Case("play_of_a_tendon", description, [rec], check, source=1)
+    out = run(description, rec, 1)
+    z = np.array([0.010, 0.010, 0.013, 0.013, 0.013, 0.010, 0.010])
+    angle = (z - 0.01) / 0.01
+    close(out["joint_angle"][:, 0], angle, within=1e-12)
+    close(out["joint_speed"][:, 0], np.diff(angle, prepend=angle[0]) / 0.1, within=1e-11)
 
 
-def play_of_a_joint(source: int) -> Case:
+@case_of_sources(2, 3)
+def play_of_a_joint(run: Run, source: int) -> None:
     """By measured angles it stops the velocity too; a measured velocity stays as it is. Covers see what is left."""
     joints = [{"name": "j", "cover": {"stiffness": 0.5}}]
     rows = [{"effect": "backlash", "joint": 1, "width": 0.4}, {"effect": "backlash", "tendon": 1, "width": 0.4}]
     description = finger([{"moment_arms": [ARM]}], joints, extensions=rows, velocity_filter_cutoff=0.0)
     rec = recording(np.arange(5) * 0.1, 10.0, 2.0, [0.0, 0.1, 0.5, 0.2, -0.1])
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        z = np.array([0.0, 0.0, 0.3, 0.3, 0.1])
-        close(out["joint_angle"][:, 0], z)
-        close(torque(out)[:, 0], 0.5 * z)
-        expected = [0.0, 0.0, 3.0, 0.0, -2.0] if source == 2 else np.full(5, 2.0)
-        close(out["joint_speed"][:, 0], expected, within=1e-12)
-
-    return Case(f"play_of_a_joint_source_{source}", description, [rec], check, source=source)
+    out = run(description, rec, source)
+    z = np.array([0.0, 0.0, 0.3, 0.3, 0.1])
+    close(out["joint_angle"][:, 0], z)
+    close(torque(out)[:, 0], 0.5 * z)
+    expected = [0.0, 0.0, 3.0, 0.0, -2.0] if source == 2 else np.full(5, 2.0)
+    close(out["joint_speed"][:, 0], expected, within=1e-12)
 
 
-def late_positions(source: int) -> Case:
+@case_of_sources(1, 2, 3)
+def late_positions(run: Run, source: int) -> None:
     """30 ms late on uneven samples: between neighbours, before the oldest the oldest; forces stay."""
     rows = [{"effect": "time_delay", "delay": 0.03}]
     description = finger([{"moment_arms": [ARM]}], extensions=rows, velocity_filter_cutoff=0.0)
@@ -325,62 +284,54 @@ def late_positions(source: int) -> Case:
     angle, speed = np.array([0.5, 0.7, 1.1, 0.9, 0.4]), np.array([1.0, 2.0, 4.0, 3.0, 5.0])
     force = np.array([10.0, 12.0, 9.0, 8.0, 7.0])
     rec = recording(time, force, speed, angle, position=(ARM * angle + force / 1000.0))
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        close(out["joint_torque"][:, 0], ARM * force)
-        # at 0.97, 0.99, 1.03, 1.05, 1.10 s
-        late = np.array([0.5, 0.5, 0.8, 1.0, 0.7])
-        if source == 1:  # x0 late, f0 not
-            x0 = rec["tendon_position"][:, 0]
-            late_x0 = [
-                x0[0],
-                x0[0],
-                0.75 * x0[1] + 0.25 * x0[2],
-                0.25 * x0[1] + 0.75 * x0[2],
-                0.6 * x0[3] + 0.4 * x0[4],
-            ]
-            late = (np.array(late_x0) - force / 1000.0) / ARM
-        close(out["joint_angle"][:, 0], late, within=1e-12)
-        if source == 3:
-            close(out["joint_speed"][:, 0], [1.0, 1.0, 2.5, 3.5, 3.8], within=1e-12)
-        else:
-            raw = np.diff(late, prepend=late[0]) / np.diff(time, prepend=0.0)
-            close(out["joint_speed"][:, 0], raw, within=1e-10)
-
-    return Case(f"late_positions_source_{source}", description, [rec], check, source=source)
+    out = run(description, rec, source)
+    close(out["joint_torque"][:, 0], ARM * force)
+    # at 0.97, 0.99, 1.03, 1.05, 1.10 s
+    late = np.array([0.5, 0.5, 0.8, 1.0, 0.7])
+    if source == 1:  # x0 late, f0 not
+        x0 = rec["tendon_position"][:, 0]
+        late_x0 = [
+            x0[0],
+            x0[0],
+            0.75 * x0[1] + 0.25 * x0[2],
+            0.25 * x0[1] + 0.75 * x0[2],
+            0.6 * x0[3] + 0.4 * x0[4],
+        ]
+        late = (np.array(late_x0) - force / 1000.0) / ARM
+    close(out["joint_angle"][:, 0], late, within=1e-12)
+    if source == 3:
+        close(out["joint_speed"][:, 0], [1.0, 1.0, 2.5, 3.5, 3.8], within=1e-12)
+    else:
+        raw = np.diff(late, prepend=late[0]) / np.diff(time, prepend=0.0)
+        close(out["joint_speed"][:, 0], raw, within=1e-10)
 
 
-def late_forces() -> Case:
+@case
+def late_forces(run: Run) -> None:
     """delay < 0: the forces of before everywhere: τ, the mean force of the noise, the stretch."""
     rows = [{"effect": "time_delay", "delay": -0.05}]
     bias = {"drift_variance": 0.0, "noise_std": 0.0, "noise_std_per_force": 0.01, "initial_variance": 0.0225}
     description = finger([{"moment_arms": [ARM]}], extensions=rows, bias=bias)
     rec = recording([0.0, 0.1, 0.2], [10.0, 20.0, 30.0], 0.0, position=0.02)
-
-    def check(runs: list[Outputs]) -> None:
-        (out,) = runs
-        close(out["joint_torque"][:, 0], [0.1, 0.15, 0.25])
-        close(out["joint_angle"][:, 0], [1.0, 0.5, -0.5], within=1e-12)
-        close(out["bias_torque"][:2, 0], [0.1, 0.125])  # noise (0.01·15)² = 0.0225: K = 1/2 of 0.05
-
-    return Case("late_forces", description, [rec], check, source=1)
+    out = run(description, rec, 1)
+    close(out["joint_torque"][:, 0], [0.1, 0.15, 0.25])
+    close(out["joint_angle"][:, 0], [1.0, 0.5, -0.5], within=1e-12)
+    close(out["bias_torque"][:2, 0], [0.1, 0.125])  # noise (0.01·15)² = 0.0225: K = 1/2 of 0.05
 
 
-def delay_longer_than_its_memory() -> Case:
+@case
+def delay_longer_than_its_memory(run: Run) -> None:
     """64 samples of 0.5 ms reach back 31.5 ms: a delay of 50 ms counts as that."""
     rows = [{"effect": "time_delay", "delay": 0.05}]
     time = np.arange(150) * 0.0005
     rec = recording(time, 10.0, 0.0, np.arange(150.0) ** 2)
-
-    def check(runs: list[Outputs]) -> None:
-        expected = np.maximum(np.arange(150.0) - 63.0, 0.0) ** 2
-        close(runs[0]["joint_angle"][:, 0], expected)
-
-    return Case("delay_longer_than_its_memory", finger([{"moment_arms": [ARM]}], extensions=rows), [rec], check)
+    out = run(finger([{"moment_arms": [ARM]}], extensions=rows), rec)
+    expected = np.maximum(np.arange(150.0) - 63.0, 0.0) ** 2
+    close(out["joint_angle"][:, 0], expected)
 
 
-def signals_in_order() -> Case:
+@case
+def signals_in_order(run: Run) -> None:
     """Late first, then play at the tendon, then the progressive stretch, then play at the joint; rows in any order."""
     rows = [
         {"effect": "backlash", "joint": 1, "width": 0.2},
@@ -390,32 +341,6 @@ def signals_in_order() -> Case:
     ]
     description = one_edge(DRY, extensions=rows)
     rec = recording([0.0, 0.1, 0.2, 0.3], 30.0, 0.0, position=[0.02, 0.028, 0.02, 0.028])
-
-    def check(runs: list[Outputs]) -> None:
-        # late x0: 0.02, 0.024, 0.024, 0.024; z: 0.02, 0.022, 0.022, 0.022; x1 = z − 0.02; q: 0, 0.2 → 0.1 by the play
-        close(runs[0]["joint_angle"][:, 0], [0.0, 0.1, 0.1, 0.1], within=1e-12)
-
-    return Case("signals_in_order", description, [rec], check, source=1)
-
-
-CASES = [
-    springs_and_weights(),
-    gravity_of_other_axes(),
-    inertia(),
-    held_friction(),
-    corrected_measurements(),
-    presliding(),
-    presliding_passes_the_force_on(),
-    friction_that_drifts(),
-    drift_and_entry_load(),
-    stribeck(),
-    *bounds_of_stuck_friction(),
-    progressive_tendon(),
-    play_of_a_tendon(),
-    play_of_a_joint(2),
-    play_of_a_joint(3),
-    *(late_positions(source) for source in (1, 2, 3)),
-    late_forces(),
-    delay_longer_than_its_memory(),
-    signals_in_order(),
-]
+    out = run(description, rec, 1)
+    # late x0: 0.02, 0.024, 0.024, 0.024; z: 0.02, 0.022, 0.022, 0.022; x1 = z − 0.02; q: 0, 0.2 → 0.1 by the play
+    close(out["joint_angle"][:, 0], [0.0, 0.1, 0.1, 0.1], within=1e-12)

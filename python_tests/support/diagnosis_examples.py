@@ -30,7 +30,7 @@ from tendonfmu.diagnosis.result import (
     Unexplained,
     Where,
 )
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 
 Numbers = NDArray[np.float64]
 Shape = Callable[[Numbers], Numbers]

@@ -7,17 +7,16 @@ import platform
 import sys
 import zipfile
 from collections.abc import Mapping, Sequence
-from ctypes import c_bool, c_char, c_char_p, c_double, c_int, c_int32, c_size_t, c_uint32, c_void_p
+from ctypes import c_bool, c_char_p, c_double, c_int, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
+from fmu_binary import OK, AnyInstance
 
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 TYPES: dict[str, Any] = {"Float64": c_double, "Int32": c_int32, "Boolean": c_bool}
@@ -135,8 +134,10 @@ def unpack3(fmu: Path, folder: Path) -> UnpackedFmu3:
     return UnpackedFmu3(folder)
 
 
-class Instance3:
+class Instance3(AnyInstance):
     """One instance. Calls return the fmi3Status; `messages` holds (status, category, text)."""
+
+    version = 3
 
     def __init__(self, fmu: UnpackedFmu3, *, logging: bool = True, **changes: Any) -> None:
         self.fmu = fmu
@@ -165,29 +166,14 @@ class Instance3:
         }
         self.component = self.library.fmi3InstantiateCoSimulation(*arguments.values())
 
-    def __enter__(self) -> Instance3:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
-        self.library.fmi3FreeInstance(self.component)
-        self.component = None
-
-    def call(self, name: str, *arguments: Any) -> int:
-        status: int = getattr(self.library, "fmi3" + name)(self.component, *arguments)
-        return status
-
-    @property
-    def last_message(self) -> str:
-        return self.messages[-1][2]
-
-    def vrs(self, names: Sequence[str]) -> ctypes.Array[c_uint32]:
-        return (c_uint32 * len(names))(*(self.fmu.variables[name].vr for name in names))
-
     def set(self, values: Mapping[str, float | Sequence[float]], kind: str = "Float64") -> int:
         """Write whole variables."""
         flat = [element for value in values.values() for element in (value if isinstance(value, Sequence) else [value])]
         numbers = (TYPES[kind] * len(flat))(*flat)
         return self.call(f"Set{kind}", self.vrs(list(values)), len(values), numbers, len(flat))
+
+    def write(self, values: Mapping[str, float]) -> int:
+        return self.set_elements(values)
 
     def set_elements(self, values: Mapping[str, float]) -> int:
         """Write inputs and parameters by the names of FMI 2.0; of an array all elements must be there."""
@@ -217,35 +203,10 @@ class Instance3:
     def enter_initialisation(self, start: float = 0.0, stop: float | None = None) -> int:
         return self.call("EnterInitializationMode", False, 0.0, start, stop is not None, stop or 0.0)
 
-    def initialise(self, inputs: Mapping[str, float] | None = None, start: float = 0.0) -> None:
-        assert self.enter_initialisation(start) == OK, self.last_message
-        if inputs:
-            assert self.set_elements(inputs) == OK, self.last_message
-        assert self.call("ExitInitializationMode") == OK, self.last_message
-
     def step(self, time: float, step: float = 0.001) -> int:
         flags = (c_bool * 3)(True, True, True)
         self.last_successful_time = c_double()
         pointers = [ctypes.byref(flags, k) for k in range(3)]
         status = self.call("DoStep", time, step, True, *pointers, ctypes.byref(self.last_successful_time))
         assert not any(flags)
-        return status
-
-    def save(self) -> bytes:
-        """The state as bytes."""
-        state, size = c_void_p(), c_size_t()
-        assert self.call("GetFMUState", ctypes.byref(state)) == OK
-        assert self.call("SerializedFMUStateSize", state, ctypes.byref(size)) == OK
-        data = (c_char * size.value)()
-        assert self.call("SerializeFMUState", state, data, size.value) == OK
-        assert self.call("FreeFMUState", ctypes.byref(state)) == OK and state.value is None
-        return bytes(data)
-
-    def restore(self, data: bytes) -> int:
-        """Takes over a state from bytes; the status of the call that refused, if one did."""
-        state = c_void_p()
-        status = self.call("DeserializeFMUState", data, len(data), ctypes.byref(state))
-        if status == OK:
-            status = self.call("SetFMUState", state)
-        self.call("FreeFMUState", ctypes.byref(state))
         return status

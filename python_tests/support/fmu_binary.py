@@ -5,6 +5,7 @@ fmpy raises on fmi2Error and refuses arguments that cannot be; the tests of call
 
 from __future__ import annotations
 
+import abc
 import ctypes
 import struct
 import sys
@@ -14,10 +15,13 @@ from ctypes import c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 
@@ -126,6 +130,10 @@ class UnpackedFmu:
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         return [name for name, v in self.variables.items() if v.causality == causality and v.type == kind]
 
+    def element_names(self, names: Sequence[str]) -> list[str]:
+        """Of FMI 3.0, whose variables may be arrays, names of the elements."""
+        return list(names)
+
     def with_derivatives(self) -> list[str]:
         """The Real outputs but for discrete ones."""
         return [name for name in self.names("output") if self.variables[name].variability == "continuous"]
@@ -146,8 +154,79 @@ def unpack(fmu: Path, folder: Path, mode: int = ctypes.DEFAULT_MODE) -> Unpacked
     return UnpackedFmu(folder, mode)
 
 
-class Instance:
-    """One instance. Calls return the fmi2Status; `messages` holds (status, category, text, environment, name)."""
+class AnyInstance(abc.ABC):
+    """What instances of both versions of FMI have: calls by name, and the state as bytes."""
+
+    version: int
+    library: ctypes.CDLL
+    component: int | None
+    messages: list[Any]  # (status, category, text, ...)
+    fmu: Any
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
+        getattr(self.library, f"fmi{self.version}FreeInstance")(self.component)
+        self.component = None
+
+    def call(self, name: str, *arguments: Any) -> int:
+        status: int = getattr(self.library, f"fmi{self.version}{name}")(self.component, *arguments)
+        return status
+
+    @property
+    def last_message(self) -> str:
+        return str(self.messages[-1][2])
+
+    def vrs(self, names: Sequence[str]) -> ctypes.Array[c_uint]:
+        return (c_uint * len(names))(*(self.fmu.variables[name].vr for name in names))
+
+    @abc.abstractmethod
+    def enter_initialisation(self, start: float = 0.0) -> int: ...
+
+    @abc.abstractmethod
+    def write(self, values: dict[str, float]) -> int:
+        """Write numbers by the names of FMI 2.0."""
+
+    @abc.abstractmethod
+    def step(self, time: float, step: float = 0.001) -> int: ...
+
+    @abc.abstractmethod
+    def outputs(self) -> list[float]: ...
+
+    def initialise(self, inputs: dict[str, float] | None = None, start: float = 0.0) -> None:
+        """Through the initialisation mode, with inputs of the first sample."""
+        assert self.enter_initialisation(start) == OK, self.last_message
+        if inputs:
+            assert self.write(inputs) == OK, self.last_message
+        assert self.call("ExitInitializationMode") == OK, self.last_message
+
+    def save(self) -> bytes:
+        """The state as bytes."""
+        word = {2: "FMUstate", 3: "FMUState"}[self.version]
+        state, size = c_void_p(), c_size_t()
+        assert self.call(f"Get{word}", ctypes.byref(state)) == OK
+        assert self.call(f"Serialized{word}Size", state, ctypes.byref(size)) == OK
+        data = (c_char * size.value)()
+        assert self.call(f"Serialize{word}", state, data, size.value) == OK
+        assert self.call(f"Free{word}", ctypes.byref(state)) == OK and state.value is None
+        return bytes(data)
+
+    def restore(self, data: bytes) -> int:
+        """Takes over a state from bytes; the status of the call that refused, if one did."""
+        word, read = {2: ("FMUstate", "DeSerializeFMUstate"), 3: ("FMUState", "DeserializeFMUState")}[self.version]
+        state = c_void_p()
+        status = self.call(read, data, len(data), ctypes.byref(state))
+        if status == OK:
+            status = self.call(f"Set{word}", state)
+        self.call(f"Free{word}", ctypes.byref(state))
+        return status
+
+
+class Instance(AnyInstance):
+    """One instance of FMI 2.0. `messages` holds (status, category, text, environment, name)."""
+
+    version = 2
 
     def __init__(self, fmu: UnpackedFmu, *, logging: bool = True, logger: bool = True, **changes: Any) -> None:
         self.fmu = fmu
@@ -170,23 +249,8 @@ class Instance:
         }
         self.component = self.library.fmi2Instantiate(*arguments.values())
 
-    def __enter__(self) -> Instance:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
-        self.library.fmi2FreeInstance(self.component)
-        self.component = None
-
-    def call(self, name: str, *arguments: Any) -> int:
-        status: int = getattr(self.library, "fmi2" + name)(self.component, *arguments)
-        return status
-
-    @property
-    def last_message(self) -> str:
-        return self.messages[-1][2]
-
-    def vrs(self, names: Sequence[str]) -> ctypes.Array[c_uint]:
-        return (c_uint * len(names))(*(self.fmu.variables[name].vr for name in names))
+    def write(self, values: dict[str, float]) -> int:
+        return self.set_real(values)
 
     def set_real(self, values: dict[str, float]) -> int:
         numbers = (c_double * len(values))(*values.values())
@@ -212,43 +276,19 @@ class Instance:
     def setup(self, start: float = 0.0, stop: float | None = None) -> int:
         return self.call("SetupExperiment", 0, 0.0, start, stop is not None, stop or 0.0)
 
-    def initialise(self, inputs: dict[str, float] | None = None, start: float = 0.0) -> None:
-        """Through the initialisation mode, with inputs of the first sample."""
-        assert self.setup(start) == OK
-        assert self.call("EnterInitializationMode") == OK
-        if inputs:
-            assert self.set_real(inputs) == OK
-        assert self.call("ExitInitializationMode") == OK, self.last_message
+    def enter_initialisation(self, start: float = 0.0) -> int:
+        return self.setup(start) or self.call("EnterInitializationMode")
 
     def step(self, time: float, step: float = 0.001) -> int:
         return self.call("DoStep", time, step, 1)
 
-    def save(self) -> bytes:
-        """The state as bytes."""
-        state, size = c_void_p(), c_size_t()
-        assert self.call("GetFMUstate", ctypes.byref(state)) == OK
-        assert self.call("SerializedFMUstateSize", state, ctypes.byref(size)) == OK
-        data = (c_char * size.value)()
-        assert self.call("SerializeFMUstate", state, data, size.value) == OK
-        assert self.call("FreeFMUstate", ctypes.byref(state)) == OK and state.value is None
-        return bytes(data)
 
-    def restore(self, data: bytes) -> int:
-        """Takes over a state from bytes; the status of the call that refused, if one did."""
-        state = c_void_p()
-        status = self.call("DeSerializeFMUstate", data, len(data), ctypes.byref(state))
-        if status == OK:
-            status = self.call("SetFMUstate", state)
-        self.call("FreeFMUstate", ctypes.byref(state))
-        return status
-
-
-def motion(fmu: UnpackedFmu, time: float, seed: int = 0) -> dict[str, float]:
+def motion(fmu: Any, time: float, seed: int = 0) -> dict[str, float]:
     """Inputs that move: forces about 5 N, positions of a bending finger, with rests (sliding and sticking)."""
     phase = 0.3 * seed
     swing = np.clip(1.5 * np.sin(8.0 * time + phase), -1.0, 1.0)
     inputs = {}
-    for k, name in enumerate(fmu.names("input")):
+    for k, name in enumerate(fmu.element_names(fmu.names("input"))):
         if name.startswith("tendon_force"):
             inputs[name] = 5.0 + 2.0 * np.sin(3.0 * time + k)
         elif name.startswith("tendon_position"):

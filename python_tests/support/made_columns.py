@@ -14,9 +14,8 @@ from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Sh
 from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.block_grams import Grams
-from tendonfmu.statistics.column_products import Products
-from tendonfmu.statistics.folds import make_folds
+from tendonfmu.statistics.block_grams import Grams, Products
+from tendonfmu.statistics.blocks import make_folds
 from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]

@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_detection import NEAR, Detector, direction_above
+from oracle_detection import Detector, direction_above
 from oracle_extensions import Extensions
-from oracle_finger import Effect, Places, given, read_joints, read_tendons, tendon_velocity
+from oracle_finger import NEAR, Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
-from oracle_result import Key, Result, Step
 from oracle_sensors import SensorWatch, Watch
 from oracle_start import StartFriction, gain_of
 

@@ -1,4 +1,4 @@
-"""What the oracle knows of a finger: laws, friction effects, tendons and joints, read from a description.
+"""What the oracle knows of a finger (laws, friction effects, tendons and joints), and what it gives of a run.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
 """
@@ -6,14 +6,17 @@ Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+Key = tuple[Any, ...]
+NEAR = 1e-9  # docs/reference/semantics.md#agreement: a decision closer than this to its threshold may go either way
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 
 
@@ -186,3 +189,43 @@ def read_tendons(description: Mapping[str, Any]) -> list[Tendon]:
         )
         for entry in description["tendons"]
     ]
+
+
+# --- what a sample and a run give -------------------------------------------------------------------------------------
+
+
+@dataclass
+class Result:
+    """Outputs of a run and what the agreement rule and the branch counts need.
+
+    outputs: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`).
+    velocity_margin, residual_margin, force_margin: [N], smallest distance of the sample to a
+        threshold (m/s or rad/s, N.m, N); evidence, in s, counts with the residual.
+    alternatives: sample -> {decision key: values the decision may also take within NEAR}.
+    branches: how often each branch was taken.
+    """
+
+    outputs: dict[str, Array]
+    velocity_margin: Array
+    residual_margin: Array
+    force_margin: Array
+    alternatives: dict[int, dict[Key, list[Any]]]
+    branches: Counter[str]
+
+    @property
+    def near(self) -> Array:
+        """[N] bool: samples within NEAR of some threshold."""
+        smallest = np.minimum(np.minimum(self.velocity_margin, self.residual_margin), self.force_margin)
+        return np.asarray(smallest < NEAR)
+
+
+@dataclass
+class Step:
+    """What one sample yields besides the change of the state."""
+
+    values: dict[str, Array] = field(default_factory=dict)
+    velocity_margin: float = math.inf
+    residual_margin: float = math.inf
+    force_margin: float = math.inf
+    decisions: dict[Key, Any] = field(default_factory=dict)
+    alternatives: dict[Key, list[Any]] = field(default_factory=dict)

@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import given
+from oracle_finger import NEAR, given
 
 Array = NDArray[Any]
-
-NEAR = 1e-9
 
 
 class RestWatch:

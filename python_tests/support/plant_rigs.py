@@ -20,8 +20,6 @@ needs_plant = pytest.mark.skipif(not binding.HAS_PLANT, reason=f"SIMULATED FINGE
 ARM, STIFFNESS = 0.01, 8000.0  # m, N/m: of the rigs below unless they say otherwise
 ANTAGONISTS = [[ARM], [-ARM]]
 TWO_JOINTS = [[ARM, ARM], [-ARM, ARM], [ARM, -ARM], [-ARM, -ARM]]  # every column sums to 0: equal tensions hold it
-STIFF_ONLY = {"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 1.0}
-
 CALM = {"damping": 20.0}  # N·s/m in the tendons: settles the springs, leaves friction_torque alone
 
 

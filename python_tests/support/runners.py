@@ -13,7 +13,7 @@ import importlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import agreement
 import oracle
 
 Outputs = dict[str, NDArray[Any]]
@@ -35,7 +36,6 @@ class Runner:
     name: str
     run: Run
     repeated_time: bool = True
-    extensions: bool = True
 
     def __call__(
         self, description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
@@ -130,3 +130,47 @@ RUNNERS: list[Runner] = [
     # fmi2DoStep has no step of length 0; test_fmu_states.py takes a time twice
     Runner("fmu", run_fmu, repeated_time=False),
 ]
+OTHERS = [runner for runner in RUNNERS if runner is not ORACLE]
+# a call from Python for each sample, and a package to be made
+SLOW = [runner for runner in RUNNERS if runner.name in ("single_steps", "fmu")]
+
+
+def assert_agreement(
+    runner: Runner,
+    cases: Iterable[tuple[int, Mapping[str, Any], Mapping[str, NDArray[Any]], int, oracle.Result]],
+    *required: str,
+) -> None:
+    """Compare a runner with the oracle. cases: seed, description, recording, kinematics source, run of the oracle."""
+    results, wrong = [], []
+    for seed, description, recording, source, reference in cases:
+        outputs = runner(description, recording, source)
+        assert set(required) <= set(outputs)
+        result = agreement.agree_with_oracle(description, recording, source, outputs, reference)
+        results.append(result)
+        if not result.agrees:
+            wrong.append(f"finger {seed}, source {source}: {result}")
+    assert not wrong, "\n".join(wrong[:10])
+    assert agreement.few_left_out(results)
+
+
+def assert_state_continues(
+    description: Mapping[str, Any],
+    recording: Mapping[str, NDArray[Any]],
+    source: int,
+    cuts: Iterable[int],
+) -> None:
+    """Save the state at each cut, and go on twice from it in another instance: all outputs have the same bits."""
+    native = product("model.native")
+    whole = native.Instance.from_description(description, source).run(recording, parts=True)
+    for cut in cuts:
+        head, tail = ({name: x[part] for name, x in recording.items()} for part in (slice(cut), slice(cut, None)))
+        first, other = (
+            native.Instance.from_description(description, source),
+            native.Instance.from_description(description),
+        )
+        first.run(head)
+        state = first.save_state()
+        for finger in (first, other, other):
+            finger.restore_state(state)
+            for name, values in finger.run(tail, parts=True).items():
+                np.testing.assert_array_equal(values, whole[name][cut:], err_msg=f"{name} from {cut}")

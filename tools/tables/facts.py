@@ -18,21 +18,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 FOLDER = ROOT / "runtime" / "description"
 KINDS = ("object", "list", "law", "laws", "edges", "flag", "word", "name", "format", "extensions")
 FIELDS = {
-    *(
-        "path",
-        "kind",
-        "item",
-        "unit",
-        "words",
-        "spoken_unit",
-        "least",
-        "above",
-        "most",
-        "default",
-        "required",
-        "absent",
-    ),
-    *("fixed", "option", "keys", "text", "note", "why"),
+    *("path", "kind", "item", "unit", "words", "spoken_unit", "least", "above", "most", "default", "required"),
+    *("absent", "fixed", "option", "keys", "text", "note", "why"),
 }
 
 

@@ -31,7 +31,6 @@ TEMPLATES = {
     "tendonfmu_outputs.hpp.jinja": "runtime/include/tendonfmu_outputs.hpp",
     "output_table.h.jinja": "python/binding/output_table.h",
     "finger_signals.c.jinja": "fmu_src/finger_signals.c",
-    "description_defaults.py.jinja": "python/tendonfmu/model/description_defaults.py",
     "output_names.py.jinja": "python/tendonfmu/model/output_names.py",
     "description_keys.md.jinja": "docs/reference/description_keys.md",
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",
@@ -136,6 +135,35 @@ def schema_text(facts: Facts) -> str:
     return json_text({"$comment": NOTICE} | finger_schema(facts)) + "\n"
 
 
+def numbers_text(facts: Facts) -> str:
+    """What tendonfmu/model/description_numbers.py reads; all numbers in SI units."""
+
+    def least(row: Row) -> float:
+        return float(row["least"] if "least" in row else row["above"])
+
+    numbers = {plain(row["path"]): row for row in facts.numbers}
+    effects = {
+        effect["name"]: {
+            number["key"]: {
+                "least": least(number),
+                "most": float(number["most"]),
+                "missing": float(number["default"]) if "default" in number else None,
+                "scale": float(number["scale"]),
+            }
+            for number in effect["numbers"]
+        }
+        for effect in facts.effects["effects"]
+    }
+    content = {
+        "$comment": NOTICE,
+        "defaults": {path: float(row["default"]) for path, row in numbers.items() if "default" in row},
+        "ranges": {path: [least(row), float(row["most"])] for path, row in numbers.items()},
+        "limits": facts.keys["limits"],
+        "effects": effects,
+    }
+    return json_text(content) + "\n"
+
+
 def variables_text(facts: Facts) -> str:
     """modelDescription/variables.json: outputs and settings of the FMU, and the texts of its parameters."""
     outputs = dict(facts.outputs) | {"format": "tendonfmu-variables-1"}
@@ -226,6 +254,7 @@ def generated(facts: Facts) -> dict[str, str]:
     files = {path: templates.get_template(name).render() for name, path in TEMPLATES.items()}
     makers: Mapping[str, Callable[[Facts], str]] = {
         "python/tendonfmu/schema/finger.schema.json": schema_text,
+        "python/tendonfmu/schema/description_numbers.json": numbers_text,
         "modelDescription/variables.json": variables_text,
     }
     return files | {path: make(facts) for path, make in makers.items()}

@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from binary_contents import Contents, read_contents
+from binary_contents import Contents, broken_promises, read_contents
 
 # The C library in its parts, as they were before GLIBC 2.34.
 SYSTEM = re.compile(r"lib(c|m|dl|rt|pthread)\.so\.\d|ld-linux-x86-64\.so\.2")
@@ -23,19 +23,9 @@ WANTED = ("_estimation", "_native", "_plant", "tendonfmu", "tendonfmu_fmi3", "te
 
 
 def findings(name: str, contents: Contents, glibc: tuple[int, ...]) -> list[str]:
-    """What is wrong with one library; empty for a good one."""
     stem = name.rsplit("/", 1)[-1].split(".")[0]
-    allowed = rf"PyInit_{stem}" if stem.startswith("_") else r"fmi3\w+" if stem.endswith("_fmi3") else r"fmi2\w+"
-    found = []
-    foreign = sorted(each for each in contents.exports if not re.fullmatch(allowed, each))
-    if foreign:
-        found.append(f"exports {', '.join(foreign[:5])} and so on ({len(foreign)}); expected {allowed} only")
-    others = [each for each in contents.libraries if not SYSTEM.fullmatch(each)]
-    if others:
-        found.append(f"needs {', '.join(others)}; expected the C library only")
-    if contents.glibc_floor > glibc:
-        found.append(f"needs GLIBC {contents.glibc[-1]}; expected at most {'.'.join(map(str, glibc))}")
-    return found
+    exports = rf"PyInit_{stem}" if stem.startswith("_") else r"fmi3\w+" if stem.endswith("_fmi3") else r"fmi2\w+"
+    return broken_promises(contents, re.compile(exports), SYSTEM, glibc)
 
 
 def check(wheel: Path, glibc: tuple[int, ...]) -> list[str]:

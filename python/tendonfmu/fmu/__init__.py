@@ -1,6 +1,6 @@
 """How FMUs are packaged without a compiler, described, and run.
 
-`packaging` makes the archive from `model_variables` and `documentation`. `fmpy_client` runs an FMU sample by sample.
+`packaging` makes the archive from `model_variables`. `fmpy_client` runs an FMU sample by sample.
 `running` runs a description or an FMU over a recording.
 """
 
@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .documentation import render_documentation
     from .fmpy_client import run_fmu
-    from .fmu_report import fmu_report
     from .model_variables import NOT_IN_XML, VariableTable, elements, group_sizes, read_table, units_of
     from .packaging import (
         build_fmu,
         draw_pictures,
         find_binaries,
+        fmu_report,
         guid,
         licenses,
         members,
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
         model_identifier,
         pack,
         package_file,
+        render_documentation,
     )
     from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
     from .reference_results import bridged_rows, reference_run, related_members

@@ -5,20 +5,22 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import re
 import shutil
+import stat
+import struct
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError, OutputError
-from tendonfmu.fmu.archive_check import check_members, is_whole, one_line
+from tendonfmu.files import counted
 from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
 from tendonfmu.recordings import Recording
 
@@ -28,6 +30,8 @@ KINDS = ("Real", "Boolean", "Integer")
 FOR_READERS = ("sources/", "documentation/")  # no run needs these folders; with them unpacking takes five times as long
 # Types of FMI 3.0 by the names that they have in FMI 2.0.
 KIND_OF = {"Float64": "Real", "Int32": "Integer"}
+# An FMU of `tendonfmu build` has some 4 MB in 200 files; what is larger by far is no FMU and would fill the disk.
+LARGEST_UNPACKED, MOST_MEMBERS = 1 << 30, 10_000
 
 
 @dataclass(frozen=True)
@@ -72,21 +76,49 @@ def _unpack(path: Path, folder: Path) -> None:
     from fmpy import extract
 
     try:
-        check_members(path)
+        _check_members(path)
         extract(os.fspath(path), unzipdir=str(folder), include=lambda name: not name.startswith(FOR_READERS))
     except (InputError, MemoryError):
         raise
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
             raise OutputError(f"{path}: cannot be unpacked into {folder.parent} ({error.strerror})") from None
-        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
     except Exception as error:
-        raise InputError(f"{path}: not an FMU ({one_line(error)})") from None
+        raise InputError(f"{path}: not an FMU ({_one_line(error)})") from None
     if not (folder / "modelDescription.xml").is_file():
         raise InputError(f"{path}: no modelDescription.xml in it; expected an FMU of `tendonfmu build`")
     for library in folder.glob("binaries/*/*.so"):
-        if not is_whole(library.read_bytes()):
+        if not _is_whole(library.read_bytes()):
             raise InputError(f"{path}: {library.name} ends early; expected a whole library")
+
+
+def _is_whole(library: bytes) -> bool:
+    """Return whether a 64-bit ELF library has all its sections: loading one without ends the process (SIGBUS)."""
+    if library[:6] != b"\x7fELF\x02\x01" or len(library) < 64:
+        return True  # of another kind: the loader refuses what it does not know
+    (table,) = struct.unpack_from("<Q", library, 40)
+    size, count = struct.unpack_from("<HH", library, 58)
+    return bool(len(library) >= table + size * count)
+
+
+def _one_line(error: Exception) -> str:
+    """Return what an error says, in one line."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _check_members(path: Path) -> None:
+    """Check an archive before any of it is unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+    if len(members) > MOST_MEMBERS:
+        raise InputError(f"{path}: {counted(len(members), 'file')} in it; expected an FMU, of at most {MOST_MEMBERS}")
+    size = sum(member.file_size for member in members)  # no more is unpacked, whatever the data hold
+    if size > LARGEST_UNPACKED:
+        raise InputError(f"{path}: {size / 1e9:.3g} GB when unpacked; expected an FMU, of at most 1.07 GB")
+    for member in members:
+        if ".." in member.filename.split("/") or stat.S_ISLNK(member.external_attr >> 16):
+            raise InputError(f"{path}: {member.filename!r} is a link or leads out of it; expected an FMU")
 
 
 def _description_of(path: Path, folder: Path) -> Any:
@@ -98,32 +130,26 @@ def _description_of(path: Path, folder: Path) -> Any:
     except MemoryError:
         raise
     except Exception as error:
-        reason = f"modelDescription.xml: {one_line(error)}"
+        reason = f"modelDescription.xml: {_one_line(error)}"
         raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
-class _Slave(Protocol):
-    """An instance of a version of FMI, as `_Run` uses it. fmpy raises bare exceptions when the FMU refuses a call."""
+class _Slave:
+    """What instances of both versions of FMI have. fmpy raises bare exceptions when the FMU refuses a call."""
 
-    numbers: ClassVar[Mapping[str, type[np.generic]]]  # C type of the values by kind
+    _slave: Any
 
-    def instantiate(self, log: Callable[[int, bytes], None]) -> None: ...
-    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
-        """Write settings by value reference, and enter the initialisation mode."""
+    def exit_initialisation(self) -> None:
+        self._slave.exitInitializationMode()
 
-    def exit_initialisation(self) -> None: ...
-    def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
-        """Return a function that writes `count` numbers to Real variables."""
+    def terminate(self) -> None:
+        self._slave.terminate()
 
-    def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
-        """Return a function that reads `count` values."""
-
-    def step(self, time: float, step: float) -> None: ...
-    def terminate(self) -> None: ...
-    def free(self) -> None: ...
+    def free(self) -> None:
+        self._slave.freeInstance()
 
 
-class _Slave2:
+class _Slave2(_Slave):
     """FMI 2.0."""
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.int32, "Integer": np.int32}
@@ -149,33 +175,27 @@ class _Slave2:
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
 
     def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
+        """Write settings by value reference, and enter the initialisation mode."""
         self._slave.setupExperiment(startTime=start)
         self._slave.setInteger(list(whole), list(whole.values()))
         self._slave.setReal(list(real), list(real.values()))
         self._slave.enterInitializationMode()
 
-    def exit_initialisation(self) -> None:
-        self._slave.exitInitializationMode()
-
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that writes `count` numbers to Real variables."""
         vr, write, component = _references(references), self._slave.fmi2SetReal, self._slave.component
         return lambda values: write(component, vr, count, values)
 
     def reader(self, kind: str, references: list[int], count: int) -> Callable[[Pointer], None]:
+        """Return a function that reads `count` values."""
         vr, read, component = _references(references), getattr(self._slave, f"fmi2Get{kind}"), self._slave.component
         return lambda values: read(component, vr, count, values)
 
     def step(self, time: float, step: float) -> None:
         self._slave.fmi2DoStep(self._slave.component, time, step, 1)
 
-    def terminate(self) -> None:
-        self._slave.terminate()
 
-    def free(self) -> None:
-        self._slave.freeInstance()
-
-
-class _Slave3:
+class _Slave3(_Slave):
     """FMI 3.0."""
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.bool_, "Integer": np.int32}
@@ -195,9 +215,6 @@ class _Slave3:
         self._slave.setFloat64(list(real), list(real.values()))
         self._slave.enterInitializationMode(startTime=start)
 
-    def exit_initialisation(self) -> None:
-        self._slave.exitInitializationMode()
-
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
         vr, write, component = _references(references), self._slave.fmi3SetFloat64, self._slave.component
         return lambda values: write(component, vr, len(vr), values, count)
@@ -210,24 +227,17 @@ class _Slave3:
     def step(self, time: float, step: float) -> None:
         self._slave.fmi3DoStep(self._slave.component, time, step, True, *self._answers)
 
-    def terminate(self) -> None:
-        self._slave.terminate()
-
-    def free(self) -> None:
-        self._slave.freeInstance()
-
 
 class _Run:
     """One instance of an FMU. Its arrays are laid out once, so that a step is a few calls."""
 
     def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
-
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._parameters = parameters
         self._messages: list[str] = []
         description = _description_of(path, folder)
-        slaves: dict[str, Callable[..., _Slave]] = {"2": _Slave2, "3": _Slave3}
+        slaves: dict[str, type[_Slave2 | _Slave3]] = {"2": _Slave2, "3": _Slave3}
         slave = slaves.get(str(description.fmiVersion).partition(".")[0])
         if slave is None or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected a co-simulation FMU of FMI 2.0 or 3.0")
@@ -238,7 +248,7 @@ class _Run:
         self._inputs = {group: self._group(group) for group in INPUTS}
         before = Path.cwd()
         try:
-            self._slave: _Slave = slave(
+            self._slave: _Slave2 | _Slave3 = slave(
                 guid=description.guid,
                 unzipDirectory=str(folder),
                 modelIdentifier=description.coSimulation.modelIdentifier,
@@ -248,7 +258,7 @@ class _Run:
             raise
         # no library for this system, or none that can be loaded: fmpy raises bare exceptions
         except Exception as error:
-            raise InputError(f"{path}: not an FMU ({one_line(error).replace(str(folder), '')})") from None
+            raise InputError(f"{path}: not an FMU ({_one_line(error).replace(str(folder), '')})") from None
         finally:
             os.chdir(before)  # fmpy loads a library in its folder, and stays there if that fails
 
@@ -274,14 +284,13 @@ class _Run:
             sizes = [int(dimension.start) for dimension in variable.dimensions or ()]
             names = tuple(f"{group}[{i}]" for i in range(1, sizes[0] + 1)) if sizes else (group,)
             return Group(names, (variable.valueReference,), kind)
-        found = {}
-        for name, variable in self._all.items():
-            if match := re.fullmatch(rf"{group}\[(\d+)\]", name):
-                found[int(match[1])] = variable
-        if not found:
+        count = 0
+        while f"{group}[{count + 1}]" in self._all:
+            count += 1
+        if not count:
             raise InputError(f"{self.path}: no variable {group}[1]; expected a friction FMU of `tendonfmu build`")
-        names = tuple(f"{group}[{i}]" for i in sorted(found))
-        return Group(names, tuple(found[i].valueReference for i in sorted(found)), str(found[min(found)].type))
+        names = tuple(f"{group}[{i}]" for i in range(1, count + 1))
+        return Group(names, tuple(self._all[name].valueReference for name in names), str(self._all[names[0]].type))
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:

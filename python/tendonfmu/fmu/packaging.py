@@ -10,22 +10,20 @@ import io
 import re
 import unicodedata
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.files import whole_file
-from tendonfmu.fmu.array_variables import in_arrays
-from tendonfmu.fmu.documentation import documentation_page
-from tendonfmu.fmu.model_variables import VariableTable, describe_model, group_sizes, read_table
-from tendonfmu.fmu.schema_check import checked
-from tendonfmu.fmu.terminals import terminals_and_icons
-from tendonfmu.model import Finger, FingerSource, native, read_finger
+from tendonfmu.files import html_template, whole_file
+from tendonfmu.fmu.model_variables import VariableTable, describe_model, group_sizes, in_arrays, read_table
+from tendonfmu.fmu.terminals import checked, terminals_and_icons
+from tendonfmu.model import Finger, FingerSource, count, native, read_finger
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable
@@ -53,48 +51,13 @@ VERSIONS = {
 BUILD_TEMPLATE, BUILD_SCHEMA = "buildDescription.xml.jinja", "fmi3/fmi3BuildDescription.xsd"
 
 # A model identifier names files and C functions, so words reserved by C or by a file system are excluded.
-RESERVED = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "con",
-        "prn",
-        "aux",
-        "nul",
-    ]
-)
+RESERVED = frozenset((
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
+    "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
+    "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "con",
+    "prn", "aux", "nul",
+))  # fmt: skip
+REPORT_FORMAT = "tendonfmu-build-1"
 
 
 def build_fmu(
@@ -166,7 +129,8 @@ def members(
     if illustrated:
         pictures, icon = draw_pictures(description)
         content |= pictures
-        content["documentation/index.html"] = documentation_page(description, context).encode()
+        page = render_documentation("documentation.html.jinja", context, summary=count(description))
+        content["documentation/index.html"] = page.encode()
     content |= terminals_and_icons(context["variables"], icon)
     content |= licenses("license.txt")
     content |= {f"sources/{name}": data for name, data in sources.items()}
@@ -185,6 +149,15 @@ def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
     picture, icon = io.BytesIO(), io.BytesIO()
     draw_finger(finger_drawing(finger), picture, icon)
     return {"model.png": picture.getvalue()}, icon.getvalue()
+
+
+def render_documentation(template: str, model: Mapping[str, Any], **context: Any) -> str:
+    """Render the HTML page of an FMU."""
+    by_causality = {
+        f"{causality}s": [variable for variable in model["variables"] if variable["causality"] == causality]
+        for causality in ("input", "output", "parameter")
+    }
+    return html_template(template).render(model=model, **by_causality, **context)
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -218,15 +191,15 @@ def _sources(folder: str) -> dict[str, bytes]:
 def find_binaries(folder: Path | None, installed: str, stem: str, identifier: str) -> dict[str, bytes]:
     """Read the binaries of all platforms."""
     root: Traversable = package_file(installed) if folder is None else folder
-    found = {}
+    libraries = {}
     for platform in root.iterdir() if root.is_dir() else []:
         for file in platform.iterdir() if platform.is_dir() else []:
             suffix = Path(file.name).suffix
             if Path(file.name).stem == stem and suffix in BINARY_SUFFIXES:
-                found[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
-    if not found:
+                libraries[f"{platform.name}/{identifier}{suffix}"] = file.read_bytes()
+    if not libraries:
         raise InputError(f"{root}: no binary; expected <FMI platform>/{stem}.so, .dll or .dylib in it")
-    return found
+    return libraries
 
 
 def model_description(context: Mapping[str, Any], fmi: int = 2) -> bytes:
@@ -262,3 +235,33 @@ def pack(content: Mapping[str, bytes]) -> bytes:
             member.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
             archive.writestr(member, content[path])
     return buffer.getvalue()
+
+
+def fmu_report(source: Path, fmu: Path) -> dict[str, Any]:
+    """Return what `tendonfmu build --json` prints: what an FMU is, as read from its file."""
+    with zipfile.ZipFile(fmu) as archive:
+        names = archive.namelist()
+        model = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    variables = list(_variables(model))
+    return {
+        "format": REPORT_FORMAT,
+        "source": str(source),
+        "fmu": str(fmu),
+        "kind": "rig" if "resources/rig.json" in names else "finger",
+        "name": model.attrib["modelName"],
+        "fmi_version": model.attrib["fmiVersion"],
+        "guid": model.attrib.get("guid") or model.attrib["instantiationToken"],
+        "generated_by": model.attrib.get("generationTool"),
+        "platforms": sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name[-1] != "/"}),
+        "inputs": sum(size for causality, size in variables if causality == "input"),
+        "outputs": sum(size for causality, size in variables if causality == "output"),
+        "parameters": sum(size for causality, size in variables if causality == "parameter"),
+        "bytes": fmu.stat().st_size,
+    }
+
+
+def _variables(model: ElementTree.Element) -> Iterator[tuple[str | None, int]]:
+    """Yield causality and number of elements of each variable. FMI 2.0 has no arrays."""
+    for variable in model.find("ModelVariables") or ():
+        dimension = variable.find("Dimension")
+        yield variable.get("causality"), 1 if dimension is None else int(dimension.attrib["start"])

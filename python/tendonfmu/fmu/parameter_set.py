@@ -65,23 +65,23 @@ def write_parameter_set(
 def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger, warnings: Sequence[str]) -> bytes:
     from lxml import etree
 
-    units = {each.path: each.unit for each in native.Instance(finger.image).parameters()}
+    units = {given.path: given.unit for given in native.Instance(finger.image).parameters()}
     base_units = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8")).data["units"]
     plain_name = NOT_IN_XML.sub("?", name)
     root = etree.Element(f"{{{_SSV}}}ParameterSet", version="1.0", name=plain_name, nsmap={"ssv": _SSV, "ssc": _SSC})
     listed = etree.SubElement(root, f"{{{_SSV}}}Parameters")
-    for each in parameters:
-        parameter = etree.SubElement(listed, f"{{{_SSV}}}Parameter", name=each.path)
-        unit = {"unit": units[each.path]} if units[each.path] in base_units else {}
-        etree.SubElement(parameter, f"{{{_SSV}}}Real", value=repr(each.value), **unit)
-        if each.standard_error is not None and np.isfinite(each.standard_error):
+    for given in parameters:
+        parameter = etree.SubElement(listed, f"{{{_SSV}}}Parameter", name=given.path)
+        unit = {"unit": units[given.path]} if units[given.path] in base_units else {}
+        etree.SubElement(parameter, f"{{{_SSV}}}Real", value=repr(given.value), **unit)
+        if given.standard_error is not None and np.isfinite(given.standard_error):
             etree.SubElement(
                 _annotation(parameter, ANNOTATION),
                 "uncertainty",
-                standardError=repr(each.standard_error),
-                identified=str(each.identified).lower(),
+                standardError=repr(given.standard_error),
+                identified=str(given.identified).lower(),
             )
-    used = sorted({units[each.path] for each in parameters} & set(base_units))
+    used = sorted({units[given.path] for given in parameters} & set(base_units))
     if used:
         defined = etree.SubElement(root, f"{{{_SSV}}}Units")
         for unit_name in used:
@@ -112,7 +112,7 @@ def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:
         raise InputError(f"{path}: {wrong}; expected a parameter set of SSP (.ssv)") from None
     if root.tag != f"{{{_SSV}}}ParameterSet":
         raise InputError(f"{path}: element {root.tag}; expected a parameter set of SSP (.ssv)")
-    known = {each.path: each.unit for each in native.Instance(finger.image).parameters()}
+    known = {parameter.path: parameter.unit for parameter in native.Instance(finger.image).parameters()}
     values: dict[str, float] = {}
     for name, value, unit in _entries(path, root):
         if name not in known:
@@ -143,14 +143,14 @@ def _entries(path: Path, root: Any) -> Iterator[tuple[str, float, str | None]]:
 
 def parameter_sets(paths: Sequence[Path], finger: Finger) -> list[Related]:
     """Return parameter sets as related files of an FMU."""
-    found: list[Related] = []
+    sets: list[Related] = []
     for path in paths:
         if path.suffix.lower() != ".ssv":
             raise InputError(f"{path}: expected a parameter set of SSP, with the suffix .ssv")
-        if any(each.name == path.name for each in found):
+        if any(related.name == path.name for related in sets):
             raise InputError(f"{path}: a second file of this name; expected different names")
         count = len(read_parameter_set(path, finger))
-        found.append(
+        sets.append(
             Related(path.name, path.read_bytes(), "parameter", MIME_TYPE, f"Values of {counted(count, 'parameter')}")
         )
-    return found
+    return sets

@@ -69,7 +69,7 @@ class ReferenceRun:
 
 def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False) -> ReferenceRun:
     """Run a finger over a recording; inputs, outputs and tolerance become files."""
-    # arrays: [2]
+    # arrays: as FMI 3.0 has them, the elements of a signal in one column
     grid, step = _on_grid(finger, recording)
     outputs = run_model(finger, grid)
     # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
@@ -124,7 +124,7 @@ def related_members(related: Sequence[Related]) -> dict[str, bytes]:
     """Return the members of an FMU for related files."""
     if not related:
         return {}
-    files = {f"{FOLDER}/{each.name}": each.content for each in related}
+    files = {f"{FOLDER}/{file.name}": file.content for file in related}
     return files | {f"{FOLDER}/fmi-ls-manifest.xml": _manifest(related), NOTE: _note(related).encode()}
 
 
@@ -193,15 +193,15 @@ def _experiments(name: str, experiment: Mapping[str, float], source: str) -> byt
 def _manifest(related: Sequence[Related]) -> bytes:
     attributes = {f"{{{_SPACE}}}{name}": value for name, value in _ROOT_ATTRIBUTES.items()}
     root = etree.Element("fmiReferences", attributes, nsmap={"fmi-ls": _SPACE})
-    for each in related:
+    for file in related:
         etree.SubElement(
             root,
             "Related",
-            type=each.kind,
-            source=each.name,
-            role=each.role,
-            description=each.description,
-            checksum=hashlib.sha3_256(each.content).hexdigest(),
+            type=file.kind,
+            source=file.name,
+            role=file.role,
+            description=file.description,
+            checksum=hashlib.sha3_256(file.content).hexdigest(),
             checksumType="SHA3-256",
         )
     return _xml(root)
@@ -212,10 +212,10 @@ def _xml(root: Any) -> bytes:
 
 
 def _note(related: Sequence[Related]) -> str:
-    files = "".join(f"  {each.name}: {each.description}\n" for each in related)
+    files = "".join(f"  {file.name}: {file.description}\n" for file in related)
     rows = (
         "The rows of the results are those of a client that calls fmi2DoStep(t, h), reads the outputs, and writes\n"
         "them under the time t + h: the outputs belong to the sample at t. The first sample is in the first two rows.\n"
         "An output agrees if |result - reference| <= RelTol * max |reference| + AbsTol in every row.\n"
     )
-    return f"Files in {FOLDER}:\n\n{files}\n" + (rows if any(each.role == "result" for each in related) else "")
+    return f"Files in {FOLDER}:\n\n{files}\n" + (rows if any(file.role == "result" for file in related) else "")

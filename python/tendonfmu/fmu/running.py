@@ -74,7 +74,7 @@ def outputs_of(columns: Mapping[str, NDArray[Any]]) -> Outputs:
     groups: dict[str, list[NDArray[Any]]] = {}
     for name, column in columns.items():
         groups.setdefault(name.partition("[")[0], []).append(column)
-    return {name: each[0] if name in columns else np.column_stack(each) for name, each in groups.items()}
+    return {name: parts[0] if name in columns else np.column_stack(parts) for name, parts in groups.items()}
 
 
 def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
@@ -110,9 +110,9 @@ def _run_native(finger: Finger, recording: Recording, source: int) -> Outputs:
         raise InputError(f"kinematics = {source!r}: expected 1, 2 or 3")
     recording.require(finger.joints, finger.tendons, inputs_used(source, watches_motors(finger.data)))
     try:
-        found = native.Instance(finger.image, source).run(recording.arrays())
+        results = native.Instance(finger.image, source).run(recording.arrays())
     except native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
     names = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS)
-    outputs = {name: found[name] for name in names if name in found}
+    outputs = {name: results[name] for name in names if name in results}
     return {"time": recording.time, **outputs}

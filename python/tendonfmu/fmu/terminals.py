@@ -6,11 +6,13 @@ with the friction FMU by one line, `sensors` to `sensors`.
 
 from __future__ import annotations
 
+import importlib.util
 import io
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tendonfmu.fmu.schema_check import checked
+from tendonfmu.errors import InternalError
 
 if TYPE_CHECKING:
     from lxml.builder import ElementMaker
@@ -87,3 +89,18 @@ def _terminal(
         content.append(e.TerminalGraphicalRepresentation(**place, iconBaseName=sides[name]))
     # bus: members of the same name are connected, and either side may have more
     return e.Terminal(*content, name=name, matchingRule="bus", description=DESCRIPTIONS[name])
+
+
+def checked(xml: bytes, schema: str) -> bytes:
+    """Return the XML if FMI's schema accepts it."""
+    from lxml import etree
+
+    spec = importlib.util.find_spec("fmpy")
+    if spec is None or not spec.submodule_search_locations:
+        raise InternalError("FMI's schemas not found; expected the Python package fmpy")
+    path = Path(spec.submodule_search_locations[0]) / "schema" / schema
+    rules = etree.XMLSchema(etree.parse(str(path)))
+    if not rules.validate(etree.fromstring(xml)):
+        error = rules.error_log[0]
+        raise InternalError(f"{path.stem}, line {error.line}: {error.message}")
+    return xml

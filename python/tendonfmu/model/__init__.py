@@ -17,24 +17,39 @@ if TYPE_CHECKING:
         FingerSource,
         Law,
         count,
+        description_text,
         finger_file,
         finger_from_data,
         finger_from_text,
         read_finger,
         sides,
     )
-    from .description_defaults import DEFAULTS, EFFECT_NUMBERS, LIMITS, RANGES
-    from .description_numbers import number_of
+    from .description_numbers import (
+        DEFAULTS,
+        EFFECT_NUMBERS,
+        LEFT_OUT,
+        LIMITS,
+        MAGNITUDES,
+        RANGES,
+        extended_row,
+        extension_numbers,
+        extension_rows,
+        number_of,
+        place_of,
+    )
     from .description_path import steps_of
-    from .description_text import description_text
-    from .extensions import LEFT_OUT, MAGNITUDES, extended_row, extension_numbers, extension_rows, place_of
-    from .findings import Finding
     from .friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
     from .native import Instance, NativeError
-    from .output_dependencies import Dependencies, dependencies, structure_of
+    from .output_dependencies import (
+        INPUTS_OF_SOURCE,
+        Dependencies,
+        dependencies,
+        inputs_used,
+        structure_of,
+        watches_motors,
+    )
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS
-    from .plausibility import description_findings, is_direct_drive
+    from .plausibility import Finding, description_findings, is_direct_drive
     from .routing_geometry import DrawnTendon, FingerDrawing, Points, finger_drawing
-    from .signals import INPUTS_OF_SOURCE, inputs_used, watches_motors
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -70,10 +70,10 @@ def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pret
     finger = friction_probe(data)
     start = finger.save_state()
     spread = np.linalg.pinv(moment_arms(data))
-    own = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
-    forces = own
+    internal = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
+    forces = internal
     for _ in range(_ITERATIONS):
         finger.restore_state(start)
-        found = finger.run({**motion, "tendon_force": forces})
-        forces = own + (found["friction_torque"] - found["bias_torque"]) @ spread
+        outputs = finger.run({**motion, "tendon_force": forces})
+        forces = internal + (outputs["friction_torque"] - outputs["bias_torque"]) @ spread
     return np.asarray(forces)

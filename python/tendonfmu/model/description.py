@@ -17,11 +17,9 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, write_text
 from tendonfmu.model import native
+from tendonfmu.model.description_numbers import extension_numbers, extension_rows
 from tendonfmu.model.description_path import with_values_at
-from tendonfmu.model.description_text import description_text
-from tendonfmu.model.extensions import extension_numbers, extension_rows
-from tendonfmu.model.finger_html import finger_html
-from tendonfmu.model.routing_geometry import finger_drawing
+from tendonfmu.model.routing_geometry import finger_drawing, finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
 FORMAT = "tendonfmu-finger-1"
@@ -32,6 +30,7 @@ _OTHER_FORMATS = {
     "tendonfmu-score-": "report of a score",
     "tendonfmu-excitation-": "report of a plan",
 }
+_WIDTH = 160  # longest line of JSON that is not broken: a law with all digits fits
 Law = Mapping[str, Any]
 
 
@@ -245,6 +244,27 @@ def finger_from_text(path: Path, text: bytes) -> Finger:
     return Finger(path=path, text=text, data=json.loads(text), image=image)
 
 
+def description_text(data: Mapping[str, Any]) -> str:
+    """Return a description as JSON with each law, or list of numbers, on one line."""
+    return _laid_out(data, "") + "\n"
+
+
+def _laid_out(value: Any, indent: str) -> str:
+    flat = json.dumps(value, ensure_ascii=False)
+    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    leaf = not any(isinstance(element, dict | list) for element in inner)
+    if not inner or (leaf and len(indent) + len(flat) <= _WIDTH):
+        return flat
+    deeper = indent + "  "
+    if isinstance(value, dict):
+        parts = [
+            f"{json.dumps(key, ensure_ascii=False)}: {_laid_out(element, deeper)}" for key, element in value.items()
+        ]
+        return "{\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}}}"
+    parts = [_laid_out(element, deeper) for element in value]
+    return "[\n" + ",\n".join(deeper + part for part in parts) + f"\n{indent}]"
+
+
 class _NoJson(InputError):
     """A value is not what JSON has. The message names no file."""
 
@@ -273,11 +293,11 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
 def _not_finite(path: str, value: Any) -> Iterator[tuple[str, float]]:
     """Yield the path of each infinity and NaN, with its value."""
     if isinstance(value, dict):
-        for key, each in value.items():
-            yield from _not_finite(f"{path}.{key}" if path else key, each)
+        for key, element in value.items():
+            yield from _not_finite(f"{path}.{key}" if path else key, element)
     elif isinstance(value, list):
-        for number, each in enumerate(value, start=1):
-            yield from _not_finite(f"{path}[{number}]", each)
+        for number, element in enumerate(value, start=1):
+            yield from _not_finite(f"{path}[{number}]", element)
     elif isinstance(value, float) and not math.isfinite(value):
         yield path, value
 
@@ -289,12 +309,12 @@ def _check_format(path: Path, text: bytes) -> None:
     except (ValueError, RecursionError):
         return  # the runtime reports the place of the error
     if isinstance(data, dict):
-        found = data.get("format")
-        if found is None:
+        given = data.get("format")
+        if given is None:
             raise InputError(f'{path}: format: missing; expected "{FORMAT}"')
         for prefix, what in _OTHER_FORMATS.items():
-            if isinstance(found, str) and found.startswith(prefix):
-                raise InputError(f'{path}: format = "{found}": {what}; expected a finger description, "{FORMAT}"')
+            if isinstance(given, str) and given.startswith(prefix):
+                raise InputError(f'{path}: format = "{given}": {what}; expected a finger description, "{FORMAT}"')
 
 
 def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
@@ -339,14 +359,14 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
 
 
 def _range(values: Iterable[float]) -> tuple[float, float]:
-    found = list(values)
-    return min(found), max(found)
+    numbers = list(values)
+    return min(numbers), max(numbers)
 
 
 def count(description: Finger) -> Counts:
     """Count what a description holds."""
     data = description.data
-    found = list(laws(data))
+    present = list(laws(data))
     parameters = native.Instance(description.image).parameters()
     edges = _entries(data, "edge_friction")
     kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
@@ -360,8 +380,8 @@ def count(description: Finger) -> Counts:
         pulleys=len(_entries(data, "pulley_friction")),
         edges=len(edges),
         working_points=sum(len(edge.get("angles") or []) for edge in edges),
-        laws={kind: sum(1 for k, _ in found if k == kind) for kind in kinds},
-        asymmetric_laws=sum(1 for _, law in found if len(sides(law)) == 2),
+        laws={kind: sum(1 for k, _ in present if k == kind) for kind in kinds},
+        asymmetric_laws=sum(1 for _, law in present if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
         extensions=[row["effect"] for row in extension_rows(data)],
         parameters=len(parameters),

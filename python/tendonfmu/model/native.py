@@ -7,7 +7,7 @@ caller that passes user input to the runtime adds the name of the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import _native
 from tendonfmu.arrays import Array
-from tendonfmu.model.signals import INPUTS
+from tendonfmu.model.output_names import INPUTS
 
 
 class NativeError(ValueError):
@@ -137,12 +137,6 @@ class Instance:
         # returns [p], in canonical order
         return np.array(self._finger.get_parameters(range(self._finger.parameter_count)))
 
-    def set_values(self, values: Sequence[float] | NDArray[np.float64]) -> None:
-        """Write all parameters."""
-        # values: [p]
-        with _refusals():
-            self._finger.set_parameters(range(self._finger.parameter_count), [float(value) for value in values])
-
     def reset(self) -> None:
         """Return to the image: its parameters, kinematics source 1, no sample taken."""
         self._finger.reset()
@@ -178,7 +172,7 @@ class Instance:
         """Return the arrays that `step` writes."""
         # returns [n] [m]
         arrays = self._finger.step_outputs()
-        return {name: each.view(bool) if each.dtype == np.uint8 else each for name, each in arrays.items()}
+        return {name: array.view(bool) if array.dtype == np.uint8 else array for name, array in arrays.items()}
 
     def step(
         self,

@@ -17,14 +17,32 @@ import numpy as np
 
 from tendonfmu.model import native
 from tendonfmu.model.description import Finger
-from tendonfmu.model.extensions import extension_rows
-from tendonfmu.model.signals import PLACE, REST, SENSORS, VECTORS
+from tendonfmu.model.description_numbers import extension_rows
+from tendonfmu.model.output_names import PLACE, REST, SENSORS, VECTORS
 
 # Extensions whose torque at their joint follows from its angle, or from its velocity.
 BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
 BY_OWN_VELOCITY = frozenset({"inertia", "load_friction"})
 
+# Inputs that a kinematics source uses
+INPUTS_OF_SOURCE = {
+    1: ("tendon_force", "tendon_position"),
+    2: ("tendon_force", "joint_position"),
+    3: ("tendon_force", "joint_position", "joint_velocity"),
+}
+
 Dependencies = dict[str, list[dict[str, list[int]]]]
+
+
+def inputs_used(source: int, watches_motors: bool) -> tuple[str, ...]:
+    """Return the inputs that a finger needs."""
+    used = INPUTS_OF_SOURCE[source]
+    return used if "tendon_position" in used or not watches_motors else (*used, "tendon_position")
+
+
+def watches_motors(data: Mapping[str, Any]) -> bool:
+    """Return whether a finger needs tendon positions with every kinematics source."""
+    return (data.get("contact") or {}).get("rest") is not None or data.get("sensor_fault") is not None
 
 
 @dataclass
@@ -104,10 +122,10 @@ def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
         return {}
     tendons = list(range(structure.tendons))
     watched = {"tendon_force": tendons, "tendon_position": tendons}
-    found: Dependencies = {
+    contacts: Dependencies = {
         name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
     }
-    return found | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
+    return contacts | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
 
 
 def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
@@ -116,12 +134,12 @@ def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
         return {}
     tendons, joints = list(range(structure.tendons)), list(range(structure.joints))
     watched = {"tendon_force": tendons, "tendon_position": tendons, "joint_position": joints}
-    found: Dependencies = {
+    extended: Dependencies = {
         name: [element | watched for element in elements]
         for name, elements in others.items()
         if name in ("joint_contact", "contact", *PLACE, *REST)
     }
-    return found | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
+    return extended | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
 
 
 def _inputs(structure: Structure, motion: Motion, forces: set[int]) -> dict[str, list[int]]:

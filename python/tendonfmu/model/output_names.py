@@ -27,17 +27,7 @@ FLAGS = (
     "slack",
 )
 
-# numbers of every finger that have no derivative
-DETECTION = (
-    "compensated_torque_std",
-    "residual",
-    "innovation",
-    "stuck_friction",
-    "friction_jump",
-    "drift",
-)
-
-# those of them that the FMU has; FMUs of older versions lack them
+# numbers without a derivative; FMUs of older versions lack them
 OPTIONAL_NUMBERS = ("compensated_torque_std",)
 
 # of fingers with links, and of their FMUs

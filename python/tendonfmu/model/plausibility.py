@@ -7,13 +7,14 @@ values of fingers, and wrong units are far beyond them: by a factor of 57 at lea
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.model.description import Finger, laws, sides
-from tendonfmu.model.findings import Finding
 
 LONGEST_ARM = 0.3  # m; arms of fingers have 2 to 20 mm, those of a wrist 50
 SHORTEST_ARM = 1e-4  # m
@@ -24,6 +25,36 @@ TENDON_THRESHOLD, JOINT_THRESHOLD = 0.02, 0.5  # m/s, rad/s; no finger counts fa
 STRONGEST_FORCE = 1000.0  # N, of a finger's tendon; times the longest arm, it exceeds every contact torque
 ALL_FRICTION = 1.0  # of the tendon's force; no pulley takes all of it
 UNREACHED = 1e-6  # of the torque that the tendons should make
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong, or probably is."""
+
+    severity: str  # "error" (no fit of it is sound) or "warning"
+    # of a recording: "sign", "exchange", "scale", "clock", "unfit", "columns", "pushing", "against", "held", "clipped",
+    # "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover", "friction", "angles"
+    # or "threshold"
+    kind: str
+    path: Path  # the recording or description
+    columns: tuple[str, ...]  # columns of the recording, or keys of the description
+    seen: str  # the observation, with numbers
+    probably: str  # its probable cause
+    write: str  # what to do about it
+    # for each column, what to write into its entry of the map of columns: "sign", "scale", or "exchange" with the name
+    # of another column
+    entries: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+
+    def line(self) -> str:
+        """Return the whole finding in one line."""
+        where = f"{self.path}: {_listed(self.columns)}: " if self.columns else f"{self.path}: "
+        return f"{where}{self.seen}; probably {self.probably}; {self.write}"
+
+
+def _listed(columns: tuple[str, ...]) -> str:
+    """List at most four of the columns by name."""
+    few = ", ".join(columns[:4])
+    return few if len(columns) <= 4 else f"{few} and {len(columns) - 4} more"
 
 
 def description_findings(finger: Finger) -> list[Finding]:

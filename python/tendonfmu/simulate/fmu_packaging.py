@@ -10,10 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import whole_file
+from tendonfmu.files import counted, whole_file
 from tendonfmu.fmu import (
+    NOT_IN_XML,
+    VariableTable,
     draw_pictures,
+    elements,
     find_binaries,
+    group_sizes,
     guid,
     licenses,
     model_description,
@@ -21,15 +25,18 @@ from tendonfmu.fmu import (
     pack,
     package_file,
     read_table,
+    render_documentation,
     terminals_and_icons,
+    units_of,
 )
 from tendonfmu.model import count, native
-from tendonfmu.simulate.fmu_variables import describe_plant
-from tendonfmu.simulate.plant import Plant, Settings, refused_by
+from tendonfmu.simulate.plant import INTEGRATORS, Plant, Settings, refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
 
 BINARIES, BINARY_STEM = "binaries_plant", "tendonfmu_plant"
 LARGEST_SEED = 2**31 - 1
+STEP = 0.001  # s, communication step of the default experiment
+DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 
 def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
@@ -43,8 +50,6 @@ def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
     """Return content by path in the archive, for all files of the FMU."""
-    from tendonfmu.fmu import render_documentation
-
     text = rig.json().encode()
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
     identifier = f"TendonFinger_{model_identifier(rig.name)}"
@@ -57,7 +62,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     }
     page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
     pictures, icon = draw_pictures(rig.finger)
-    found = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
+    libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     return {
         "modelDescription.xml": model_description(context),
         **pictures,
@@ -65,7 +70,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "resources/rig.json": text,
         **terminals_and_icons(context["variables"], icon),
         **licenses("license.txt", "third_party.txt"),
-        **{f"binaries/{path}": data for path, data in found.items()},
+        **{f"binaries/{path}": data for path, data in libraries.items()},
     }
 
 
@@ -78,3 +83,51 @@ def _settings(rig: Rig, text: bytes) -> Settings:
             f"{rig.path}: seed = {settings.seed}: expected at most {LARGEST_SEED} in an FMU, whose Integer has 32 bits"
         )
     return settings
+
+
+# --- variables, from the table in modelDescription/plant_variables.json ----------------------------------------------
+
+
+def describe_plant(rig: Rig, settings: Settings, table: VariableTable) -> dict[str, Any]:
+    """Return the template's context, except what belongs to the package: identifier, GUID, version, sources."""
+    sizes = group_sizes(rig.joints, rig.tendons)
+    variables = [variable for group in table.data["groups"] for variable in elements(group, sizes)]
+    starts = _starts(settings)
+    for variable in variables:
+        variable |= {"start": starts[variable["name"]]} if variable["name"] in starts else {}
+        if variable["name"] == "push_link":
+            variable["max"] = rig.joints
+    outputs = [index for index, variable in enumerate(variables, start=1) if variable["causality"] == "output"]
+    name = NOT_IN_XML.sub("?", rig.name)
+    return {
+        "name": f"TendonFinger {name}",
+        "description": f"Simulated tendon-driven finger {name}, version {rig.version}: "
+        f"{counted(rig.joints, 'joint')}, {counted(rig.tendons, 'tendon')}",
+        "units": units_of(variables, table),
+        "log_categories": table.data["log_categories"],
+        "variables": variables,
+        # outputs are read after a step, and inputs act in the next one: no direct feedthrough
+        "outputs": [{"index": index, "dependencies": [], "kinds": []} for index in outputs],
+        "initial_unknowns": outputs,
+        "directional_derivative": False,
+        "default_experiment": {
+            "start": 0.0,
+            "stop": DURATION if rig.duration is None else float(rig.duration),
+            "step": STEP,
+            "tolerance": settings.relative_tolerance,
+        },
+    }
+
+
+def _starts(settings: Settings) -> dict[str, Any]:
+    """Return the start values of the parameters as XML writes them."""
+    flags = {name: str(getattr(settings, name)).lower() for name in ("scheduled_motion", "scheduled_pushes", "sensors")}
+    return {
+        "integrator": INTEGRATORS[settings.integrator],
+        "relative_tolerance": settings.relative_tolerance,
+        "step": settings.step,
+        **flags,
+        "seed": settings.seed,
+        "push_link": settings.push_link,
+        **{f"push_point[{i}]": coordinate for i, coordinate in enumerate(settings.push_point, start=1)},
+    }

@@ -186,24 +186,24 @@ def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list
 def _range_of_strokes(motion: Node, joints: Joints) -> tuple[list[float], list[float]]:
     """Return the lowest and highest targets [n]: as given, or the limits less a margin."""
     margin = [MARGIN * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
-    found = {
+    targets = {
         "lower": [low + part for low, part in zip(joints.lower, margin, strict=True)],
         "upper": [high - part for high, part in zip(joints.upper, margin, strict=True)],
     }
-    for key in found:
+    for key in targets:
         node = motion.member(key)
-        for j, angle in enumerate(found[key], start=1):
+        for j, angle in enumerate(targets[key], start=1):
             if node.absent and not math.isfinite(angle):
                 node.refuse(f"one angle per joint in rad, since physics.links[{j}] has no limits")
         if not node.absent:
-            found[key] = _posture(node, joints.lower, joints.upper)
-    for element, low, high in zip(motion.member("upper").elements(), found["lower"], found["upper"], strict=False):
+            targets[key] = _posture(node, joints.lower, joints.upper)
+    for element, low, high in zip(motion.member("upper").elements(), targets["lower"], targets["upper"], strict=False):
         if high < low:
             element.refuse(f"an angle not below motion.lower, {low:g} rad")
-    for element, low, high in zip(motion.member("lower").elements(), found["lower"], found["upper"], strict=False):
+    for element, low, high in zip(motion.member("lower").elements(), targets["lower"], targets["upper"], strict=False):
         if high < low:
             element.refuse(f"an angle not above motion.upper, {high:g} rad")
-    return found["lower"], found["upper"]
+    return targets["lower"], targets["upper"]
 
 
 def _pretension(motion: Node) -> dict[str, list[float]]:

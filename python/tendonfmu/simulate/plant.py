@@ -210,11 +210,11 @@ class Plant:
         """Advance through increasing times, and return one row of each signal wanted."""
         # time: [N] (s); returns [N, size] [N]
         with _refusals():
-            found = self._plant.run(np.ascontiguousarray(time, dtype=np.float64), list(signals))
+            arrays = self._plant.run(np.ascontiguousarray(time, dtype=np.float64), list(signals))
         for name in FLAGS:
-            if name in found:
-                found[name] = found[name].astype(bool)
-        return {name: array[:, 0] if name in SCALARS else array for name, array in found.items()}
+            if name in arrays:
+                arrays[name] = arrays[name].astype(bool)
+        return {name: array[:, 0] if name in SCALARS else array for name, array in arrays.items()}
 
     def save_state(self) -> bytes:
         """Return a copy of the state."""

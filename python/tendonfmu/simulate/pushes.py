@@ -63,7 +63,7 @@ class _Recipe:
         node.keys(("count", "seed", "first", "force", "hold", "rise", "gap", "where", "direction"))
         where = node.member("where")
         anywhere = (where.choice("tip", "anywhere") if not where.absent else "tip") == "anywhere"
-        found = cls(
+        recipe = cls(
             node=node,
             segments=[s for s in segments if s.length > 0.0] if anywhere else segments[-1:],
             count=node.member("count").integer(0, MOST),
@@ -75,9 +75,9 @@ class _Recipe:
             gap=node.member("gap").span(0.0, LONGEST, "s", default=(2.0, 4.0)),
             directions=_directions(node.member("direction")),
         )
-        if not found.segments:
+        if not recipe.segments:
             where.refuse('"tip", since no link of this finger has a length')
-        return found
+        return recipe
 
     def draw(self, duration: float) -> list[dict[str, Any]]:
         draws = Draws(self.seed, 2)

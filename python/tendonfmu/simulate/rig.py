@@ -126,6 +126,16 @@ class Rig:
         return np.asarray(np.arange(samples) / self.rate)
 
 
+def is_rig(path: Path) -> bool:
+    """Return whether a file claims to be a rig, even an invalid one."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            data = json.load(file)
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
+
+
 def description_files(path: Path) -> list[Path]:
     """Return the files that describe a rig: itself, its bases and its finger."""
     # A motion file is not included, since it is a result that may be made again.
@@ -167,8 +177,8 @@ def read_rig(path: Path) -> Rig:
 
 def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, Any]:
     """Return the keys of a rig file; missing keys come from its base. The files read are appended to `files`."""
-    if path.resolve() in [each.resolve() for each in chain]:
-        loop = " -> ".join(str(each) for each in (*chain, path))
+    if path.resolve() in [earlier.resolve() for earlier in chain]:
+        loop = " -> ".join(str(earlier) for earlier in (*chain, path))
         raise InputError(f"{chain[-1]}: base: {loop}; expected no rig that is its own base")
     if len(chain) >= LONGEST_BASE_CHAIN:
         raise InputError(f"{chain[-1]}: base: {path}; expected at most {LONGEST_BASE_CHAIN - 1} bases in a row")
@@ -179,14 +189,14 @@ def _with_base(path: Path, files: list[Path], chain: list[Path]) -> dict[str, An
             Node(data).member("format").choice(FORMAT)  # before the other keys: the file may be a finger description
         root = Node(data).keys(TOP)
         base = root.member("base")
-        own = {key: value for key, value in data.items() if key != "base"}
-        _place_paths(own, path.parent)
+        keys = {key: value for key, value in data.items() if key != "base"}
+        _place_paths(keys, path.parent)
         if base.absent:
-            return own
+            return keys
         other = path.parent / base.text("path of another rig, relative to this file")
     except Refusal as refused:
         raise InputError(f"{path}: {refused}") from None
-    return _merged(_with_base(other, files, [*chain, path]), own)
+    return _merged(_with_base(other, files, [*chain, path]), keys)
 
 
 def _place_paths(data: dict[str, Any], folder: Path) -> None:
@@ -199,11 +209,11 @@ def _place_paths(data: dict[str, Any], folder: Path) -> None:
             place[key] = str(folder / place[key])
 
 
-def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Merge the keys of `own` into those of `base`: objects key by key, all other values whole."""
     # A motion of another kind replaces the base's, since kinds have different keys; one of the same kind changes it.
     result = dict(base)
-    for key, value in own.items():
+    for key, value in changes.items():
         before = base.get(key)
         if value is None:
             result.pop(key, None)

@@ -19,8 +19,7 @@ from lxml.builder import ElementMaker
 from tendonfmu.files import check_output, whole_file
 from tendonfmu.fmu import NOT_IN_XML, members, pack
 from tendonfmu.model import INPUTS
-from tendonfmu.simulate.fmu_packaging import plant_members
-from tendonfmu.simulate.fmu_variables import STEP
+from tendonfmu.simulate.fmu_packaging import DURATION, STEP, plant_members
 from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
 from tendonfmu.simulate.simulation import plant_of
@@ -28,7 +27,6 @@ from tendonfmu.simulate.simulation import plant_of
 PLANT, FRICTION = "plant", "friction"
 PLANT_FMU, FRICTION_FMU = "TendonFinger.fmu", "friction.fmu"
 START_VALUES = "resources/start_values.ssv"
-DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 # outputs to look at, in addition to the connected ones; fmpy does not support unconnected inputs
 PLANT_OUTPUTS = ("truth.external_torque",)

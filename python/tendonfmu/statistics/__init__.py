@@ -1,8 +1,8 @@
 """How certain results are: statistics without any knowledge of fingers.
 
-Series are averaged over blocks (`block_averages`, `blocks`), splines remove a slow bias (`splines`), and parts are held
-out (`folds`). Columns are judged by their Gram matrices (`column_products`, `block_grams`), noise is whitened
-(`whitening`), and counts and measurements get an interval (`intervals`, `paired_gain`, `effective_number`).
+Series are averaged over blocks, and parts are held out (`blocks`). Splines remove a slow bias (`splines`). Columns are
+judged by their Gram matrices (`block_grams`), noise is whitened (`whitening`), and counts and measurements get an
+interval (`intervals`, `paired_gain`, `effective_number`).
 """
 
 from typing import TYPE_CHECKING
@@ -11,14 +11,19 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import error_directions, intervals, paired_gain, quintic
-    from .block_averages import BlockSums, SampleBlocks, regular_blocks
-    from .block_grams import Grams, standard_error
-    from .blocks import BlockSeries
-    from .column_products import Products
+    from .block_grams import Grams, Products, standard_error
+    from .blocks import (
+        FEWEST_STRETCHES,
+        STRETCH,
+        BlockSeries,
+        BlockSums,
+        Folds,
+        SampleBlocks,
+        make_folds,
+        regular_blocks,
+    )
     from .effective_number import effective_samples, sample_weights
-    from .folds import FEWEST_STRETCHES, STRETCH, Folds, make_folds
-    from .interval import Interval
-    from .intervals import Estimate
+    from .intervals import Estimate, Interval
     from .paired_gain import BlockIndex, blocks_of, gain_interval
     from .random_numbers import LARGEST_SEED, Draws
     from .spectral_line import Line, find_lines

@@ -8,17 +8,94 @@ each fold; leaving a fold out is a subtraction. The numbers of the nominal model
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.statistics.column_products import PIECE, Products
+from tendonfmu.arrays import Array, Indices, Numbers
+from tendonfmu.statistics.blocks import Folds
+from tendonfmu.statistics.splines import Span, Splines
 
 MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
+_PIECE = 4096  # rows at a time
 _SMALLEST = 1e-100  # of a scale; its square does not underflow
+
+
+class Products:
+    """Columns without a slow bias, and their products by fold: the part that does not depend on a target."""
+
+    def __init__(self, folds: Folds, nominal: Array, values: Array, splines: Splines) -> None:
+        """Project the bias out, and multiply."""
+        self.folds, self.nominal_count, self.count = folds, nominal.shape[2], values.shape[2]
+        rows, joints = folds.rows, nominal.shape[1]
+        self.span = Span(splines[rows])
+        self.table = np.empty((len(rows), joints, self.nominal_count + self.count), dtype=np.float32)
+        for j in range(joints):
+            self.table[:, j, : self.nominal_count] = self.span.without(nominal[rows, j])
+            self.table[:, j, self.nominal_count :] = self.span.without(values[rows, j])
+        self.by_fold = [self._of(np.flatnonzero(folds.fold == number)) for number in range(folds.folds)]
+
+    def _of(self, rows: Indices) -> Numbers:
+        """Return the products [u + c]² of some rows."""
+        size, joints = self.table.shape[2], self.table.shape[1]
+        total = np.zeros((size, size))
+        for begin in range(0, len(rows), _PIECE):
+            part = rows[begin : begin + _PIECE]
+            columns = self.table[part].reshape(len(part) * joints, size).astype(np.float64)
+            total += columns.T @ columns
+        return total
+
+    def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
+        """Return the products with other columns."""
+        # shared: [c, k]
+        u = self.nominal_count
+        mixed = np.zeros((self.count, 0)) if shared is None else shared
+        kept = np.arange(self.count) if candidates is None else candidates
+        if not mixed.shape[1] and len(kept) == self.count:
+            return self
+        products = copy(self)
+        products.nominal_count, products.count = u + mixed.shape[1], len(kept)
+        added = self.table[:, :, u:] @ mixed.astype(np.float32)
+        products.table = np.concatenate([self.table[:, :, :u], added, self.table[:, :, u + kept]], axis=2)
+        products.by_fold = [self._turned(of_fold, mixed, u + kept) for of_fold in self.by_fold]
+        return products
+
+    def _turned(self, products: Numbers, mixed: Numbers, kept: Indices) -> Numbers:
+        """Return products [u + k + kept]² from [u + c]². kept: indices among all columns."""
+        u = self.nominal_count
+        cross = products[:, u:] @ mixed
+        rows = np.concatenate([np.arange(u), kept])
+        count = mixed.shape[1]
+        turned = np.empty((len(rows) + count, len(rows) + count))
+        place = np.concatenate([np.arange(u), u + count + np.arange(len(kept))])
+        turned[np.ix_(place, place)] = products[np.ix_(rows, rows)]
+        turned[place, u : u + count] = cross[rows]
+        turned[u : u + count, place] = cross[rows].T
+        turned[u : u + count, u : u + count] = mixed.T @ cross[u:]
+        return turned
+
+    def with_own(self, values: Array) -> Products:
+        """Return the products with other candidates."""
+        # values: [r, n, k]
+        u = self.nominal_count
+        changed = copy(self)
+        changed.count = values.shape[2]
+        changed.table = np.concatenate([self.table[:, :, :u], values.astype(np.float32)], axis=2)
+        changed.by_fold = []
+        for number, products in enumerate(self.by_fold):
+            rows = self.folds.fold == number
+            part = changed.table[rows]
+            columns = part.reshape(part.shape[0] * part.shape[1], u + changed.count).astype(np.float64)
+            cross = columns.T @ columns[:, u:]
+            both = np.empty((u + changed.count, u + changed.count))
+            both[:u, :u] = products[:u, :u]
+            both[:, u:] = cross
+            both[u:, :u] = cross[:u].T
+            changed.by_fold.append(both)
+        return changed
 
 
 @dataclass(frozen=True)
@@ -56,7 +133,7 @@ class Grams:
         ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
-        self._by_fold = [self._left_out(whole - own, own) for own in by_fold]
+        self._by_fold = [self._left_out(whole - held, held) for held in by_fold]
         self._whole = self._left_out(whole, whole)
 
     # --- making -------------------------------------------------------------------------------------------------------
@@ -64,25 +141,25 @@ class Grams:
     def _with_target(self, by_fold: Sequence[Numbers]) -> list[Numbers]:
         """Return the products [u + c + 1]² of all columns and the target, for each fold."""
         size = self._table.shape[2]
-        found = []
+        extended = []
         for number, columns in enumerate(by_fold):
             rows = self.folds.fold == number
             target = self._target[rows].reshape(-1)
-            own = self._table[rows].reshape(len(target), size)
+            values = self._table[rows].reshape(len(target), size)
             both = np.empty((size + 1, size + 1))
             both[:size, :size] = columns
-            both[:size, size] = both[size, :size] = own.T.astype(np.float64) @ target
+            both[:size, size] = both[size, :size] = values.T.astype(np.float64) @ target
             both[size, size] = target @ target
-            found.append(both)
-        return found
+            extended.append(both)
+        return extended
 
-    def _left_out(self, learned: Numbers, own: Numbers) -> _Fold:
+    def _left_out(self, learned: Numbers, held: Numbers) -> _Fold:
         u = self.nominal_count
         inner = learned[:u, :u] + np.diag(self._ridge)
         refit = _solved(inner, learned[:u, u:])
         after = learned[u:, u:] - learned[u:, :u] @ refit
-        mixed = own[u:, :u] @ refit
-        there = own[u:, u:] - mixed - mixed.T + refit.T @ own[:u, :u] @ refit
+        mixed = held[u:, :u] @ refit
+        there = held[u:, u:] - mixed - mixed.T + refit.T @ held[:u, :u] @ refit
         return _Fold(
             refit=refit,
             energy=after[:-1, :-1],
@@ -97,7 +174,7 @@ class Grams:
     @property
     def without(self) -> float:
         """Σ e² on held-out folds ((N·m)²) of the nominal model refitted, without any candidate."""
-        return float(sum(each.own_square for each, counts in zip(self._by_fold, self._judged, strict=True) if counts))
+        return float(sum(fold.own_square for fold, counts in zip(self._by_fold, self._judged, strict=True) if counts))
 
     def surviving(self, mix: Numbers) -> float:
         """Return how much of a combination of candidates the refit leaves."""
@@ -128,8 +205,8 @@ class Grams:
         if not hasattr(self, "_raw"):
             values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
             self._raw = np.zeros((self.count, self.count))
-            for begin in range(0, len(values), PIECE):
-                part = values[begin : begin + PIECE].astype(np.float64)
+            for begin in range(0, len(values), _PIECE):
+                part = values[begin : begin + _PIECE].astype(np.float64)
                 self._raw += part.T @ part
         return self._raw
 
@@ -141,26 +218,28 @@ class Grams:
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
         # mix: [c, d]; low, high: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
-        left, found = 0.0, []
+        left, magnitudes = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
-        for each, counts in zip(self._by_fold, self._judged, strict=True):
-            energy, own = (part.T @ matrix[np.ix_(used, used)] @ part for matrix in (each.energy, each.own_energy))
-            theta = bounded(energy, part.T @ each.score[used], low, high)
-            gain = 2.0 * float(theta @ (part.T @ each.own_score[used])) - float(theta @ own @ theta)
-            left += (each.own_square - gain) if counts else 0.0
-            found.append(theta)
-        return left, np.array(found)
+        for fold, counts in zip(self._by_fold, self._judged, strict=True):
+            energy, held_energy = (
+                part.T @ matrix[np.ix_(used, used)] @ part for matrix in (fold.energy, fold.own_energy)
+            )
+            theta = bounded(energy, part.T @ fold.score[used], low, high)
+            gain = 2.0 * float(theta @ (part.T @ fold.own_score[used])) - float(theta @ held_energy @ theta)
+            left += (fold.own_square - gain) if counts else 0.0
+            magnitudes.append(theta)
+        return left, np.array(magnitudes)
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
         """Return the error of each stretch on unseen samples."""
         # mix: [c, d]; magnitudes: [f, d]; returns Σ e² [stretches that count] ((N·m)²)
-        found = np.zeros(self.folds.stretches)
+        errors = np.zeros(self.folds.stretches)
         for number, counts in enumerate(self._judged):
             if counts:
                 rows, left = self._unseen(number, mix, magnitudes)
-                found += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
-        return np.asarray(found[self._counted])
+                errors += np.bincount(self.folds.stretch[rows], np.sum(left**2, axis=1), minlength=self.folds.stretches)
+        return np.asarray(errors[self._counted])
 
     def unseen_residual(self, mix: Numbers | None = None, magnitudes: Numbers | None = None) -> Numbers:
         """Return the residual on the unseen rows that count."""
@@ -170,21 +249,21 @@ class Grams:
     @property
     def counted_stretch(self) -> NDArray[np.int64]:
         """Stretch of each unseen row that counts [r]."""
-        own = [self.folds.stretch[self.folds.fold == k] for k in np.flatnonzero(self._judged)]
-        return np.asarray(np.concatenate(own), dtype=np.int64)
+        stretches = [self.folds.stretch[self.folds.fold == k] for k in np.flatnonzero(self._judged)]
+        return np.asarray(np.concatenate(stretches), dtype=np.int64)
 
     def _unseen(
         self, number: int, mix: Numbers | None, magnitudes: Numbers | None
     ) -> tuple[NDArray[np.bool_], Numbers]:
         """Return the rows of a fold, and the residual [r, n] (N·m) there of the model learned without it."""
-        u, each = self.nominal_count, self._by_fold[number]
+        u, fold = self.nominal_count, self._by_fold[number]
         rows = self.folds.fold == number
         change = np.zeros(u + self.count)
-        change[:u] = each.refit[:, -1]
+        change[:u] = fold.refit[:, -1]
         if mix is not None and magnitudes is not None:
             added = mix @ magnitudes[number]
             change[u:] = added
-            change[:u] -= each.refit[:, :-1] @ added
+            change[:u] -= fold.refit[:, :-1] @ added
         used = np.flatnonzero(change)
         return rows, np.asarray(self._target[rows] - self._table[rows][:, :, used] @ change[used])
 
@@ -194,22 +273,22 @@ class Grams:
         u, used = self.nominal_count, np.flatnonzero(mix.any(axis=1))
         part = mix[used]
         nominal = self._whole.refit[:, used] @ part
-        found = np.zeros((self.folds.stretches, mix.shape[1]))
+        scores = np.zeros((self.folds.stretches, mix.shape[1]))
         for number in range(self.folds.folds):
             rows, left = self._unseen(number, mix, magnitudes)
             table = self._table[rows]
-            own = table[:, :, u + used] @ part - table[:, :, :u] @ nominal
-            np.add.at(found, self.folds.stretch[rows], np.einsum("rnd,rn->rd", own, left))
-        return part.T @ self._whole.energy[np.ix_(used, used)] @ part, found
+            slopes = table[:, :, u + used] @ part - table[:, :, :u] @ nominal
+            np.add.at(scores, self.folds.stretch[rows], np.einsum("rnd,rn->rd", slopes, left))
+        return part.T @ self._whole.energy[np.ix_(used, used)] @ part, scores
 
     def left(self) -> tuple[Numbers, Numbers]:
         """Return the errors on unseen samples without any candidate, whether the stretches count or not."""
         # returns Σ e² of each stretch and joint [stretches, n] ((N·m)²), rows of each stretch [stretches]
-        found = np.zeros((self.folds.stretches, self._target.shape[1]))
+        squares = np.zeros((self.folds.stretches, self._target.shape[1]))
         for number in range(self.folds.folds):
             rows, left = self._unseen(number, None, None)
-            np.add.at(found, self.folds.stretch[rows], left**2)
-        return found, np.bincount(self.folds.stretch, minlength=self.folds.stretches).astype(np.float64)
+            np.add.at(squares, self.folds.stretch[rows], left**2)
+        return squares, np.bincount(self.folds.stretch, minlength=self.folds.stretches).astype(np.float64)
 
     @property
     def refitted(self) -> Numbers:
@@ -222,15 +301,15 @@ class Grams:
         u, rows = self.nominal_count, self.folds.rows
         flat = self._table[:, :, :u].astype(np.float64)
         left = np.stack([self._span.without(targets[rows, j]) for j in range(targets.shape[1])], axis=1)
-        score = [np.einsum("rnu,rnk->uk", flat[own], left[own]) for own in self._rows_of_folds()]
-        energy = [np.einsum("rnu,rnv->uv", flat[own], flat[own], optimize=True) for own in self._rows_of_folds()]
-        found = np.zeros(targets.shape[2])
-        for k, own in enumerate(self._rows_of_folds()):
+        score = [np.einsum("rnu,rnk->uk", flat[held], left[held]) for held in self._rows_of_folds()]
+        energy = [np.einsum("rnu,rnv->uv", flat[held], flat[held], optimize=True) for held in self._rows_of_folds()]
+        errors = np.zeros(targets.shape[2])
+        for k, held in enumerate(self._rows_of_folds()):
             inner = np.sum(energy, axis=0) - energy[k] + np.diag(self._ridge)
             refit = _solved(inner, np.sum(score, axis=0) - score[k])
-            found += np.einsum("rnk,rnk->k", left[own], left[own])
-            found += np.einsum("uk,uk->k", refit, energy[k] @ refit - 2.0 * score[k])
-        return found
+            errors += np.einsum("rnk,rnk->k", left[held], left[held])
+            errors += np.einsum("uk,uk->k", refit, energy[k] @ refit - 2.0 * score[k])
+        return errors
 
     def _rows_of_folds(self) -> list[NDArray[np.bool_]]:
         return [self.folds.fold == number for number in range(self.folds.folds)]
@@ -251,16 +330,16 @@ def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Num
     fixed = np.full(count, np.nan)
     for _ in range(count + 1):
         free = np.isnan(fixed)
-        found = np.where(free, 0.0, fixed)
+        solution = np.where(free, 0.0, fixed)
         if free.any():
             inner = scaled[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
-            found[free] = np.linalg.solve(inner, right[free] - scaled[np.ix_(free, ~free)] @ found[~free])
-        beyond = np.where(free, np.maximum(low - found, found - high), -np.inf)
+            solution[free] = np.linalg.solve(inner, right[free] - scaled[np.ix_(free, ~free)] @ solution[~free])
+        beyond = np.where(free, np.maximum(low - solution, solution - high), -np.inf)
         worst = int(np.argmax(beyond)) if count else 0
         if not count or beyond[worst] <= 0.0:
             break
-        fixed[worst] = low[worst] if found[worst] < low[worst] else high[worst]
-    return np.asarray(found / length) if count else np.zeros(0)
+        fixed[worst] = low[worst] if solution[worst] < low[worst] else high[worst]
+    return np.asarray(solution / length) if count else np.zeros(0)
 
 
 def _solved(matrix: Numbers, right: Numbers) -> Numbers:

@@ -28,10 +28,10 @@ def correlation_time(values: Numbers) -> float:
         return 1.0
     pairs = np.round(_autocovariance(known.astype(np.float64)))
     reach = int(np.argmax(pairs < FEWEST)) or len(pairs)
-    found = _autocovariance(filled)[1:reach] / pairs[1:reach] / (power / count)
-    ended = found <= CHANCE / np.sqrt(pairs[1:reach])
-    last = int(np.argmax(ended)) if ended.any() else len(found)
-    return min(1.0 + 2.0 * float(found[:last].sum()), float(count))
+    correlations = _autocovariance(filled)[1:reach] / pairs[1:reach] / (power / count)
+    ended = correlations <= CHANCE / np.sqrt(pairs[1:reach])
+    last = int(np.argmax(ended)) if ended.any() else len(correlations)
+    return min(1.0 + 2.0 * float(correlations[:last].sum()), float(count))
 
 
 def _autocovariance(values: Numbers) -> Numbers:
@@ -50,7 +50,7 @@ def sample_weights(standardised: Numbers) -> Numbers:
 def effective_samples(standardised: Sequence[Numbers], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
     """Count samples, and the independent samples that they are worth."""
     # standardised: [N, n]; weights: [N, n]; returns samples of each joint [n], independent samples of each joint [n]
-    used = [~np.isnan(each) for each in standardised]
+    used = [~np.isnan(residuals) for residuals in standardised]
     count = sum(flags.sum(axis=0) for flags in used)
-    worth = sum((flags * each).sum(axis=0) for flags, each in zip(used, weights, strict=True))
+    worth = sum((flags * weight).sum(axis=0) for flags, weight in zip(used, weights, strict=True))
     return np.asarray(count, dtype=np.float64), np.asarray(worth, dtype=np.float64)

@@ -41,12 +41,12 @@ def few_directions(parts: Numbers, slopes: Numbers, most: int = MOST) -> tuple[N
         return np.zeros((0, parts.shape[1])), 1.0
     white = axes[:, seen] / np.sqrt(moment[seen])  # [q, r]: parts·white has the second moment 1
     shown = parts @ white
-    own, leading = _leading(shown.T @ slopes / len(parts), most)
-    captured = float(np.sum(own)) / variance
-    start = leading * np.sqrt(own / max(captured, 1e-300))
+    eigenvalues, leading = _leading(shown.T @ slopes / len(parts), most)
+    captured = float(np.sum(eigenvalues)) / variance
+    start = leading * np.sqrt(eigenvalues / max(captured, 1e-300))
     turned = _principal(_matched(shown, start.T, std))
-    found = turned[np.sum(turned**2, axis=1) > _NOTHING * variance] @ white.T
-    return found * _signs(found), min(captured, 1.0)
+    directions = turned[np.sum(turned**2, axis=1) > _NOTHING * variance] @ white.T
+    return directions * _signs(directions), min(captured, 1.0)
 
 
 def _leading(regression: Numbers, most: int) -> tuple[Numbers, Numbers]:
@@ -62,21 +62,21 @@ def _matched(shown: Numbers, start: Numbers, std: Numbers) -> Numbers:
     small = 1e-9 * size  # the root has no slope where all parts are zero
 
     def project(flat: Numbers) -> tuple[Numbers, Numbers]:
-        each = shown @ flat.reshape(start.shape).T
-        return each, np.sqrt(squares(each) + small**2)
+        torques = shown @ flat.reshape(start.shape).T
+        return torques, np.sqrt(squares(torques) + small**2)
 
     def error(flat: Numbers) -> Numbers:
         return (project(flat)[1] - std) / size
 
     def slope(flat: Numbers) -> Numbers:
-        each, total = project(flat)
-        share = each / (total * size)[:, None]
+        torques, total = project(flat)
+        share = torques / (total * size)[:, None]
         return (share[:, :, None] * shown[:, None, :]).reshape(len(shown), -1)
 
     if len(shown) < start.size:
         return start
-    found = least_squares(error, start.ravel(), slope, method="lm", max_nfev=_ROUNDS)
-    return np.asarray(found.x.reshape(start.shape))
+    solution = least_squares(error, start.ravel(), slope, method="lm", max_nfev=_ROUNDS)
+    return np.asarray(solution.x.reshape(start.shape))
 
 
 def _principal(directions: Numbers) -> Numbers:

@@ -24,6 +24,15 @@ _MOST = 500  # blocks; more are joined with their neighbours, so that memory sta
 
 
 @dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float  # the value
+    low: float  # ends of the interval
+    high: float
+
+
+@dataclass(frozen=True)
 class Estimate:
     """A value and the 95 % interval of the true value."""
 
@@ -55,11 +64,11 @@ def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
     # values: [k]
     if not len(values):
         return Estimate(math.nan)
-    found = float(np.quantile(values, probability))
+    value = float(np.quantile(values, probability))
     if len(values) < FEWEST:
-        return Estimate(found)
+        return Estimate(value)
     drawn = np.random.default_rng(seed).integers(0, len(values), (RESAMPLES, len(values)))
-    return Estimate(found, *_percentiles(np.quantile(values[drawn], probability, axis=1)))
+    return Estimate(value, *_percentiles(np.quantile(values[drawn], probability, axis=1)))
 
 
 def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.statistics.interval import Interval
+from tendonfmu.statistics.intervals import Interval
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
 LEVEL = 0.95
@@ -94,8 +94,8 @@ def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float
     shares = np.full(len(pairs), 1 / len(pairs))
     draws = np.random.default_rng(seed).multinomial(len(pairs), shares, _RESAMPLES).astype(float)
     drawn, errors = _log_ratio(draws, pairs)
-    found = (drawn - estimate) / np.where(errors > 0, errors, np.nan)
-    low, high = np.nanquantile(found, [tail, 1 - tail])
+    studentised = (drawn - estimate) / np.where(errors > 0, errors, np.nan)
+    low, high = np.nanquantile(studentised, [tail, 1 - tail])
     return float(low), float(high)
 
 

@@ -48,12 +48,12 @@ def find_lines(
     variance = float(np.sum(left**2))
     for _ in range(MOST_LINES):
         flat = np.where(filters.valid, filters.apply(left[:, None])[:, 0], 0.0)
-        found = _strongest(series, flat, filters.valid)
-        if found is None or found[1] > level:
+        peak = _strongest(series, flat, filters.valid)
+        if peak is None or peak[1] > level:
             break
-        wave, amplitude = _fitted(series, left, used, found[0])
+        wave, amplitude = _fitted(series, left, used, peak[0])
         share = 1.0 - float(np.sum((left - wave) ** 2)) / max(float(np.sum(left**2)), 1e-300)
-        lines.append(Line(found[0], amplitude, found[1], share * float(np.sum(left**2)) / max(variance, 1e-300)))
+        lines.append(Line(peak[0], amplitude, peak[1], share * float(np.sum(left**2)) / max(variance, 1e-300)))
         left = left - wave
         total += wave
     return tuple(lines), total
@@ -62,7 +62,7 @@ def find_lines(
 def _strongest(series: BlockSeries, flat: Numbers, used: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Return frequency (Hz) and family-wise p-value of the highest point of the periodogram over its background."""
     recordings = np.unique(series.recording)
-    places = [np.flatnonzero(series.recording == each) for each in recordings]
+    places = [np.flatnonzero(series.recording == number) for number in recordings]
     slots = [np.round((series.time[rows] - series.time[rows[0]]) / series.step).astype(int) for rows in places]
     length = 2 * (max(int(slot[-1]) for slot in slots) + 1)
     power, waves = np.zeros(length // 2 + 1), 0
@@ -99,8 +99,8 @@ def _background(power: Numbers) -> Numbers:
 def _fitted(series: BlockSeries, left: Numbers, used: NDArray[np.bool_], near: float) -> tuple[Numbers, float]:
     """Return the least-squares wave of each recording at the frequency, and the greatest amplitude."""
     wave, amplitude = np.zeros(len(left)), 0.0
-    for each in np.unique(series.recording):
-        rows = (series.recording == each) & used
+    for number in np.unique(series.recording):
+        rows = (series.recording == number) & used
         if not rows.any():
             continue
         phase = 2.0 * np.pi * near * (series.time[rows] - series.time[rows][0])

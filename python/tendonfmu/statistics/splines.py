@@ -77,15 +77,15 @@ def basis(columns: Array) -> Numbers:
     # by the Gram matrix, since there are many rows and few columns; its lower precision does no harm
     power, direction = np.linalg.eigh(values.T @ values)
     kept = power > _RANK * power[-1]
-    found = values @ (direction[:, kept] / np.sqrt(power[kept]))
-    return np.asarray(np.linalg.qr(found)[0])
+    directions = values @ (direction[:, kept] / np.sqrt(power[kept]))
+    return np.asarray(np.linalg.qr(directions)[0])
 
 
 def without(columns: Array, span: Numbers) -> Array:
     """Return columns without their part in an orthonormal span."""
     # columns: [R, ...]; span: [R, r]; returns [R, ...], with the columns' type of number
-    own = span.astype(columns.dtype, copy=False)
-    return np.asarray(columns - own @ (own.T @ columns))
+    same_type = span.astype(columns.dtype, copy=False)
+    return np.asarray(columns - same_type @ (same_type.T @ columns))
 
 
 def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Numbers:
@@ -95,13 +95,13 @@ def residual_of(series: BlockSeries, splines: Splines, nominal: Array) -> Number
     span = Span(splines[used])
     target = span.without(series.target[used])
     if nominal.shape[2]:
-        own = np.asarray(nominal[used]).copy()
-        for j in range(own.shape[1]):
-            own[:, j] = span.without(own[:, j])
-        target = target - _explained(own.reshape(-1, own.shape[2]), target.reshape(-1)).reshape(target.shape)
-    found = series.target - np.mean(series.target[used], axis=0)
-    found[used] = target
-    return np.asarray(found)
+        columns = np.asarray(nominal[used]).copy()
+        for j in range(columns.shape[1]):
+            columns[:, j] = span.without(columns[:, j])
+        target = target - _explained(columns.reshape(-1, columns.shape[2]), target.reshape(-1)).reshape(target.shape)
+    residual = series.target - np.mean(series.target[used], axis=0)
+    residual[used] = target
+    return np.asarray(residual)
 
 
 def _explained(columns: Array, target: Numbers) -> Numbers:

@@ -32,13 +32,13 @@ class Whitener:
         """Filter values, and scale them to the noise."""
         # values: [B, n, ...]; returns [B, n, ...] in units of the noise. Rows that are not valid are 0
         shape = (1, values.shape[1], *[1] * (values.ndim - 2))
-        found = np.array(values, dtype=np.float64)
-        before = _sums(found)
-        for (first, last), own in zip(WINDOWS, self.coefficients, strict=False):
-            found[last:] -= own.reshape(shape) * _mean(before, first, last)
-        found /= self.scale.reshape(shape)
-        found[~self.valid] = 0.0
-        return found.astype(values.dtype, copy=False)
+        filtered = np.array(values, dtype=np.float64)
+        before = _sums(filtered)
+        for (first, last), weights in zip(WINDOWS, self.coefficients, strict=False):
+            filtered[last:] -= weights.reshape(shape) * _mean(before, first, last)
+        filtered /= self.scale.reshape(shape)
+        filtered[~self.valid] = 0.0
+        return filtered.astype(values.dtype, copy=False)
 
 
 def _sums(values: Numbers) -> Numbers:
@@ -103,9 +103,9 @@ def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
     best, chosen = np.inf, np.zeros(0)
     power = float(target @ target)
     for order in range(most + 1):
-        own = past[:, :order]
-        fit = np.linalg.lstsq(own.T @ own, own.T @ target, rcond=1e-12)[0]
-        left = max(power - float(fit @ (own.T @ target)), 1e-300)
+        columns = past[:, :order]
+        fit = np.linalg.lstsq(columns.T @ columns, columns.T @ target, rcond=1e-12)[0]
+        left = max(power - float(fit @ (columns.T @ target)), 1e-300)
         score = len(rows) * np.log(left) + order * np.log(max(len(rows), 2))
         if score < best:
             best, chosen = score, fit
