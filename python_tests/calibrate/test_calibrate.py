@@ -20,11 +20,10 @@ from command import Call, DemoRun
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.files import write_calibration
-from tendonfmu.calibrate.fit import fit_all
-from tendonfmu.calibrate.parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
+from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, rms_of
 from tendonfmu.calibrate.text import size_rows, verdict
-from tendonfmu.cli.several_values import several_values
+from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described
@@ -186,11 +185,7 @@ def test_what_is_unchanged_is_not_done_again(
     assert answer.status == 0 and answer.err == ""
     assert json.loads(answer.out) == json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     other = calibrate(
-        folder / FINGER,
-        [folder / FREE],
-        out,
-        tests=[folder / UNSEEN],
-        options=Options(false_alarms_per_hour=360.0),
+        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], options=Options(false_alarms_per_hour=360.0)
     )
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
     with pytest.raises(AssertionError, match="done again"):
@@ -234,8 +229,7 @@ def test_touched_motion_is_no_free_motion(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("free", "tests", "words"),
-    [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")],
+    ("free", "tests", "words"), [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")]
 )
 def test_recordings_that_cannot_be_are_refused(
     free: list[str], tests: list[str], words: str, folder: Path, tmp_path: Path

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event
-from tendonfmu.detect.run import Subject, Track
+from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
+from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Estimate, intervals
 
 FORMAT = "tendonfmu-score-1"
 
 
-@dataclass(frozen=True)
-class Scored:
-    """A finished score."""
-
-    subject: Subject  # what was scored
-    kinematics: int  # 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities
-    labels: str  # column of the label
-    seed: int  # seed of the resampling
-    tracks: Sequence[Track]  # by recording
-    scores: Sequence[DetectionScore]
-    summaries: Sequence[Summary]
-    summary: Summary  # summary of all recordings together
-    roc: Sequence[RocPoint] | None  # points of the ROC, or None
-    no_roc: str | None  # why there is no ROC, or None
-    warnings: Sequence[str]  # sentences
+SIZES = (
+    1.5,
+    3.0,
+    6.0,
+    math.inf,
+)  # of pushes: times the rms of the joint's residual, at the joint with the largest ratio
 
 
 def build_report(scored: Scored) -> dict[str, Any]:
@@ -44,11 +34,11 @@ def build_report(scored: Scored) -> dict[str, Any]:
         "finger": scored.subject.finger.name,
         "model": str(scored.subject.path),
         "joints": scored.subject.finger.joint_names,
-        "kinematics": scored.kinematics,
-        "labels": scored.labels,
+        "kinematics": scored.options.kinematics,
+        "labels": LABEL if scored.options.labels is None else scored.options.labels,
         "definitions": {"merged_s": MERGED, "silent_s": SILENT, "grace_s": GRACE},
         "confidence": intervals.CONFIDENCE,
-        "seed": scored.seed,
+        "seed": scored.options.seed,
         "warnings": list(scored.warnings),
         **_summary(scored.summary),
         "roc": {
@@ -60,71 +50,39 @@ def build_report(scored: Scored) -> dict[str, Any]:
     return {key: finite(value) for key, value in report.items()}
 
 
-def report_text(report: Mapping[str, Any]) -> str:
-    """Return the report as JSON with one line per event, point of the ROC, and other key of a recording."""
-    parts = []
-    for key, value in report.items():
-        text = _flat(value)
-        if key == "recordings":
-            text = "[\n  " + ",\n  ".join(_recording_text(each) for each in value) + "]"
-        elif key == "roc" and value["points"] is not None:
-            text = f'{{"points": {_rows(value["points"], "   ")}, "absent": null}}'
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _recording_text(entry: Mapping[str, Any]) -> str:
-    listed = ("event_list", "false_alarm_list")
-    return (
-        "{"
-        + ",\n   ".join(
-            f'"{key}": {_rows(each, "    ") if key in listed else _flat(each)}' for key, each in entry.items()
-        )
-        + "}"
-    )
-
-
-def _rows(values: Sequence[Any], indent: str) -> str:
-    return "[" + "".join(f"\n{indent}{_flat(each)}," for each in values).rstrip(",") + "]"
-
-
-def _flat(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _summary(found: Summary) -> dict[str, Any]:
-    contact = found.contact
+def _summary(summary: Summary) -> dict[str, Any]:
+    contact = summary.contact
     return {
-        "events": found.events,
-        "found": found.found,
-        "missed": found.events - found.found,
-        "missed_in_alarm": found.masked,
-        "found_share": _estimate(found.found_share),
-        "false_alarms": found.false_alarms,
-        "false_alarms_interval": _interval(found.false_alarm_count),
-        "false_alarms_per_minute": _estimate(found.false_alarms_per_minute),
-        "free_minutes": found.free_minutes,
-        "free_alarm_share": _estimate(found.free_alarm_share),
-        "median_delay_s": found.delay["median"].value,
-        "delay_s": {name: _estimate(each) for name, each in found.delay.items()},
-        "held": found.held,
-        "held_share": _estimate(found.held_share),
+        "events": summary.events,
+        "found": summary.found,
+        "missed": summary.events - summary.found,
+        "missed_in_alarm": summary.masked,
+        "found_share": _estimate(summary.found_share),
+        "false_alarms": summary.false_alarms,
+        "false_alarms_interval": _interval(summary.false_alarm_count),
+        "false_alarms_per_minute": _estimate(summary.false_alarms_per_minute),
+        "free_minutes": summary.free_minutes,
+        "free_alarm_share": _estimate(summary.free_alarm_share),
+        "median_delay_s": summary.delay["median"].value,
+        "delay_s": {name: _estimate(each) for name, each in summary.delay.items()},
+        "held": summary.held,
+        "held_share": _estimate(summary.held_share),
         "overhang": {
-            "events": found.overhang_events,
-            "seconds": found.overhang_seconds,
-            "longest_s": found.longest_overhang,
-            "per_event_s": _estimate(found.overhang),
+            "events": summary.overhang_events,
+            "seconds": summary.overhang_seconds,
+            "longest_s": summary.longest_overhang,
+            "per_event_s": _estimate(summary.overhang),
         },
         "at_alarm": {
-            "force": None if found.force_at_alarm is None else _estimate(found.force_at_alarm),
-            "external_torque": _estimates(found.external_at_alarm),
-            "compensated_torque": _estimates(found.compensated_at_alarm),
+            "force": None if summary.force_at_alarm is None else _estimate(summary.force_at_alarm),
+            "external_torque": _estimates(summary.external_at_alarm),
+            "compensated_torque": _estimates(summary.compensated_at_alarm),
         },
-        "free_rms": [each.value for each in found.free_rms],
-        "free_rms_interval": [_interval(each) for each in found.free_rms],
+        "free_rms": [each.value for each in summary.free_rms],
+        "free_rms_interval": [_interval(each) for each in summary.free_rms],
         "contact_torque_rms_error": None if contact is None else [each.value for each in contact.rms],
         "contact_torque_rms_error_interval": None if contact is None else [_interval(each) for each in contact.rms],
         "contact_torque_correlation": None if contact is None else _estimates(contact.correlation),
@@ -179,17 +137,48 @@ def _point(point: RocPoint) -> dict[str, Any]:
     }
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    return {"value": found.value, "interval": _interval(found)}
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    return {"value": estimate.value, "interval": _interval(estimate)}
 
 
-def _estimates(found: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
-    return None if found is None else [_estimate(each) for each in found]
+def _estimates(estimates: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
+    return None if estimates is None else [_estimate(each) for each in estimates]
 
 
-def _interval(found: Estimate) -> list[float] | None:
-    return None if math.isnan(found.low) or math.isnan(found.high) else [found.low, found.high]
+def _interval(estimate: Estimate) -> list[float] | None:
+    return None if math.isnan(estimate.low) or math.isnan(estimate.high) else [estimate.low, estimate.high]
 
 
 def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:
     return None if values is None else [float(value) for value in values]
+
+
+def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:
+    """Count the pushes, and those found, by the torque of a reference sensor over the residual of free motion."""
+    # left: [n] rms of the residual (N·m)
+    sizes, hits = [], []
+    scale = np.maximum(np.array(left), 1e-12)
+    for track, score in zip(scored.tracks, scored.scores, strict=True):
+        if track.external is None:
+            return None
+        for event in score.events:
+            touched = (track.recording.time >= event.onset) & (track.recording.time <= event.end)
+            sizes.append(float((np.abs(track.external[touched]) / scale).max()))
+            hits.append(event.found)
+    low, rows = 0.0, []
+    for high in SIZES:
+        inside = [hit for size, hit in zip(sizes, hits, strict=True) if low <= size < high]
+        if inside:
+            share = intervals.share(sum(inside), len(inside))
+            rows.append(
+                {
+                    "from": low,
+                    "below": None if math.isinf(high) else high,
+                    "events": len(inside),
+                    "found": sum(inside),
+                    "share": share.value,
+                    "interval": [share.low, share.high],
+                }
+            )
+        low = high
+    return rows

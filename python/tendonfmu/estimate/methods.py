@@ -19,28 +19,34 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
-from tendonfmu.estimate.files import with_values
-from tendonfmu.estimate.previous_fit import PreviousFit, known_information
+from tendonfmu.estimate.files import PreviousFit, with_values
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.files import counted
+from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
 Start = Callable[[Sequence[str]], Numbers]
 
 
+_LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 in a previous fit leave it
+
+
+@dataclass(frozen=True)
+class FrictionFitOptions(FitOptions):
+    """Options of `FrictionFit`."""
+
+    threads: int = option(0, Number(0, whole=True), "of a batch; 0: all cores")
+
+
 @dataclass(frozen=True)
 class Settings:
-    """Options of a fit, named as those of `FrictionFit`."""
+    """How a fit is made."""
 
-    prior: float = 1.0
-    max_passes: int = 60
-    tolerance: float = 0.3
-    threads: int = 0
-    parameter_drift: float = 0.0
+    options: FrictionFitOptions
+    passes: int  # most passes over the data
     effective: bool = True  # whether samples count for their share of an effective number
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
-    change: float = 0.0  # relative standard deviation of what may have changed since
     noise: float = 0.0  # torque noise of the description (N·m)
 
 
@@ -158,57 +164,71 @@ def _measured_weights(
     most = 1.0 if settings.previous is None else settings.previous.share
     for number, (place, part) in enumerate(added):
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
-        found = sample_weights(innovation / np.sqrt(variance)[:, None])
-        weights[place][part] = np.minimum(found, most)
+        measured = sample_weights(innovation / np.sqrt(variance)[:, None])
+        weights[place][part] = np.minimum(measured, most)
     return weights
 
 
 def learn_batch(
-    structure: Structure,
-    recordings: Sequence[FitRecording],
-    watch: Watch,
-    settings: Settings,
-    start: Start | None,
+    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by maximum likelihood."""
     # start: [u]
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
-    prior = settings.prior
+    prior = settings.options.prior
     if settings.previous is not None:
-        estimator.set_known(_known(estimator, settings))
+        estimator.set_known(_known_information(estimator, settings))
         prior = np.inf  # the known information contains the prior
-    found = _fitted(estimator, begin, prior, settings, watch, "")
-    steps, passes = found.steps, found.passes
+    result = _fitted(estimator, begin, prior, settings, watch, "")
+    steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
     if settings.effective:
-        weights = _measured_weights(estimator, found.z, recordings, added, settings)
+        weights = _measured_weights(estimator, result.z, recordings, added, settings)
     if any((each < 1).any() for each in weights):
         for number, (place, part) in enumerate(added):
             estimator.set_weights(number, weights[place][part.start])
-        found = _fitted(estimator, found.z, prior, settings, watch, ", with effective samples")
-        steps, passes = steps + found.steps, passes + found.passes
+        result = _fitted(estimator, result.z, prior, settings, watch, ", with effective samples")
+        steps, passes = steps + result.steps, passes + result.passes
     return Learned(
         estimator=estimator,
-        z=found.z,
-        covariance=found.covariance,
-        information=found.information,
-        cost=found.cost,
+        z=result.z,
+        covariance=result.covariance,
+        information=result.information,
+        cost=result.cost,
         iterations=steps,
         passes=passes,
-        converged=found.converged,
+        converged=result.converged,
         weights=weights,
         innovations=[],
-        warnings=[] if found.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
+        warnings=[] if result.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
     )
 
 
-def _known(estimator: Estimator, settings: Settings) -> Numbers:
-    """Return [u, u] the information of the previous fit."""
-    assert settings.previous is not None
-    names = unknown_names(estimator)
-    return known_information(estimator, names, settings.previous, settings.change, settings.prior, settings.noise)
+def _known_information(estimator: Estimator, settings: Settings) -> Numbers:
+    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start."""
+    # The prior of an unknown is a Gaussian about its previous value with covariance C + D. C is that of the previous
+    # fit, if its report has it. D is diagonal, (change · size)², for the change by wear, temperature or another
+    # instrument of the type since then.
+    previous = settings.previous
+    assert previous is not None
+    start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
+    size = np.maximum(np.abs(start), _LEAST * scale)
+    is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
+    size[is_bias] = np.maximum(size[is_bias], settings.noise)
+    has = np.array([unknown.path in previous.values for unknown in estimator.unknowns], dtype=bool)
+    variance = np.where(has, settings.options.change * size, settings.options.prior * scale) ** 2
+    place = {name: k for k, name in enumerate(previous.names)}
+    both = [k for k, name in enumerate(names) if name in place and has[k]]
+    before = [place[names[k]] for k in both]
+    covariance = np.diag(variance)
+    covariance[np.ix_(both, both)] += previous.covariance[np.ix_(before, before)]
+    # its correlations are rounded: no direction counts as known better than by a relative 1e-6
+    root = np.sqrt(np.diag(covariance))
+    value, turn = np.linalg.eigh(covariance / np.outer(root, root))
+    turned = turn / root[:, None]
+    return np.asarray((turned / np.maximum(value, 1e-6)) @ turned.T)
 
 
 def _fitted(
@@ -224,19 +244,19 @@ def _fitted(
         return watch(FitProgress(f"{phase}{what}", number, done, total, cost))
 
     try:
-        found = estimator.fit(
+        result = estimator.fit(
             begin,
             prior_std=prior,
-            max_passes=settings.max_passes,
-            tolerance=settings.tolerance,
-            threads=settings.threads,
+            max_passes=settings.passes,
+            tolerance=settings.options.tolerance,
+            threads=settings.options.threads,
             progress=show,
         )
     except KeyboardInterrupt:
         raise Interrupted(estimator, best, best_cost, by_user=True) from None
-    if watch.stopped or found.stopped:
-        raise Interrupted(estimator, found.z, found.cost, watch.by_user)
-    return found
+    if watch.stopped or result.stopped:
+        raise Interrupted(estimator, result.z, result.cost, watch.by_user)
+    return result
 
 
 def _slack(samples: int) -> str:
@@ -244,25 +264,21 @@ def _slack(samples: int) -> str:
 
 
 def learn_ekf(
-    structure: Structure,
-    recordings: Sequence[FitRecording],
-    watch: Watch,
-    settings: Settings,
-    start: Start | None,
+    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)
     innovations: list[Numbers] = []
-    for number in range(1, settings.max_passes + 1):
+    for number in range(1, settings.passes + 1):
         if number > 1:
             learner.begin_pass()
         innovations = _filter_once(learner, estimator, recordings, watch, number)
     z, covariance = learner.z, learner.covariance
-    plain = np.diag(1 / (settings.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
+    plain = np.diag(1 / (settings.options.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective and settings.parameter_drift == 0:
+    if settings.effective and settings.options.drift == 0:
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
     if share < 1 or settings.previous is not None:
@@ -270,7 +286,7 @@ def learn_ekf(
         first = np.array([unknown.start for unknown in learner.unknowns])
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
-        known = plain if settings.previous is None else _known(estimator, settings)
+        known = plain if settings.previous is None else _known_information(estimator, settings)
         information = share * information
         covariance = np.asarray(np.linalg.inv(information + known), dtype=np.float64)
         z = _within(estimator, mean + covariance @ pull)
@@ -280,8 +296,8 @@ def learn_ekf(
         covariance=covariance,
         information=information,
         cost=float("nan"),
-        iterations=settings.max_passes,
-        passes=settings.max_passes,
+        iterations=settings.passes,
+        passes=settings.passes,
         converged=True,
         weights=weights,
         innovations=innovations,
@@ -293,9 +309,9 @@ def _common_weight(
     estimator: Estimator, z: Numbers, recordings: Sequence[FitRecording], settings: Settings
 ) -> list[Numbers]:
     """Return by recording [N, n] one weight for all samples: the share of all samples trained on together."""
-    found = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
-    trained = np.concatenate([each[recording.train] for each, recording in zip(found, recordings, strict=True)])
-    return [np.full_like(each, trained.mean()) for each in found]
+    weights = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
+    trained = np.concatenate([each[recording.train] for each, recording in zip(weights, recordings, strict=True)])
+    return [np.full_like(each, trained.mean()) for each in weights]
 
 
 def _within(estimator: Estimator, z: Numbers) -> Numbers:
@@ -314,7 +330,7 @@ def _filter_once(
 
     innovations = []
     for recording in recordings:
-        found = np.full(recording.target.shape, np.nan)
+        standardised = np.full(recording.target.shape, np.nan)
         for part in recording.parts:
             try:
                 outputs = learner.run(**_rows(recording, part), progress=show)
@@ -324,9 +340,9 @@ def _filter_once(
                 raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
             if watch.stopped:
                 raise Interrupted(estimator, learner.z, float("nan"), watch.by_user)
-            found[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
+            standardised[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
             before += part.stop - part.start
-        innovations.append(np.where(recording.train[:, None], found, np.nan))
+        innovations.append(np.where(recording.train[:, None], standardised, np.nan))
     return innovations
 
 
@@ -339,7 +355,7 @@ def _learner(structure: Structure, estimator: Estimator, settings: Settings, sta
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
     try:
         return Learner(
-            image, structure.group, scale, prior_std=settings.prior, parameter_drift=settings.parameter_drift
+            image, structure.group, scale, prior_std=settings.options.prior, parameter_drift=settings.options.drift
         )
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

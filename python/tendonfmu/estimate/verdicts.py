@@ -4,52 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.estimation import Unknown as FittedUnknown
 from tendonfmu.estimate.fisher_information import Unknown
-from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
+from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
+from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
+from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
 
-CAUSES = {
-    "never_moves": "never slides at all",
-    "side": "never slides to that side",
-    "working_point": "never slides near that working point",
-    "slow": "never slides as slowly as its Stribeck velocity",
-    "noise": "too little torque compared with noise and drift, even if all else is known",
-    "combination": "visible, but only in combination with others",
-}
+CAUSES = {**CAUSES_OF_A_MOTION, "never_moves": "never slides at all", "side": "never slides to that side"}
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
-
-
-class FittedUnknown(Protocol):
-    """The attributes of `estimation.Unknown` that are read here."""
-
-    @property
-    def path(self) -> str: ...
-    @property
-    def role(self) -> str: ...
-    @property
-    def parameters(self) -> tuple[int, ...]: ...
-    @property
-    def lower(self) -> float: ...
-    @property
-    def upper(self) -> float: ...
-    @property
-    def scale(self) -> float: ...
-
-
-class Estimates(Protocol):
-    """The attributes of `estimation.Estimator` that are read here."""
-
-    @property
-    def unknowns(self) -> Sequence[FittedUnknown]: ...
-    def values(self, z: Numbers) -> Numbers: ...
 
 
 @dataclass(frozen=True)
@@ -75,20 +45,7 @@ class Fitted:
         return not self.cause
 
 
-@dataclass(frozen=True)
-class Knowledge:
-    """What a fit knows."""
-
-    estimator: Estimates  # unknowns, and their conversion into numbers of the description
-    z: Numbers  # [u] estimate
-    covariance: Numbers  # [u, u] of z, prior included
-    information: Numbers  # [u, u] of the data alone
-    fitted: Finger  # description with the values at z
-    coverage: Sequence[EffectCoverage]  # what the recorded motion covers
-    noise: float  # torque noise (N·m); a bias.initial_torque counts as at least that large
-
-
-def slopes(estimator: Estimates, z: Numbers) -> Numbers:
+def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
     # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
     base = np.asarray(estimator.values(z))
@@ -102,35 +59,49 @@ def slopes(estimator: Estimates, z: Numbers) -> Numbers:
     return np.column_stack(columns)
 
 
-def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted], Numbers]:
-    """Judge every estimated number."""
-    # returns [p, p] of their values
-    numbers = values_of(structure, known.fitted)
-    matrix = slopes(known.estimator, known.z)[[structure.index[number.path] for number in numbers]]
-    covariance = matrix @ known.covariance @ matrix.T
+def judge_numbers(
+    structure: Structure, learned: Learned, finger: Finger, coverage: Sequence[EffectCoverage], noise: float
+) -> tuple[list[Fitted], Numbers]:
+    """Judge every number of a fitted finger by what the motion covers; return the covariance [p, p] of the values."""
+    # noise: of the torque (N·m); a bias.initial_torque counts as at least that large
+    estimator, z = learned.estimator, learned.z
+    numbers = values_of(structure, finger)
+    matrix = slopes(estimator, z)[[structure.index[number.path] for number in numbers]]
+    covariance = matrix @ learned.covariance @ matrix.T
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    size = np.array([_size(number, known.noise) for number in numbers])
-    columns = _columns(structure, known.estimator)
-    deputies = _deputies(numbers, columns, known.coverage)
-    verdicts = _verdicts(numbers, deputies, known, matrix, covariance, size)
-    by_path = {cover.effect.path: cover for cover in known.coverage}
-    found = []
+    size = np.array([_size(number, noise) for number in numbers])
+    columns = _columns(structure, estimator)
+    representatives = _representatives(numbers, columns, coverage)
+    # `error` from all numbers, `error_alone` with all others known
+    chosen = covariance[np.ix_(representatives, representatives)]
+    deviation = np.sqrt(np.maximum(np.diag(chosen), 1e-300))
+    inverse = np.linalg.inv(matrix[representatives])
+    seen = np.diag(inverse.T @ learned.information @ inverse) * size[representatives] ** 2
+    verdicts = explain(
+        [numbers[k] for k in representatives],
+        deviation / size[representatives],
+        1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2),
+        chosen / np.outer(deviation, deviation),
+        coverage,
+    )
+    by_path = {cover.effect.path: cover for cover in coverage}
+    judged = []
     for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
         cover = by_path[number.effect.path] if number.effect is not None else None
         cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else ""
-        found.append(
+        judged.append(
             Fitted(
                 number=number,
                 start=before.value,
                 standard_error=float(error[k]),
-                at_bound=_bound(known.estimator.unknowns[columns[k]], float(known.z[columns[k]])),
+                at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
                 reason=verdict.reason if cause else "",
-                advice=_advice(cause, verdict, cover, known.fitted) if cause else "",
+                advice=_advice(cause, verdict, cover, finger) if cause else "",
             )
         )
-    return found, covariance
+    return judged, covariance
 
 
 def _size(number: Unknown, noise: float) -> float:
@@ -148,7 +119,7 @@ def _bound(unknown: FittedUnknown, value: float) -> str | None:
 # --- one number for each unknown --------------------------------------------------------------------------------------
 
 
-def _columns(structure: Structure, estimator: Estimates) -> list[int]:
+def _columns(structure: Structure, estimator: Estimator) -> list[int]:
     """Return [numbers] the unknown of each: for a static friction its drop, for a Stribeck velocity its rate."""
     by_parameter: dict[int, int] = {}
     for column, unknown in enumerate(estimator.unknowns):
@@ -157,7 +128,9 @@ def _columns(structure: Structure, estimator: Estimates) -> list[int]:
     return [by_parameter[structure.index[number.path]] for number in structure.numbers]
 
 
-def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]) -> list[int]:
+def _representatives(
+    numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]
+) -> list[int]:
     """Return [unknowns] a number that represents all that share its value, if possible one that the motion visits."""
     by_path = {cover.effect.path: cover for cover in coverage}
     first: dict[int, int] = {}
@@ -167,24 +140,6 @@ def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequ
     for k, column in enumerate(columns):
         first.setdefault(column, k)
     return [first[column] for column in sorted(first)]
-
-
-def _verdicts(
-    numbers: Sequence[Unknown],
-    deputies: Sequence[int],
-    known: Knowledge,
-    matrix: Numbers,
-    covariance: Numbers,
-    size: Numbers,
-) -> list[Verdict]:
-    """Judge [unknowns] by their deputies: `error` from all numbers, `error_alone` with all others known."""
-    own = covariance[np.ix_(deputies, deputies)]
-    error = np.sqrt(np.maximum(np.diag(own), 1e-300))
-    inverse = np.linalg.inv(matrix[deputies])
-    seen = np.diag(inverse.T @ known.information @ inverse) * size[deputies] ** 2
-    alone = 1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2)
-    correlation = own / np.outer(error, error)
-    return explain([numbers[k] for k in deputies], error / size[deputies], alone, correlation, known.coverage)
 
 
 # --- advice -----------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .counting import are, counted, percent
-    from .json_node import Node, Refusal, finite, read_json
+    from .json_node import Node, Refusal, finite, read_json, report_text
     from .tables import (
         FORMATS,
         Table,

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         number_of,
         place_of,
     )
-    from .description_path import steps_of
+    from .description_path import law_path, steps_of
     from .friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
     from .native import Instance, NativeError
     from .output_dependencies import (
