@@ -74,7 +74,7 @@ def tune(
     from tendonfmu.estimate import check_outputs
     from tendonfmu.files import write_text
     from tendonfmu.interface import tune as tune_finger
-    from tendonfmu.report import tune_files, tune_text
+    from tendonfmu.report import tune_text, write_tune_figures
 
     check_outputs(output, report, figures, [finger, *recordings])
     with progress_bar(progress) as bar:
@@ -108,7 +108,7 @@ def tune(
     print_tables(tune_text.tables(tuning), tune_text.lines(tuning), left="joint")
     say(f"{output}: {tuning.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
-        say_files(tune_files.write_figures(tuning, figures))
+        say_files(write_tune_figures(tuning, figures))
 
 
 @reads("model", "recordings")
@@ -166,6 +166,6 @@ def score(
     print_tables(score_text.tables(scored), score_text.lines(scored), left="")
     say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")
     if figures is not None:
-        from tendonfmu.report import score_files
+        from tendonfmu.report import write_score_figures
 
-        say_files(score_files.write_figures(scored, figures))
+        say_files(write_score_figures(scored, figures))

@@ -145,7 +145,7 @@ def _history(
     from tendonfmu.estimate import check_given_once
     from tendonfmu.files import check_output_folder
     from tendonfmu.model import read_finger
-    from tendonfmu.report import Names, history_report, history_text, write_history
+    from tendonfmu.report import Names, headline, history_report, rows_of_lines, write_history
     from tendonfmu.tasks import workers_of
 
     check_given_once(recordings, reference, "the reference")
@@ -168,8 +168,8 @@ def _history(
     names = Names(tuple(given.joint_names), tuple(given.tendon_names))
     written = write_history(found, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
-    rows = list(history_text.rows_of_lines(found, names))
-    print_tables([(found.finger, headings, rows)] if rows else (), [history_text.headline(found)], left="trend")
+    rows = list(rows_of_lines(found, names))
+    print_tables([(found.finger, headings, rows)] if rows else (), [headline(found)], left="trend")
     for name, why in found.failed:
         warn(f"{name}: left out: {why}")
     say_files(written)

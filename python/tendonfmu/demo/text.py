@@ -12,6 +12,8 @@ from tendonfmu.demo.run import FREE, FREE_X4, PUSHES, RecordingResult
 from tendonfmu.detect import DetectionScore
 from tendonfmu.report import (
     ResidualTable,
+    Row,
+    Table,
     confusion_sentence,
     diagnosis_text,
     error_sentence,
@@ -19,9 +21,6 @@ from tendonfmu.report import (
     residual_tables,
     rounded,
 )
-
-Row = tuple[str, ...]
-Table = tuple[str, Row, list[Row]]
 
 
 def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
@@ -106,7 +105,7 @@ def fit_sentence(story: Story) -> str:
     """Say how many numbers were fitted to how much motion, and the effect on a recording that was not trained on."""
     report = story.fit.report_
     unseen = list(residual_tables(story.fit.picture()))[-1]
-    seconds = sum(each["duration"] for each in report["recordings"])
+    seconds = sum(recording["duration"] for recording in report["recordings"])
     return (
         f"{report['identified']['of']} numbers from {seconds:.0f} s of motion in {report['seconds']:.1f} s; on a "
         f"recording that it has not seen the error falls from {rounded(unseen.all.start)} to "
@@ -137,11 +136,11 @@ def alarms(score: DetectionScore) -> str:
 
 def cause_lines(story: Story) -> Iterator[str]:
     """Yield the verdict, each cause with its size, and the gain."""
-    found = story.diagnosis
-    names = names_of(found)
-    yield diagnosis_text.headline(found)
-    for cause in found.causes:
+    diagnosis = story.diagnosis
+    names = names_of(diagnosis)
+    yield diagnosis_text.headline(diagnosis)
+    for cause in diagnosis.causes:
         yield f"  {cause.where.effect} at {names.place(cause.where) or 'the whole finger'}: {cause.size}"
         if confusion := confusion_sentence(cause, names):
             yield f"  {confusion}"
-    yield error_sentence(found)
+    yield error_sentence(diagnosis)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .output_dependencies import Dependencies, dependencies, structure_of
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS
     from .plausibility import description_findings, is_direct_drive
-    from .routing_geometry import DrawnTendon, FingerDrawing, Points, finger_drawing
+    from .routing_geometry import DrawnTendon, FingerDrawing, finger_drawing
     from .signals import INPUTS_OF_SOURCE, inputs_used, watches_motors
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
