@@ -22,9 +22,10 @@ from plant_figures import (
     presliding_figure,
     truth_figure,
 )
+from rig_drawing import GAP, rig_drawing
+
 from plant_rigs import needs_plant
 from repository_paths import ROOT
-from rig_drawing import GAP, rig_drawing
 from tendonfmu.simulate.rig import Rig, read_rig
 
 RIGS = ROOT / "examples" / "rigs"

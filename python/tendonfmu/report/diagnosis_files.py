@@ -11,19 +11,17 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import (
     Cause,
     ChangedSize,
     DetectionGain,
     Diagnosis,
-    Evidence,
     Experiment,
     ResidualView,
     Where,
@@ -156,45 +154,29 @@ def _earlier(folder: Path) -> list[str]:
 
 def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
     """Make the report of a diagnosis."""
-    nominal, extended, unexplained = diagnosis.nominal, diagnosis.extended, diagnosis.unexplained
+    effect = ("title", "surviving_share", "ordinary_gain", "needed_gain", "experiment")
     report = {
         "format": FORMAT,
-        "kind": diagnosis.kind,
-        "verdict": diagnosis.verdict,
-        "nominal": asdict(nominal) | {"bias_only_rms": diagnosis.bias_only_rms, "finger": NOMINAL},
-        "extended": asdict(extended) | {"finger": EXTENDED, "fmu": EXTENDED_FMU},
-        "noise_floor": diagnosis.noise_floor,
-        "gain": _gain(diagnosis.gain),
+        **_fields(diagnosis, "kind", "verdict"),
+        "nominal": _plain(diagnosis.nominal) | {"bias_only_rms": diagnosis.bias_only_rms, "finger": NOMINAL},
+        "extended": _plain(diagnosis.extended) | {"finger": EXTENDED, "fmu": EXTENDED_FMU},
+        **_fields(diagnosis, "noise_floor", "gain"),
         "causes": [_cause(cause, diagnosis.kind) for cause in reported_causes(diagnosis)],
         "too_small": [_cause(cause, diagnosis.kind) for cause in diagnosis.too_small],
-        "unexplained": {
-            **_fields(unexplained, "share", "description", "by_joint"),
-            "gain": _gain(unexplained.gain),
-        },
+        "unexplained": _fields(diagnosis.unexplained, "share", "description", "by_joint", "gain"),
         "next_experiment": diagnosis.experiment.sentence,
         "waterfall": _waterfall(diagnosis),
         **_fields(diagnosis, "signals", "least_gain", "finger"),
         "joints": [joint.get("name") for joint in diagnosis.nominal_data["joints"]],
         "tendons": [tendon.get("name") for tendon in diagnosis.nominal_data["tendons"]],
-        **_fields(
-            diagnosis,
-            *("references", "repeated", "recordings", "tests", "held_out", "seed", "tested", "floor_source"),
-        ),
+        **_fields(diagnosis, "references", "repeated", "recordings", "tests", "held_out", "seed", "tested"),
+        "floor_source": diagnosis.floor_source,
         "whiteness": [{"nominal": before, "extended": after} for before, after in diagnosis.whiteness],
-        "invisible": [
-            _where(effect.where)
-            | _fields(effect, "title", "surviving_share", "ordinary_gain", "needed_gain", "experiment")
-            for effect in diagnosis.invisible
-        ],
-        "events": [
-            {"recording": event.recording, "start_s": event.start, "end_s": event.end}
-            | _fields(event, "joints", "peak", "description")
-            for event in diagnosis.events
-        ],
+        "invisible": [_where(invisible.where) | _fields(invisible, *effect) for invisible in diagnosis.invisible],
+        "events": [_plain(event, start="start_s", end="end_s") for event in diagnosis.events],
         "experiment": _experiment(diagnosis.experiment),
         "detection": None if diagnosis.detection is None else _detection(diagnosis.detection),
-        "warnings": diagnosis.warnings,
-        "seconds": diagnosis.seconds,
+        **_fields(diagnosis, "warnings", "seconds"),
         "files": files,
         "views": [_view(view) for view in diagnosis.views],
     }
@@ -221,12 +203,22 @@ def _in_line(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
+def _plain(value: Any, **renamed: str) -> Any:
+    """Return a dataclass as JSON has it; fields may have other names there, and those without a value are left out."""
+    if isinstance(value, Interval):
+        return {"value": value.value, "interval": [value.low, value.high]}
+    if isinstance(value, np.ndarray):
+        return [float(f"{number:.{DIGITS}g}") for number in value.astype(float).tolist()]
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    if is_dataclass(value):
+        known = {field.name: getattr(value, field.name) for field in fields(value)}
+        return {renamed.get(name, name): _plain(part) for name, part in known.items() if part is not None}
+    return value
+
+
 def _fields(source: Any, *names: str) -> dict[str, Any]:
-    return {name: getattr(source, name) for name in names}
-
-
-def _gain(gain: Interval) -> dict[str, Any]:
-    return {"value": gain.value, "interval": [gain.low, gain.high]}
+    return {name: _plain(getattr(source, name)) for name in names}
 
 
 def _where(where: Where) -> dict[str, Any]:
@@ -236,14 +228,12 @@ def _where(where: Where) -> dict[str, Any]:
 def _cause(cause: Cause, kind: str) -> dict[str, Any]:
     return {
         **_where(cause.where),
-        "p_value": cause.p_value,
-        "gain": _gain(cause.gain),
+        **_fields(cause, "p_value", "gain"),
         "confusable_with": [_where(other) for other in cause.confusable_with],
         **_numbers_of(cause.parameters),
         **(_changed(cause.changed) if kind == "change" else {}),
         "places": [_fields(place, "joint", "tendon") | _numbers_of(place.parameters) for place in cause.places],
-        **_fields(cause, "size", "title", "explanation"),
-        "evidence": [_evidence(evidence) for evidence in cause.evidence],
+        **_fields(cause, "size", "title", "explanation", "evidence"),
     }
 
 
@@ -256,8 +246,8 @@ def _changed(changed: ChangedSize | None) -> dict[str, Any]:
         "reference": changed.reference.value,
         "now": changed.now.value,
         "now_interval": [changed.now.low, changed.now.high],
-        "change": _gain(changed.change),
-        "by_recording": [_gain(size) for size in changed.by],
+        "change": _plain(changed.change),
+        "by_recording": _plain(changed.by),
     }
 
 
@@ -279,19 +269,11 @@ def _waterfall(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def _evidence(evidence: Evidence) -> dict[str, Any]:
-    names = ["coordinate", "before", "after", "before_std", "after_std"]
-    names += ["reference", "reference_std"] if evidence.reference is not None else []
-    curves = {name: _listed(getattr(evidence, name)) for name in names}
-    return _fields(evidence, "joint", "label", "unit") | curves
-
-
 def _experiment(experiment: Experiment) -> dict[str, Any]:
     return {
-        "sentence": experiment.sentence,
+        **_fields(experiment, "sentence", "distance"),
         "separates": [[_where(one), _where(other)] for one, other in experiment.separates],
         "makes_visible": [_where(where) for where in experiment.makes_visible],
-        "distance": experiment.distance,
         "motion": dict(experiment.motion),
     }
 
@@ -309,14 +291,4 @@ def _detection(gain: DetectionGain) -> dict[str, Any]:
 
 
 def _view(view: ResidualView) -> dict[str, Any]:
-    return {
-        **_fields(view, "joint", "kind", "label", "unit"),
-        "x": _listed(view.x),
-        "nominal": _listed(view.before),
-        "extended": _listed(view.after),
-        "nominal_std": None if view.before_std is None else _listed(view.before_std),
-    }
-
-
-def _listed(values: Numbers) -> list[float]:
-    return [float(f"{value:.{DIGITS}g}") for value in np.asarray(values, dtype=float).tolist()]
+    return {"nominal_std": None} | _plain(view, before="nominal", after="extended", before_std="nominal_std")
