@@ -131,17 +131,13 @@ def _tile(story: Story, chapter: str) -> Tile:
         return Tile(
             found, "", f"pushes found, without a touch sensor, by a finger calibrated on {MINUTES} min of motion"
         )
-    return _tile_of_cause(story.diagnosis)
-
-
-def _tile_of_cause(diagnosis: Diagnosis) -> Tile:
+    diagnosis = story.diagnosis
     factor, unit = unit_of(diagnosis)
     before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
     if not diagnosis.causes:
         return Tile(before, unit, "error on an unseen recording; no cause was found")
-    first = diagnosis.causes[0]
-    cause = f"{at_place(first.title, first.where, names_of(diagnosis))}, found and built in"
-    meaning = f"error on an unseen recording: {percent(diagnosis.gain.value)} less with {cause}"
+    cause = at_place(diagnosis.causes[0].title, diagnosis.causes[0].where, names_of(diagnosis))
+    meaning = f"error on an unseen recording: {percent(diagnosis.gain.value)} less with {cause}, found and built in"
     return Tile(f"{before} → {after}", unit, meaning)
 
 

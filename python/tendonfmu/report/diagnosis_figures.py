@@ -14,7 +14,7 @@ from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
-from tendonfmu.report.numbers import capital, unit_text
+from tendonfmu.report.numbers import capital, unit_text, with_ends
 
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
 _TITLES = {
@@ -75,9 +75,7 @@ def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
         return
     factor, unit = (1.0, unit_text(changed.unit)) if unit_text(changed.unit) else (100.0, "%")
     x = np.arange(1.0, len(changed.by) + 1.0)
-    value, low, high = (
-        factor * np.array([getattr(size, end) for size in changed.by]) for end in ("value", "low", "high")
-    )
+    value, low, high = with_ends(changed.by, factor)
     then = np.full(2, factor * changed.reference.value)
     yield Panel(
         title="In each of the new recordings",

@@ -291,4 +291,5 @@ def _detection(gain: DetectionGain) -> dict[str, Any]:
 
 
 def _view(view: ResidualView) -> dict[str, Any]:
-    return {"nominal_std": None} | _plain(view, before="nominal", after="extended", before_std="nominal_std")
+    names = {"before": "nominal", "after": "extended", "before_std": "nominal_std"}
+    return {"nominal_std": None, **_plain(view, **names)}

@@ -14,7 +14,7 @@ from tendonfmu.diagnosis import NBSP, History, Line, quantity, share_of
 from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted, whole_file, write_text
 from tendonfmu.report.diagnosis_text import Names, at_place
-from tendonfmu.report.numbers import Row, capital, percent, unit_text
+from tendonfmu.report.numbers import Row, capital, percent, unit_text, with_ends
 from tendonfmu.report.page import drawn, render, write_figures
 
 FORMAT = "tendonfmu-history-1"
@@ -164,9 +164,7 @@ def _panel(line: Line, history: History, names: Names) -> Panel:
     x = np.array([when[size.recording] for size in line.sizes])
     unit = unit_text(line.sizes[0].size.unit)
     factor, unit = (1.0, unit) if unit else (100.0, "%")
-    value, low, high = (
-        factor * np.array([getattr(size.size.now, end) for size in line.sizes]) for end in ("value", "low", "high")
-    )
+    value, low, high = with_ends((size.size.now for size in line.sizes), factor)
     named = np.array([size.named for size in line.sizes])
     then = factor * line.sizes[0].size.reference.value
     title = at_place(line.where.effect.replace("_", " ").capitalize(), line.where, names)

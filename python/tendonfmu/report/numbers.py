@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -84,6 +85,12 @@ def magnitude(value: float, unit: str) -> str:
 def capital(text: str) -> str:
     """Return a text whose first letter is a capital."""
     return text[:1].upper() + text[1:]
+
+
+def with_ends(estimates: Iterable[Any], factor: float = 1.0) -> tuple[Numbers, Numbers, Numbers]:
+    """Return values, lower and upper ends of estimates."""
+    value, low, high = factor * np.array([(one.value, one.low, one.high) for one in estimates]).reshape(-1, 3).T
+    return value, low, high
 
 
 def column(values: Sequence[float | None]) -> list[float]:

@@ -17,6 +17,7 @@ from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Tra
 from tendonfmu.drawing import BLUE, SKY, Band, Bars, Curve, Dots, Heat, Panel, Sheet, line_of
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.numbers import with_ends
 from tendonfmu.report.page import drawn, write_figures
 from tendonfmu.statistics import intervals as statistics_intervals
 
@@ -246,12 +247,8 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
     """Show found events against false alarms, and both over the factor on the thresholds."""
     events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
     factors = np.array([point.factor for point in points])
-    found, found_low, found_high = (
-        100.0 * np.array([getattr(point.found_share, end) for point in points]) for end in ("value", "low", "high")
-    )
-    rate, rate_low, rate_high = (
-        np.array([getattr(point.false_alarms_per_hour, end) for point in points]) for end in ("value", "low", "high")
-    )
+    found, found_low, found_high = with_ends((point.found_share for point in points), 100.0)
+    rate, rate_low, rate_high = with_ends(point.false_alarms_per_hour for point in points)
     in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
     own = [int(np.argmin(np.abs(np.log(factors))))]
     named, least = _named(points), 60.0 / minutes  # one alarm in all free time, 1/h
@@ -315,17 +312,14 @@ def _named(points: Sequence[RocPoint]) -> list[int]:
 def delay_sheet(scored: Scored) -> Sheet:
     """Show the share of all events found within a time, with its interval, and the number of delays."""
     delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
-    total, median, ninety = (
-        scored.summary.events,
-        *(scored.summary.delay[name].value for name in ("median", "ninety_percent")),
-    )
+    total, delay = scored.summary.events, scored.summary.delay
+    median, ninety = delay["median"].value, delay["ninety_percent"].value
     end = float(delays[-1])
     if end > TAIL * ninety > 0:
         end = TAIL * ninety
     later, bins = int((delays > end).sum()), int(np.clip(len(delays) // 2, 12, 40))
-    within = [statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)]
     ms = 1e3 * delays
-    low, high = (100.0 * np.array([getattr(share, bound) for share in within]) for bound in ("low", "high"))
+    share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
     counts, edges = np.histogram(ms, bins, (0.0, 1e3 * end))
     limits, top = (0.0, 1.03e3 * max(end, 1e-3)), min(100.0, 1.3 * float(high.max()))
 
@@ -342,7 +336,7 @@ def delay_sheet(scored: Scored) -> Sheet:
         size="wide",
         height=330,
         bands=(Band("confidence", np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1]),),
-        curves=(Curve("fitted", *_stairs(ms, 100.0 * np.array([share.value for share in within]))), *marks(top)),
+        curves=(Curve("fitted", *_stairs(ms, share)), *marks(top)),
         x_limits=limits,
         y_limits=(0.0, top),
         zoom="delay",

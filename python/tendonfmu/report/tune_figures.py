@@ -10,6 +10,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import ContactTuning, FreeRun, rate_limit, tail_levels
 from tendonfmu.drawing import Band, Curve, Dots, Panel, Sheet
+from tendonfmu.report.numbers import with_ends
 from tendonfmu.report.page import drawn, write_figures
 from tendonfmu.statistics import intervals
 
@@ -40,8 +41,7 @@ def _sheet(name: str, title: str, keys: Sequence[tuple[str, str]], panels: Seque
 def tail_sheet(tuning: ContactTuning) -> Sheet:
     """Show false alarms per hour over the factor on the bounds, in sample and held out."""
     tail = tuning.tail(_FACTORS)
-    rates = [intervals.rate(held, tuning.hours_) for _, _, held in tail]
-    held_out, low, high = (np.array([getattr(rate, end) for rate in rates]) for end in ("value", "low", "high"))
+    held_out, low, high = with_ends(intervals.rate(held, tuning.hours_) for _, _, held in tail)
     in_sample = np.array([count / tuning.hours_ for _, count, _ in tail])
     limit = rate_limit(tuning.held_out_[0], tuning.hours_, tuning.confidence)
     ends = np.array([_FACTORS[0], _FACTORS[-1]])
