@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 from jaw_recordings import FAST, SLOW, Array, data_folder, read_run, rms
+from reference_figure import ReferenceCurves, ReferenceFigure, draw_reference
 
 from tendonfmu.fmu.fmpy_client import run_fmu
 from tendonfmu.fmu.packaging import build_fmu
-from tendonfmu.report.figure_data import ReferenceCurves, ReferenceFigure
-from tendonfmu.report.plots import draw_reference
 
 JAW = Path(__file__).with_name("jaw.json")
 LIMIT = 0.025  # N·m

@@ -14,7 +14,8 @@ from grasp import run
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tendonfmu.drawing.plot_style import BLUE, DARK, GREEN, GREY, VERMILION, clean, save
+from tendonfmu.drawing.panel import BLUE, DARK, GREEN, GREY, VERMILION
+from tendonfmu.drawing.png import clean, save
 
 FIGURE = Path(__file__).resolve().parents[2] / "docs" / "figures" / "grasp.png"
 Table = Mapping[str, Array]

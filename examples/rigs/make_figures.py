@@ -8,9 +8,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from tendonfmu.report.plant_figures import loop_figure, presliding_figure, truth_figure
-from tendonfmu.report.plots import draw_loops, draw_presliding, draw_rig, draw_truth
-from tendonfmu.report.rig_drawing import rig_drawing
+from plant_figures import loop_figure, presliding_figure, truth_figure
+from rig_drawing import rig_drawing
+from rig_plots import draw_loops, draw_presliding, draw_rig, draw_truth
+
 from tendonfmu.simulate.rig import read_rig
 
 HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ from command import DemoRun
 from real_browser import Elements, find_browser, measure, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.demo import demo
-from tendonfmu.demo.report import story_report
+from tendonfmu.demo.page import story_report
 from tendonfmu.files.tables import read_table
 
 HIDDEN = ROOT / "examples" / "demo_recording" / "two_joints_hidden.json"

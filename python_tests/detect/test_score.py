@@ -25,7 +25,7 @@ from tendonfmu.detect.scoring import read_subject, residual_of, run_track, scale
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
-from tendonfmu.report.score_figures import contact_figure, delay_figure, event_figure, roc_figure
+from tendonfmu.report.score_figures import contact_sheet, delay_sheet, event_sheet, roc_sheet
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
@@ -226,27 +226,34 @@ def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     scored = score_recordings(INDEX, [written(pushes, "rec.parquet")])
     track, events = scored.tracks[0], scored.scores[0].events
-    drawn = event_figure(scored)
-    assert drawn.groups == [("found", 3), ("missed", 1)]
-    assert drawn.delay[:3].tolist() == sorted(event.delay for event in events if event.found)
+    (rows,) = event_sheet(scored).panels
+    assert rows.heat is not None and rows.x_limits is not None
+    assert [name for _, name in rows.y_ticks] == ["3 found", "1 missed"]
+    delay = rows.bars[1].x
+    assert delay[:3].tolist() == sorted(event.delay for event in events if event.found)
     first = min((event for event in events if event.found), key=lambda event: event.delay)
-    size = np.linalg.norm(track.outputs["compensated_torque"], axis=1)
-    at = np.linspace(drawn.begin, drawn.end, drawn.torque.shape[1])
-    k = int(np.argmin(np.abs(at - drawn.delay[0])))
+    size = 1e3 * np.linalg.norm(track.outputs["compensated_torque"], axis=1)
+    at = np.linspace(*rows.x_limits, rows.heat.values.shape[1])
+    k = int(np.argmin(np.abs(at - delay[0])))
     row = int(np.searchsorted(track.recording.time, first.onset + at[k] + 1e-9) - 1)
-    assert drawn.torque[0, k] == size[row]
-    assert np.isnan(drawn.torque).any(axis=1).sum() == 1  # the last event is close to the end
-    over_time = contact_figure(scored)
-    assert len(over_time.labelled) == 4 and len(over_time.found) == 3
-    assert over_time.masked == over_time.outside == [] and over_time.force is None
-    assert [begin for begin, _ in over_time.found] == [event.alarm for event in events if event.found]
-    assert [joint.name for joint in over_time.joints] == scored.subject.finger.joint_names
+    assert rows.heat.values[0, k] == pytest.approx(size[row])
+    assert np.isnan(rows.heat.values).any(axis=1).sum() == 1  # the last event is close to the end
+    over_time = contact_sheet(scored)
+    *torques, detection = over_time.panels
+    bars = {curve.style: curve.x.reshape(-1, 3)[:, :2] for curve in detection.curves}  # begin and end of each
+    assert {style: len(stretches) for style, stretches in bars.items()} == {"label": 4, "alarm": 3}
+    assert len(torques) == 2 and all(len(panel.stripes["label_stripe"]) == 4 for panel in torques)
+    assert bars["alarm"][:, 0].tolist() == [event.alarm for event in events if event.found]
+    assert [name for _, name in over_time.keys[:4]] == scored.subject.finger.joint_names
     assert scored.roc is not None
-    curve = roc_figure(scored, scored.roc)
-    assert curve.factors[curve.own] == 1.0 and curve.found[curve.own] == 0.75 and curve.rate[curve.own] == 0.0
-    assert np.all(curve.found_low <= curve.found) and np.all(curve.rate <= curve.rate_high)
-    late = delay_figure(scored)
-    assert late.share.tolist() == [0.25, 0.5, 0.75] and late.delays.tolist() == drawn.delay[:3].tolist()
+    against, over = roc_sheet(scored, scored.roc).panels
+    own, found, rate = against.dots[2], against.bars[0], against.bars[1]
+    assert (own.x.tolist(), own.y.tolist()) == ([0.0], [75.0])
+    assert over.curves[0].y[over.curves[0].x.tolist().index(1.0)] == 75.0
+    assert np.all(found.low <= against.curves[0].y) and np.all(against.curves[0].x <= rate.high)
+    late = delay_sheet(scored).panels[0].curves[0]
+    assert late.y[2::2].tolist() == [25.0, 50.0, 75.0]
+    assert late.x[2::2].tolist() == pytest.approx(1e3 * delay[:3])
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

@@ -4,32 +4,33 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from pathlib import Path
+import math
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
-from tendonfmu.drawing.panel_data import Curve, MatrixPanel, Panel, Sheet
-from tendonfmu.drawing.panel_styles import STYLES, size_of
-from tendonfmu.drawing.panels import draw_panel, png, write_sheet
+from tendonfmu.drawing.panel import STYLES, Curve, Panel, Sheet
 from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import native
 from tendonfmu.model.friction_places import Effect, effects
-from tendonfmu.report import fit_law_figures
-from tendonfmu.report.fit_error_figures import (
+from tendonfmu.report import fit_laws
+from tendonfmu.report.fit_figures import (
+    SHOWN,
     correlation,
     correlation_sheet,
     error_sheet,
+    fit_sheets,
     relative_error,
+    residual_sheets,
     strongest_pairs,
+    torque_sheets,
 )
-from tendonfmu.report.fit_figures import SHOWN, fit_sheets, residual_sheets, rms, torque_sheets
-from tendonfmu.report.fit_law_figures import law_sheets
+from tendonfmu.report.fit_laws import law_sheets
+from tendonfmu.report.numbers import rms
 
 MM, PERCENT, MILLI = 1e3, 1e2, 1e3
 
@@ -44,10 +45,9 @@ def sheets(picture: FitPicture) -> list[Sheet]:
     return fit_sheets(picture)
 
 
-def curve(panel: Panel | MatrixPanel, style: str) -> Curve:
-    assert isinstance(panel, Panel)
-    (found,) = [each for each in panel.curves if each.style == style]
-    return found
+def curve(panel: Panel, style: str) -> Curve:
+    (drawn,) = [one for one in panel.curves if one.style == style]
+    return drawn
 
 
 # --- torque over time -------------------------------------------------------------------------------------------------
@@ -65,7 +65,6 @@ def test_torque_over_time_is_that_of_the_recording(picture: FitPicture) -> None:
             np.testing.assert_allclose(measured.y, MILLI * series.torque[rows, j])
             np.testing.assert_allclose(measured.y - predicted.y, MILLI * series.residual[rows, j], atol=1e-9)
             np.testing.assert_allclose(predicted.y - bias.y, MILLI * series.model_torque[rows, j], atol=1e-9)
-            assert isinstance(panel, Panel)
             share = rms(measured.y - predicted.y) / rms(measured.y)
             assert panel.note == f"residual {100 * share:.0f} % of torque"
 
@@ -108,7 +107,7 @@ def test_residual_over_angle_and_velocity_shows_what_is_in_it(picture: FitPictur
     noise = np.random.default_rng(3).normal(scale=1e-3, size=series.torque.shape)
     planted = dataclasses.replace(series, residual=0.01 * series.joint_speed + noise)
     sheet = next(iter(residual_sheets(dataclasses.replace(picture, series=[planted]))))
-    velocity = [panel for panel in sheet.panels if isinstance(panel, Panel) and panel.title.endswith("velocity")]
+    velocity = [panel for panel in sheet.panels if panel.title.endswith("velocity")]
     assert len(velocity) == 4
     for panel in velocity:
         middle = curve(panel, "median")
@@ -130,7 +129,6 @@ def test_residual_of_contact_and_faults_is_not_shown(picture: FitPicture) -> Non
     wild[3000:3010], angle[3000:3010] = np.nan, np.nan
     changed = dataclasses.replace(series, residual=wild, used=used, joint_angle=angle)
     for panel in next(iter(residual_sheets(dataclasses.replace(picture, series=[changed])))).panels:
-        assert isinstance(panel, Panel)
         assert np.max(np.abs(curve(panel, "median").y)) < 100.0
         assert np.isfinite(panel.bands[0].high).all()
 
@@ -139,10 +137,8 @@ def test_recordings_stand_end_to_end(picture: FitPicture) -> None:
     one = picture.series[0]
     sheet = next(iter(residual_sheets(dataclasses.replace(picture, series=[one, one]))))
     panel = sheet.panels[0]
-    assert isinstance(panel, Panel)
     assert curve(panel, "median").x[-1] == pytest.approx(120.0, abs=2.0)
-    assert [round(begin) for begin, _ in panel.stripes] == [40, 100]
-    assert "2 recordings" in sheet.title
+    assert [round(begin) for begin, _ in panel.stripes["held_out"]] == [40, 100]
 
 
 # --- friction laws ----------------------------------------------------------------------------------------------------
@@ -183,8 +179,7 @@ def test_a_law_is_drawn_as_the_model_has_it() -> None:
     torque = (outputs["friction_torque"] - outputs["bias_torque"])[:, 0]
     np.testing.assert_allclose(drawn.y[np.abs(drawn.x) > 0.0201], MILLI * torque, rtol=1e-9)
     assert (drawn.y[np.abs(drawn.x) < 0.0199] == 0.0).all()
-    panel = sheet.panels[0]
-    assert isinstance(panel, Panel) and panel.stripes == ((-0.02, 0.02),)
+    assert sheet.panels[0].stripes == {"standstill": [(-0.02, 0.02)]}
 
 
 def bare_picture(
@@ -255,7 +250,7 @@ def test_no_friction_below_zero(picture: FitPicture) -> None:
     wide = dataclasses.replace(picture, covariance=1e4 * picture.covariance)
     for sheet in law_sheets(wide):
         for panel in sheet.panels:
-            assert isinstance(panel, Panel) and panel.y_limits is not None
+            assert panel.y_limits is not None
             highest = max(float(each.y.max()) for each in panel.curves if each.style in ("fitted", "slow", "start"))
             assert panel.y_limits[1] <= 2.8 * highest  # a hopeless band leaves the panel, the curves stay readable
             for band in panel.bands:
@@ -267,7 +262,7 @@ def test_every_law_has_its_panel(picture: FitPicture, sheets: list[Sheet]) -> No
     laws = [sheet for sheet in sheets if sheet.section == "laws"]
     assert [sheet.name for sheet in laws] == ["laws_joints", *(f"laws_tendon_{i}" for i in range(1, 9))]
     assert sum(len(sheet.panels) for sheet in laws) == len(effects(picture.fitted)) == 44
-    notes = [panel.note for sheet in laws for panel in sheet.panels if isinstance(panel, Panel)]
+    notes = [panel.note for sheet in laws for panel in sheet.panels]
     known, of = np.array([[int(x) for x in note.split(" ")[0].split("/")] for note in notes]).sum(axis=0)
     covers = [entry for entry in picture.report["parameters"] if ".cover." in entry["path"]]
     assert of == picture.report["identified"]["of"] - len(covers)
@@ -275,7 +270,7 @@ def test_every_law_has_its_panel(picture: FitPicture, sheets: list[Sheet]) -> No
 
 
 def test_what_is_not_drawn_is_said(picture: FitPicture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fit_law_figures, "LAWS_DRAWN", 10)
+    monkeypatch.setattr(fit_laws, "LAWS_DRAWN", 10)
     drawn = list(law_sheets(picture))
     assert sum(len(sheet.panels) for sheet in drawn) == 10
     assert all("34 further laws" in sheet.caption for sheet in drawn)
@@ -298,7 +293,6 @@ def test_directions_differ_where_the_law_does() -> None:
 
 def test_every_number_has_its_dot(picture: FitPicture) -> None:
     (panel,) = error_sheet(picture).panels
-    assert isinstance(panel, Panel)
     counts = {dots.style: len(dots.x) for dots in panel.dots}
     known = picture.report["identified"]
     assert counts == {"identified": known["count"], "unidentified": known["of"] - known["count"]}
@@ -315,7 +309,7 @@ def test_numbers_without_an_error_lie_at_the_end(picture: FitPicture) -> None:
     second["value"], second["identified"] = 0.0, False
     assert relative_error(first) == relative_error(second) == float("inf")
     (panel,) = error_sheet(dataclasses.replace(picture, report=report)).panels
-    assert isinstance(panel, Panel) and panel.x_limits is not None
+    assert panel.x_limits is not None
     assert sum(np.count_nonzero(dots.x == panel.x_limits[1]) for dots in panel.dots) == 2
 
 
@@ -337,7 +331,7 @@ def test_correlation_without_variance_is_zero() -> None:
 
 
 def test_groups_cover_the_matrix(picture: FitPicture) -> None:
-    """Unknowns in any order end up grouped by joint, then tendon; small groups share a name."""
+    """Unknowns in any order end up grouped by joint, then tendon; small groups share a name; neighbours are pooled."""
     mixed = np.random.default_rng(5).permutation(len(picture.unknowns))
     shuffled = dataclasses.replace(
         picture,
@@ -346,15 +340,15 @@ def test_groups_cover_the_matrix(picture: FitPicture) -> None:
     )
     for each in (picture, shuffled):
         (panel,) = correlation_sheet(each).panels
-        assert isinstance(panel, MatrixPanel)
-        assert [begin for _, begin, _ in panel.groups[1:]] == [end for _, _, end in panel.groups[:-1]]
-        assert (panel.groups[0][1], panel.groups[-1][2]) == (0, len(picture.unknowns))
-        assert [name for name, _, _ in panel.groups] == ["mcp_abduction … dip_flexion", *picture.tendon_names]
-        (name, begin, end) = panel.groups[3]
-        assert end - begin == sum(unknown.path.startswith("tendons[3].") for unknown in picture.unknowns), name
-
-
-# --- drawing ----------------------------------------------------------------------------------------------------------
+        assert panel.heat is not None
+        count = len(picture.unknowns)
+        assert (
+            panel.heat.values.shape == (math.ceil(count / 2), math.ceil(count / 2))
+            and (np.diag(panel.heat.values) == 100).all()
+        )
+        assert [name for _, name in panel.y_ticks] == ["mcp_abduction … dip_flexion", *picture.tendon_names]
+        fourth = panel.borders[4] - panel.borders[3]
+        assert 2 * fourth == sum(unknown.path.startswith("tendons[3].") for unknown in picture.unknowns)
 
 
 def test_every_style_is_known(sheets: list[Sheet]) -> None:
@@ -362,36 +356,5 @@ def test_every_style_is_known(sheets: list[Sheet]) -> None:
     for sheet in sheets:
         for panel in sheet.panels:
             assert panel.alt and panel.title
-            if isinstance(panel, Panel):
-                used |= {each.style for each in (*panel.curves, *panel.bands, *panel.dots)} | {panel.stripe_style}
+            used |= {part.style for part in (*panel.curves, *panel.bands, *panel.dots)} | set(panel.stripes)
     assert used <= set(STYLES)
-
-
-@pytest.mark.long
-def test_panels_are_drawn(sheets: list[Sheet], tmp_path: Path) -> None:
-    """One sheet of each kind: not blank, as large as said, the same bytes again."""
-    kinds = {sheet.section: sheet for sheet in sheets}
-    assert set(kinds) == {"torque", "residual", "laws", "errors", "correlation"}
-    for sheet in kinds.values():
-        pixels = [draw_panel(panel) for panel in sheet.panels]
-        for panel, drawn in zip(sheet.panels, pixels, strict=True):
-            width, height = size_of(panel)
-            assert drawn.shape == (height * 3 // 2, width * 3 // 2, 3)
-            assert 0.01 < np.mean(drawn < 250) < 0.6
-        file = tmp_path / f"{sheet.name}.png"
-        write_sheet(sheet, pixels, file)
-        read = imread(file)
-        assert read.shape[0] > pixels[0].shape[0] and read.shape[1] >= pixels[0].shape[1]
-    panel = kinds["laws"].panels[0]
-    assert png(draw_panel(panel)) == png(draw_panel(panel))
-
-
-def test_names_may_hold_anything(picture: FitPicture) -> None:
-    """Dollar signs and unclosed mathematics, letters without a glyph, and names too long for a panel."""
-    data = copy.deepcopy(dict(picture.fitted))
-    for joint, name in zip(data["joints"], ("$\\frac{", "指", "a" * 200, "_^{$"), strict=True):
-        joint["name"] = name
-    odd = dataclasses.replace(picture, fitted=data)
-    for sheet in (next(iter(torque_sheets(odd))), next(iter(law_sheets(odd))), correlation_sheet(odd)):
-        for panel in sheet.panels:
-            assert draw_panel(panel).size

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
-from plant_rigs import needs_plant
-from repository_paths import ROOT
-from tendonfmu.report.plant_figures import (
+from plant_figures import (
     LoopFigure,
     PreslidingFigure,
     bristle_numbers,
@@ -24,7 +22,10 @@ from tendonfmu.report.plant_figures import (
     presliding_figure,
     truth_figure,
 )
-from tendonfmu.report.rig_drawing import GAP, rig_drawing
+from rig_drawing import GAP, rig_drawing
+
+from plant_rigs import needs_plant
+from repository_paths import ROOT
 from tendonfmu.simulate.rig import Rig, read_rig
 
 RIGS = ROOT / "examples" / "rigs"

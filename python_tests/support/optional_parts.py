@@ -58,8 +58,12 @@ PARTS = {
     "libcosim": _package("our FMUs in libcosim", "libcosimpy", "requirements-coupling.lock"),
     "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "requirements-coupling.lock"),
     "pythonfmu3": _package("FMUs of pythonfmu3", "pythonfmu3", "requirements-coupling.lock"),
-    "fmutool": _program("our FMUs in containers of the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmucontainer"),
-    "fmi-sim": _program("our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"),
+    "fmutool": _program(
+        "our FMUs in containers of the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmucontainer"
+    ),
+    "fmi-sim": _program(
+        "our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"
+    ),
     "java": _program("our FMUs in FMI4j and Maestro", "a Java development kit and Maven", "java"),
     "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
     "knockpy": _package("rivals of the diagnosis", "knockpy", "requirements-diagnosis-peers.lock"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import json
 import re
@@ -10,6 +11,8 @@ import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 
@@ -105,9 +108,16 @@ addEventListener("load", () => {{
 
 
 def figures_of(page: str) -> list[dict[str, Any]]:
-    """The figures that a page draws, as Plotly has them, in its order."""
-    found = re.search(r'id="panels">(.*?)</script>', page)
-    figures: list[dict[str, Any]] = [] if found is None else json.loads(found[1])["figures"]
+    """The figures that a page draws, as Plotly has them, in its order; packed numbers as arrays."""
+    script = re.search(r'id="panels">(.*?)</script>', page)
+
+    def unpacked(node: dict[str, Any]) -> Any:
+        if "bdata" not in node:
+            return node
+        numbers = np.frombuffer(base64.b64decode(node["bdata"]), node["dtype"])
+        return numbers.reshape([int(size) for size in node.get("shape", "-1").split(",")])
+
+    figures: list[dict[str, Any]] = [] if script is None else json.loads(script[1], object_hook=unpacked)["figures"]
     return figures
 
 

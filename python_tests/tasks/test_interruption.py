@@ -23,10 +23,10 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 if os.name != "posix":
     pytest.skip("SKIPPED: signals as POSIX has them", allow_module_level=True)
 
+
 import diagnosis_examples as examples
 from tendonfmu.errors import InputError
-from tendonfmu.report.diagnosis_files import write_diagnosis
-from tendonfmu.report.diagnosis_report import REPORT
+from tendonfmu.report.diagnosis_files import REPORT, write_diagnosis
 from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted
 
 HERE = SUPPORT

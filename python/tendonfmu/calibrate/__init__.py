@@ -12,6 +12,5 @@ if TYPE_CHECKING:
     from . import text
     from .calibration import DIAGNOSIS, Calibration, calibrate
     from .files import PAGE, REPORT, check_folder, write_calibration
-    from .report import rms_of
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -22,7 +22,7 @@ from typing import Any
 
 from tendonfmu.arrays import Data
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
+from tendonfmu.calibrate.report import errors_of, record_next, recording_of, structure_of, tuning_of
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
@@ -41,7 +41,7 @@ from tendonfmu.recordings import (
     read_recording,
     require_noise,
 )
-from tendonfmu.report import diagnosis_page, write_diagnosis
+from tendonfmu.report import diagnosis_page, together, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
 Options = CalibrateOptions  # its name in earlier versions
@@ -339,8 +339,8 @@ class _Run:
         if sum(value**2 for value in after) <= sum(value**2 for value in before):
             return {"finger": fitted.data, "error": error, "warnings": list(fitted.warnings)}
         kept = (
-            f"the new numbers leave an error of {1e3 * rms_of(after):.3g} mN·m on unseen motion, "
-            f"the earlier ones {1e3 * rms_of(before):.3g}: the earlier ones are kept"
+            f"the new numbers leave an error of {1e3 * together(after):.3g} mN·m on unseen motion, "
+            f"the earlier ones {1e3 * together(before):.3g}: the earlier ones are kept"
         )
         return {
             "finger": case.finger.data,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -55,18 +54,12 @@ def errors_of(
 ) -> list[float]:
     """Compute [n] the rms of r on the samples that nothing was fitted to (N·m)."""
     # With `data` None it is that without friction, with the bias of `settings`.
-    found, masks = [], []
-    for each in recordings:
-        left = residuals(settings or {}, each, None).residual if data is None else residual_of(data, each)
-        found.append(left)
-        masks.append((each.held_out if held_out else each.tracked) & np.isfinite(left).all(axis=1))
-    return list(rms(np.concatenate(found), np.concatenate(masks)))
-
-
-def rms_of(values: Sequence[float]) -> float:
-    """Combine the rms of all joints: the root of their mean square."""
-    # values: [n]
-    return math.sqrt(sum(value**2 for value in values) / len(values))
+    residual, masks = [], []
+    for recording in recordings:
+        left = residuals(settings or {}, recording, None).residual if data is None else residual_of(data, recording)
+        residual.append(left)
+        masks.append((recording.held_out if held_out else recording.tracked) & np.isfinite(left).all(axis=1))
+    return list(rms(np.concatenate(residual), np.concatenate(masks)))
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:

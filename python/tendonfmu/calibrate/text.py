@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tendonfmu.calibrate.report import rms_of
 from tendonfmu.files import counted
-from tendonfmu.report import rounded
+from tendonfmu.report import Row, Table, rounded, together
 
 Report = Mapping[str, Any]
-Row = tuple[str, ...]
 
 MODELS = {
     "bias_only": "no friction model, the bias alone",
@@ -23,7 +21,7 @@ MODELS = {
 
 def verdict(report: Report) -> tuple[str, str]:
     """Judge a calibration."""
-    before, after = (rms_of(report["error"][name]) for name in (_first(report), "calibrated"))
+    before, after = (together(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
     error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
@@ -57,7 +55,7 @@ def per_hour(report: Report) -> str:
 def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     """Yield (value, unit, meaning), the most important first."""
     error, detection = report["error"], report["detection"]
-    before, after = (mnm(rms_of(error[name])) for name in (_first(report), "calibrated"))
+    before, after = (mnm(together(error[name])) for name in (_first(report), "calibrated"))
     data = "held-out parts" if error["held_out"] else "test recordings"
     yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
     yield f"≤ {per_hour(report)}", "per hour", f"false alarms, with {100 * detection['confidence']:.0f} % confidence"
@@ -74,7 +72,7 @@ def error_rows(report: Report) -> list[Row]:
     """Return a row per model: rms by joint, and of all joints together (mN·m)."""
     error = report["error"]
     return [
-        (words, *(mnm(value) for value in error[name]), mnm(rms_of(error[name])))
+        (words, *(mnm(value) for value in error[name]), mnm(together(error[name])))
         for name, words in MODELS.items()
         if name in error
     ]
@@ -162,7 +160,7 @@ def lines(report: Report) -> Iterator[str]:
         yield f"record next: {sentence}"
 
 
-def tables(report: Report) -> Iterator[tuple[str, Row, list[Row]]]:
+def tables(report: Report) -> Iterator[Table]:
     """Yield the tables."""
     yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
     if report["structure"]["causes"]:

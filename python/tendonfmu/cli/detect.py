@@ -37,7 +37,7 @@ def tune(
     from tendonfmu.estimate import check_outputs
     from tendonfmu.files import report_text, write_text
     from tendonfmu.interface import tune as tune_finger
-    from tendonfmu.report import tune_files, tune_text
+    from tendonfmu.report import tune_text, write_tune_figures
 
     check_outputs(output, report, figures, [finger, *recordings])
     try:
@@ -58,7 +58,7 @@ def tune(
     print_tables(tune_text.tables(tuning), tune_text.lines(tuning), left="joint")
     say(f"{output}: {options.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
-        say_files(tune_files.write_figures(tuning, figures))
+        say_files(write_tune_figures(tuning, figures))
 
 
 @command(ScoreOptions, reads=("model", "recordings"), after={"figures": "force"})
@@ -81,7 +81,7 @@ def score(
     from tendonfmu.files import report_text
     from tendonfmu.interface import ScoreWarning
     from tendonfmu.interface import score as score_finger
-    from tendonfmu.report import score_files, score_text
+    from tendonfmu.report import score_text
 
     check_outputs(output, None, figures, [model, *recordings])
     with progress_bar("runs", progress) as show, warnings.catch_warnings():
@@ -95,4 +95,6 @@ def score(
     print_tables(score_text.tables(result.scored), score_text.lines(result.scored), left="")
     say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")
     if figures is not None:
-        say_files(score_files.write_figures(result.scored, figures))
+        from tendonfmu.report import write_score_figures
+
+        say_files(write_score_figures(result.scored, figures))

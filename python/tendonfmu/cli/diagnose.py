@@ -106,7 +106,7 @@ def _history(
     from tendonfmu.estimate import check_given_once
     from tendonfmu.files import check_output_folder
     from tendonfmu.model import read_finger
-    from tendonfmu.report import Names, history_report, history_text, write_history
+    from tendonfmu.report import Names, headline, history_report, rows_of_lines, write_history
     from tendonfmu.tasks import workers_of
 
     check_given_once(recordings, reference, "the reference")
@@ -131,8 +131,8 @@ def _history(
     names = Names(tuple(given.joint_names), tuple(given.tendon_names))
     written = write_history(history, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
-    rows = list(history_text.rows_of_lines(history, names))
-    print_tables([(history.finger, headings, rows)] if rows else (), [history_text.headline(history)], left="trend")
+    rows = list(rows_of_lines(history, names))
+    print_tables([(history.finger, headings, rows)] if rows else (), [headline(history)], left="trend")
     for name, why in history.failed:
         warn(f"{name}: left out: {why}")
     say_files(written)

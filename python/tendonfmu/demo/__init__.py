@@ -6,8 +6,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .demo import Story
-    from .page import write_story
-    from .report import story_report
+    from .page import story_report, write_story
     from .text import chapter_lines, chapter_tables, file_lines
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

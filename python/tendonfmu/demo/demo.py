@@ -21,10 +21,12 @@ from importlib.resources import as_file
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tendonfmu.demo.figures import compensated_sheet
 from tendonfmu.demo.run import DATA, IndexFinger
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
 from tendonfmu.files import check_output_folder
+from tendonfmu.report import drawn, write_figures
 from tendonfmu.tasks import PhaseState
 
 if TYPE_CHECKING:
@@ -65,14 +67,14 @@ class Story:
         self.folder = folder
         self.finger = IndexFinger(folder)
         self._files: dict[Path, str] = {}
-        told = (
+        all_chapters = (
             Chapter("calibrate", "From free motion to a tuned FMU", self._calibrate),
             Chapter("detect", "Contact without a touch sensor", self._detect),
             Chapter("diagnose", "What the model got wrong, and why", self._diagnose),
             Chapter("fit", "Its numbers alone, and how well they are known", self._fit),
             Chapter("run", "What the joints feel, friction subtracted", self._run),
         )
-        self.chapters = [each for each in told if HAS_ESTIMATION or each.name not in ESTIMATING]
+        self.chapters = [chapter for chapter in all_chapters if HAS_ESTIMATION or chapter.name not in ESTIMATING]
         self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
 
     @property
@@ -94,11 +96,11 @@ class Story:
         folder = self.folder / CALIBRATION
         forget_steps(folder)  # of an earlier demo: this one shows every step
         with as_file(DATA) as data:
-            found = calibrate(data / TWO_JOINTS, [data / TRAINING], folder, tests=[data / UNSEEN], progress=show)
-        assert found.diagnosis is not None, "no step was there to be repeated"
-        self.calibration, self.diagnosis = found, found.diagnosis
+            calibration = calibrate(data / TWO_JOINTS, [data / TRAINING], folder, tests=[data / UNSEEN], progress=show)
+        assert calibration.diagnosis is not None, "no step was there to be repeated"
+        self.calibration, self.diagnosis = calibration, calibration.diagnosis
         phase("writing", 0, None)
-        self._files |= write_calibration(found, folder)
+        self._files |= write_calibration(calibration, folder)
 
     def _detect(self, phase: Phase) -> None:
         self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
@@ -125,3 +127,5 @@ class Story:
 
     def _run(self, phase: Phase) -> None:
         self.finger.free_motion(lambda done, total: phase("running the FMU", done, total))
+        (figure,) = write_figures(drawn([compensated_sheet(self.finger)]), self.folder)
+        self.finger.files[figure] = "torques, what is left of them, contacts"

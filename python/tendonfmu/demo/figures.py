@@ -1,77 +1,58 @@
-"""The figures of the demo's page: torques of the index finger, errors of the two-joint finger."""
+"""The figures of the demo: torques of the index finger, errors of the two-joint finger."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.calibrate import rms_of
-from tendonfmu.demo.demo import Story
-from tendonfmu.demo.run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES
-from tendonfmu.drawing import Bars, Curve, Dots, Interval, Panel, Sheet
-from tendonfmu.report import CompensationFigure, JointCurves, law_sheets, residual_tables, torque_sheets
+from tendonfmu.demo.run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES, Curves, IndexFinger
+from tendonfmu.drawing import Bars, Curve, Dots, Interval, Panel, Sheet, line_of
+from tendonfmu.estimate import FitPicture
+from tendonfmu.report import column, law_sheets, residual_tables, together, torque_sheets
 
-SHOWN = (20.0, 40.0)  # s
-_HEIGHT = 270  # CSS pixels
-
-
-def story_sheets(story: Story) -> Iterator[Sheet]:
-    """Yield all figures except those of the diagnosis, each in the section of its chapter."""
-    yield _push_sheet(story)
-    yield _free_sheet(story)
-    if story.missing:
-        return
-    yield _calibration_sheet(story)
-    yield _error_sheet(story)
-    yield from _fit_sheets(story)
+SHOWN = (20.0, 40.0)  # s, on the page
+_TORQUE, _LEFT = {"measured": "measured", "predicted": "predicted"}, {"compensated": "after"}
+_TORQUE_KEYS = (("measured", "joint torque due to the tendons"), ("predicted", "friction and bias, predicted"))
 
 
 # --- the index finger: detect and run ---------------------------------------------------------------------------------
 
 
-def _free_sheet(story: Story) -> Sheet:
-    finger = story.finger
-    titles = {FREE: "free motion", FREE_X4: "the same motion, tendons pulled tighter"}
-    figures = [
-        finger.curves(name, [FLEXION], f"{title}, {finger.results[name].mean_force:.0f} N")
-        for name, title in titles.items()
-    ]
-    shown = [_during(figure, SHOWN) for figure in figures]
-    panels = [
-        _panel(
-            figure,
-            figure.joints[0],
-            samples,
-            figure.title,
-            f"Joint {FLEXION.replace('_', ' ')}, {figure.title}: measured torque, the FMU's prediction, and "
-            "what is left",
-            ("measured", "predicted", "compensated"),
-        )
-        for figure, samples in zip(figures, shown, strict=True)
-    ]
-    keys = (("measured", "joint torque due to the tendons"), ("predicted", "friction and bias, predicted"))
-    return Sheet("run", "run", "", "", (*keys, ("after", "what is left of it")), tuple(panels))
+def run_sheet(finger: IndexFinger) -> Sheet:
+    """Draw free motion at both pretensions."""
+    panels = []
+    for name, motion in ((FREE, "free motion"), (FREE_X4, "the same motion, tendons pulled tighter")):
+        title = f"{motion}, {finger.results[name].mean_force:.0f} N"
+        alt = f"Joint {_spaced(FLEXION)}, {title}: measured torque, the FMU's prediction, and what is left"
+        panels.append(_panel(finger.curves(name, FLEXION), _TORQUE | _LEFT, title, alt, "free", SHOWN))
+    return Sheet("run", "run", "", "", (*_TORQUE_KEYS, ("after", "what is left of it")), tuple(panels))
 
 
-def _push_sheet(story: Story) -> Sheet:
-    figure = story.finger.curves(PUSHES, [ABDUCTION, FLEXION], "pushes")
-    samples = _during(figure, SHOWN)
-    panels = [
-        _panel(
-            figure,
-            joint,
-            samples,
-            joint.name.replace("_", " "),
-            f"Joint {joint.name.replace('_', ' ')} while the fingertip is pushed: what is left of the torque, the "
-            "external torque as a sensor measures it, and when contact is reported",
-            ("external", "compensated"),
-            pushes=True,
+def push_sheet(finger: IndexFinger) -> Sheet:
+    """Draw what is left of the torque while the fingertip is pushed, and when contact is reported."""
+    panels = []
+    for joint in (ABDUCTION, FLEXION):
+        curves, name = finger.curves(PUSHES, joint), _spaced(joint)
+        alt = (
+            f"Joint {name} while the fingertip is pushed: what is left of the torque, the external torque as a sensor "
+            "measures it, and when contact is reported"
         )
-        for joint in figure.joints
-    ]
+        panel = _panel(curves, {"external": "slow"} | _LEFT, name, alt, "pushes", SHOWN)
+        low, high = panel.y_limits or (0.0, 0.0)
+        alarms = _within([*curves.found, *curves.false], SHOWN)
+        below = low - 0.05 * (high - low)
+        panels.append(
+            replace(
+                panel,
+                curves=(*panel.curves, Curve("negative", *line_of(alarms, below))),
+                stripes={"standstill": _within(curves.labelled, SHOWN)},
+                y_limits=(below - 0.05 * (high - low), high),
+            )
+        )
     keys = (
         ("after", "joint torque, friction subtracted"),
         ("slow", "external torque, by a reference sensor that the FMU does not have"),
@@ -81,92 +62,107 @@ def _push_sheet(story: Story) -> Sheet:
     return Sheet("detect", "detect", "", "", keys, tuple(panels))
 
 
-_STYLES = {"measured": "measured", "predicted": "predicted", "compensated": "after", "external": "slow"}
+def compensated_sheet(finger: IndexFinger) -> Sheet:
+    """Draw all three recordings whole: torques above, what is left of them below (the paper's figs. 6 to 8)."""
+    drawn = [
+        ("(a) free motion", FREE, FLEXION),
+        ("(b) the same motion", FREE_X4, FLEXION),
+        ("(c) with pushes", PUSHES, ABDUCTION),
+        ("(d) with pushes", PUSHES, FLEXION),
+    ]
+    panels: list[Panel] = []
+    for k in (0, 2):  # panels are side by side in pairs
+        pair = [(title, name, finger.curves(name, joint)) for title, name, joint in drawn[k : k + 2]]
+        shown = (0.0, float(pair[0][2].time[-1]))
+        for title, name, curves in pair:
+            heading = f"{title}, {finger.results[name].mean_force:.0f} N: {curves.joint}"
+            panels.append(_panel(curves, _TORQUE, heading, heading, "", shown))
+        for title, _, curves in pair:
+            left = {"external": "external"} | _LEFT if "external" in curves.torques else _LEFT
+            stripes = {"found_stripe": curves.found, "false_stripe": curves.false}
+            panels.append(replace(_panel(curves, left, "what is left", title, "", shown), stripes=stripes))
+    pushes = finger.curves(PUSHES, FLEXION)
+    bars = (("found_bar", pushes.found, 0), ("false_bar", pushes.false, 0), ("missed", pushes.labelled, 1))
+    contacts = Panel(
+        title="contact with pushes",
+        alt="When contact is found, and when it is labelled",
+        x_label="time (s)",
+        y_label="",
+        size="medium",
+        height=150,
+        curves=tuple(Curve(style, *line_of(spans, row)) for style, spans, row in bars),
+        rows=("found", "labelled"),
+        x_limits=(0.0, float(pushes.time[-1])),
+    )
+    keys = (
+        ("measured", "measured joint torque"),
+        ("predicted", "predicted friction and bias"),
+        ("after", "compensated torque"),
+        ("external", "external torque (sensor)"),
+        ("found_stripe", "contact found"),
+        ("false_stripe", "found without a push"),
+        ("missed", "contact labelled"),
+    )
+    title = f"{finger.description.name}: friction compensation"
+    return Sheet("compensated", "compensated", title, "", keys, (*panels, contacts))
 
 
-def _panel(
-    figure: CompensationFigure,
-    joint: JointCurves,
-    samples: NDArray[np.bool_],
-    title: str,
-    alt: str,
-    drawn: Sequence[str],
-    *,
-    pushes: bool = False,
-) -> Panel:
-    time = figure.time[samples]
-    values = {name: 1e3 * np.asarray(getattr(joint, name), dtype=float)[samples] for name in drawn}
-    curves = [Curve(_STYLES[name], time, each) for name, each in values.items()]
-    low, high = (function([function(each) for each in values.values()]) for function in (np.min, np.max))
-    room = 0.06 * float(high - low)
-    limits = (float(low) - (3 if pushes else 1) * room, float(high) + room)
-    if pushes:
-        curves += _alarm([*figure.found, *figure.false], limits[0] + room)
+def _panel(curves: Curves, styles: Mapping[str, str], title: str, alt: str, zoom: str, shown: Interval) -> Panel:
+    """Draw some of the torques of a joint over a span of time."""
+    samples = (curves.time >= shown[0]) & (curves.time <= shown[1])
+    torques = {name: 1e3 * np.asarray(curves.torques[name], dtype=float)[samples] for name in styles}
+    low, high = (float(end([end(torque) for torque in torques.values()])) for end in (np.min, np.max))
+    room = 0.06 * (high - low)
     return Panel(
         title=title,
         alt=alt,
         x_label="time (s)",
         y_label="torque (mN·m)",
         size="medium",
-        curves=tuple(curves),
-        stripes=tuple(_within(figure.labelled or [], SHOWN)) if pushes else (),
-        stripe_style="standstill",
-        x_limits=SHOWN,
-        y_limits=limits,
-        height=_HEIGHT,
-        zoom="pushes" if pushes else "free",
+        curves=tuple(Curve(styles[name], curves.time[samples], torque) for name, torque in torques.items()),
+        x_limits=shown,
+        y_limits=(low - room, high + room),
+        height=270,
+        zoom=zoom,
     )
 
 
-def _during(figure: CompensationFigure, span: Interval) -> NDArray[np.bool_]:
-    return np.asarray((figure.time >= span[0]) & (figure.time <= span[1]))
+def _within(spans: Sequence[Interval], shown: Interval) -> list[Interval]:
+    begin, end = shown
+    return [(max(first, begin), min(last, end)) for first, last in spans if last > begin and first < end]
 
 
-def _within(spans: Sequence[Interval], shown: Interval) -> Iterator[Interval]:
-    for begin, end in spans:
-        if end > shown[0] and begin < shown[1]:
-            yield max(begin, shown[0]), min(end, shown[1])
-
-
-def _alarm(spans: Sequence[Interval], height: float) -> list[Curve]:
-    """Draw a line at this height wherever contact is reported."""
-    ends = [np.array([begin, end]) for begin, end in _within(spans, SHOWN)]
-    return [Curve("negative", each, np.full(2, height)) for each in ends]
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
 
 
 # --- the two-joint finger: calibrate and fit --------------------------------------------------------------------------
 
 
-def _calibration_sheet(story: Story) -> Sheet:
+def calibration_sheet(report: Mapping[str, Any]) -> Sheet:
     """Draw the error before and after the calibration, by joint."""
-    report = story.calibration.report
     names = [*report["joints"], "all joints"]
-    none, before, after = (
-        1e3 * np.array([*report["error"][model], rms_of(report["error"][model])])
-        for model in ("bias_only", "as_given", "calibrated")
-    )
-    panel = _error_panel("On a recording that it has not seen", "mN·m", names, none, before, after)
+    models = ("bias_only", "as_given", "calibrated")
+    errors = [1e3 * np.array([*report["error"][model], together(report["error"][model])]) for model in models]
+    panel = _error_panel("On a recording that it has not seen", "mN·m", names, *errors)
     keys = (("floor", "no friction model"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
     return Sheet("calibrate", "calibrate_error", "", "", keys, (panel,))
 
 
-def _error_sheet(story: Story) -> Sheet:
-    """Draw the error before and after the fit, by joint."""
-    tables = list(residual_tables(story.fit.picture()))
+def fit_sheets(picture: FitPicture) -> Iterator[Sheet]:
+    """Draw the errors before and after the fit, the torque that was not trained on, and the friction in the joints."""
     panels = []
-    for table, title in zip(tables, ("On the training recording", "On a recording that it has not seen"), strict=True):
+    titles = ("On the training recording", "On a recording that it has not seen")
+    for table, title in zip(residual_tables(picture), titles, strict=True):
         rows = table.rows[:-1]
-        none, before, after = (
-            np.array([np.nan if value is None else value for value in values])
-            for values in (
-                [row.bias_only for row in rows],
-                [row.start for row in rows],
-                [row.fitted for row in rows],
-            )
-        )
-        panels.append(_error_panel(title, table.unit, [row.name for row in rows], none, before, after))
+        errors = [np.array(column([getattr(row, key) for row in rows])) for key in ("bias_only", "start", "fitted")]
+        panels.append(_error_panel(title, table.unit, [row.name for row in rows], *errors))
     keys = (("floor", "no friction model"), ("before_dots", "before the fit"), ("after_dots", "fitted"))
-    return Sheet("fit", "fit_error", "", "", keys, tuple(panels))
+    yield Sheet("fit", "fit_error", "", "", keys, tuple(panels))
+    *_, unseen = torque_sheets(picture)
+    yield Sheet("fit", "fit_torque", "", "", unseen.keys, unseen.panels)
+    joints = next(sheet for sheet in law_sheets(picture) if sheet.name == "laws_joints")
+    yield Sheet("fit", "fit_laws", "", "", joints.keys, joints.panels)
 
 
 def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, before: Numbers, after: Numbers) -> Panel:
@@ -183,17 +179,7 @@ def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, bef
             Dots("before_dots", before, places),
             Dots("after_dots", after, places),
         ),
-        rows=tuple(name.replace("_", " ") for name in names),
+        rows=tuple(map(_spaced, names)),
         x_limits=(0.0, 1.08 * float(np.nanmax([*before, *after, *none]))),
         height=110 + 30 * len(names),
     )
-
-
-def _fit_sheets(story: Story) -> Iterator[Sheet]:
-    """Draw the torque over time of the recording that was not trained on, and the friction in the joints."""
-    picture = story.fit.picture()
-    *_, unseen = torque_sheets(picture)
-    yield Sheet("fit", "fit_torque", "", "", unseen.keys, unseen.panels)
-    for sheet in law_sheets(picture):
-        if sheet.name == "laws_joints":
-            yield Sheet("fit", "fit_laws", "", "", sheet.keys, sheet.panels)

@@ -1,8 +1,9 @@
-"""The page of the demo: its chapters with their figures, in one self-contained HTML file."""
+"""The page of the demo, its chapters with their figures in one HTML file, and what `tendonfmu demo --json` prints."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from markupsafe import Markup
@@ -11,54 +12,60 @@ from tendonfmu.calibrate import DIAGNOSIS
 from tendonfmu.calibrate import PAGE as CALIBRATION_PAGE
 from tendonfmu.calibrate import text as calibration_text
 from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
-from tendonfmu.demo.figures import story_sheets
-from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES
-from tendonfmu.demo.text import Table, alarms, chapter_tables, detection_sentence, fit_sentence
+from tendonfmu.demo.figures import calibration_sheet, fit_sheets, push_sheet, run_sheet
+from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES, RecordingResult
+from tendonfmu.demo.text import alarms, chapter_tables, detection_sentence, fit_sentence
 from tendonfmu.diagnosis import Diagnosis
-from tendonfmu.files import whole_file
+from tendonfmu.files import write_text
 from tendonfmu.report import (
+    Table,
     Tile,
     at_place,
     cards_of,
-    diagnosis_numbers,
     diagnosis_page,
     diagnosis_sheets,
     diagnosis_text,
+    drawn,
     error_sentence,
     fit_page,
     left_sentence,
     names_of,
+    percent,
     render,
     residual_tables,
     rounded,
+    together,
     unit_of,
     waterfall_of,
 )
 
+FORMAT = "tendonfmu-demo-1"
 PAGE = "story.html"
 
 
 def write_story(story: Story) -> None:
     """Write the page with all chapters of a finished story; the file appears whole or not at all."""
     file = story.folder / PAGE
-    text = story_page(story)
-    with whole_file(file) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(file, story_page(story))
     story.add_page(file)
 
 
 def story_page(story: Story) -> str:
     """Return the HTML text of the page."""
-    evidence = [] if story.missing else [each for each in diagnosis_sheets(story.diagnosis) if each.section != "views"]
+    sheets = [push_sheet(story.finger), run_sheet(story.finger)]
+    if not story.missing:
+        evidence = (sheet for sheet in diagnosis_sheets(story.diagnosis) if sheet.section != "views")
+        sheets += [calibration_sheet(story.calibration.report), *fit_sheets(story.fit.picture()), *evidence]
+    names = [chapter.name for chapter in story.chapters]
     return render(
         "story.html.jinja",
-        [*story_sheets(story), *evidence],
+        drawn(sheets),
         chapters=story.chapters,
-        tiles=[(each.name, _tile(story, each.name)) for each in story.chapters],
-        tables={each.name: [_readable(table) for table in chapter_tables(story, each.name)] for each in story.chapters},
+        tiles=[(name, _tile(story, name)) for name in names],
+        tables={name: [_readable(table) for table in chapter_tables(story, name)] for name in names},
         calibrate=None if story.missing else _calibrate(story),
         detect=_detect(story),
-        diagnosis=None if story.missing else _diagnosis(story),
+        diagnosis=None if story.missing else _diagnosis(story.diagnosis),
         fit=None if story.missing else {"sentence": fit_sentence(story), "page": f"{FIT}/{fit_page.PAGE}"},
         run=_run(story),
         missing=story.missing,
@@ -66,12 +73,37 @@ def story_page(story: Story) -> str:
     )
 
 
+def story_report(story: Story) -> dict[str, Any]:
+    """Return the results of a demo that has run."""
+    return {
+        "format": FORMAT,
+        "folder": str(story.folder),
+        "chapters": [{"name": chapter.name, "title": chapter.title} for chapter in story.chapters],
+        "left_out": story.missing or None,
+        "recordings": [_recording(result) for result in story.finger.results.values()],
+        "files": {str(path): what for path, what in story.files.items()},
+    }
+
+
+def _recording(result: RecordingResult) -> dict[str, Any]:
+    events = result.score.events
+    return {
+        "name": result.name,
+        "seconds": result.seconds,
+        "mean_force": result.mean_force,
+        "events": len(events),
+        "found": sum(event.found for event in events),
+        "false_alarms": len(result.score.false_alarms),
+        "joints": [asdict(joint) for joint in result.joints],
+    }
+
+
 def _readable(table: Table) -> Table:
     """Names without underscores."""
     title, headings, rows = table
 
     def spaced(cells: Sequence[str]) -> tuple[str, ...]:
-        return tuple(each.replace("_", " ") for each in cells)
+        return tuple(cell.replace("_", " ") for cell in cells)
 
     return title.replace("_", " "), spaced(headings), [spaced(row) for row in rows]
 
@@ -86,7 +118,7 @@ def _tile(story: Story, chapter: str) -> Tile:
     if chapter == "calibrate":
         return Tile(*next(calibration_text.tiles(story.calibration.report)))
     if chapter == "run":
-        joint = next(each for each in results[FREE].joints if each.name == FLEXION)
+        joint = next(joint for joint in results[FREE].joints if joint.name == FLEXION)
         left = f"{1e3 * joint.measured:.0f} → {1e3 * joint.left:.1f}"
         return Tile(left, "mN·m", "torque at the base of the finger, before and after its friction is subtracted")
     if chapter == "fit":
@@ -99,19 +131,13 @@ def _tile(story: Story, chapter: str) -> Tile:
         return Tile(
             found, "", f"pushes found, without a touch sensor, by a finger calibrated on {MINUTES} min of motion"
         )
-    return _tile_of_cause(story.diagnosis)
-
-
-def _tile_of_cause(found: Diagnosis) -> Tile:
-    factor, unit = unit_of(found)
-    before, after = (
-        rounded(factor * diagnosis_numbers.together(each.test_rms)) for each in (found.nominal, found.extended)
-    )
-    if not found.causes:
+    diagnosis = story.diagnosis
+    factor, unit = unit_of(diagnosis)
+    before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
+    if not diagnosis.causes:
         return Tile(before, unit, "error on an unseen recording; no cause was found")
-    first = found.causes[0]
-    cause = f"{at_place(first.title, first.where, names_of(found))}, found and built in"
-    meaning = f"error on an unseen recording: {diagnosis_numbers.percent(found.gain.value)} less with {cause}"
+    cause = at_place(diagnosis.causes[0].title, diagnosis.causes[0].where, names_of(diagnosis))
+    meaning = f"error on an unseen recording: {percent(diagnosis.gain.value)} less with {cause}, found and built in"
     return Tile(f"{before} → {after}", unit, meaning)
 
 
@@ -151,15 +177,14 @@ def _detect(story: Story) -> dict[str, Any]:
     }
 
 
-def _diagnosis(story: Story) -> dict[str, Any]:
-    found = story.diagnosis
-    names = names_of(found)
+def _diagnosis(diagnosis: Diagnosis) -> dict[str, Any]:
+    names = names_of(diagnosis)
     return {
-        "headline": diagnosis_text.headline(found),
-        "error": error_sentence(found),
-        "left": left_sentence(found),
-        "fall": waterfall_of(found, names),
-        "cards": cards_of(found, names),
-        "tested": found.tested,
+        "headline": diagnosis_text.headline(diagnosis),
+        "error": error_sentence(diagnosis),
+        "left": left_sentence(diagnosis),
+        "fall": waterfall_of(diagnosis, names),
+        "cards": cards_of(diagnosis, names),
+        "tested": diagnosis.tested,
         "page": f"{CALIBRATION}/{DIAGNOSIS}/{diagnosis_page.PAGE}",
     }

@@ -17,18 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Array
 from tendonfmu.detect import DetectionScore, score_detection
 from tendonfmu.files import write_table
 from tendonfmu.fmu import build_fmu, run_fmu
-from tendonfmu.model import NUMBERS, Finger, Instance, read_finger
-from tendonfmu.recordings import Recording, read_recording
-from tendonfmu.report import CompensationFigure, StoryFigure, compensation_figure
+from tendonfmu.model import Finger, Instance, read_finger
+from tendonfmu.recordings import Recording, flagged_stretches, read_recording
+from tendonfmu.report import rms
 
 FINGER, GIVEN = "index_finger_calibrated.json", "index_finger.json"  # after and before the calibration
 MINUTES = 27  # of free motion that it was calibrated on
 FREE, FREE_X4, PUSHES = "index_finger_free", "index_finger_free_x4", "index_finger_pushes"
 ABDUCTION, FLEXION = "mcp_abduction", "mcp_flexion"  # the joints that are drawn
-FMU, FIGURE = "index_finger.fmu", "compensated.png"
+FMU = "index_finger.fmu"
 DATA = files("tendonfmu") / "data"
 
 Outputs = Mapping[str, NDArray[Any]]
@@ -56,6 +57,18 @@ class RecordingResult:
     score: DetectionScore
 
 
+@dataclass(frozen=True)
+class Curves:
+    """One joint of a recording over time, and when contact is found and labelled."""
+
+    joint: str
+    time: Array  # [N] s
+    torques: dict[str, Array]  # measured, predicted, compensated and, where a sensor is, external: [N] N·m
+    found: list[tuple[float, float]]
+    false: list[tuple[float, float]]  # found without a push
+    labelled: list[tuple[float, float]]
+
+
 class IndexFinger:
     """The calibrated index finger in an existing folder: `pushes` runs first, then `free_motion`."""
 
@@ -80,16 +93,28 @@ class IndexFinger:
         self.as_given = score_detection(recording.time, _label(recording), contact)
 
     def free_motion(self, progress: Callable[[int, int], None]) -> None:
-        """Run the FMU over both recordings of free motion, and draw all three recordings."""
+        """Run the FMU over both recordings of free motion."""
         self._run((FREE, FREE_X4), progress)
-        figure = self.folder / FIGURE
-        _draw(self.description, self.results, self._recordings, self._outputs, figure)
-        self.files[figure] = "torques, what is left of them, contacts"
 
-    def curves(self, name: str, joints: Sequence[str], title: str) -> CompensationFigure:
-        """Return the curves of some joints of a recording that has been run."""
-        numbers = [self.description.joint_names.index(joint) for joint in joints]
-        return _curves(self.description, self._recordings[name], self._outputs[name], title, numbers)
+    def curves(self, name: str, joint: str) -> Curves:
+        """Return the curves of a joint in a recording that has been run."""
+        recording, outputs = self._recordings[name], self._outputs[name]
+        number = self.description.joint_names.index(joint)
+        names = {"measured": "joint_torque", "predicted": "friction_torque", "compensated": "compensated_torque"}
+        torques = {key: outputs[f"{column}[{number + 1}]"] for key, column in names.items()}
+        if "external_torque" in recording.groups:
+            torques["external"] = recording.groups["external_torque"][:, number]
+        time, found = recording.time, outputs["contact"].ravel().astype(bool)
+        alarms = self.results[name].score.false_alarms
+        false = np.any([(time >= begin) & (time <= end) for begin, end in alarms] or [np.zeros_like(found)], axis=0)
+        return Curves(
+            joint=joint,
+            time=time,
+            torques=torques,
+            found=flagged_stretches(time, found & ~false),
+            false=flagged_stretches(time, false),
+            labelled=flagged_stretches(time, _label(recording)),
+        )
 
     def _run(self, names: Sequence[str], progress: Callable[[int, int], None]) -> None:
         for name in names:
@@ -110,65 +135,26 @@ def _advance(progress: Callable[[int, int], None], before: int, total: int, done
     progress(before + done, total)
 
 
-def _draw(
-    description: Finger,
-    results: Mapping[str, RecordingResult],
-    recordings: Mapping[str, Recording],
-    outputs: Mapping[str, Outputs],
-    figure: Path,
-) -> None:
-    from tendonfmu.report import draw_story
-
-    def panel(name: str, title: str, joints: Sequence[str]) -> CompensationFigure:
-        numbers = [description.joint_names.index(joint) for joint in joints]
-        title = f"{title}, {results[name].mean_force:.0f} N"
-        return _curves(description, recordings[name], outputs[name], title, numbers)
-
-    free = [panel(FREE, "(a) free motion", [FLEXION]), panel(FREE_X4, "(b) the same motion", [FLEXION])]
-    pushed = panel(PUSHES, "(c) with pushes", [ABDUCTION, FLEXION])
-    story = StoryFigure(f"{description.name}: friction compensation", free, pushed)
-    draw_story(story, figure)
-
-
-def _curves(
-    description: Finger, recording: Recording, outputs: Outputs, title: str, joints: Sequence[int]
-) -> CompensationFigure:
-    measured: dict[str, NDArray[Any]] = recording.arrays()
-    if recording.contact is not None:
-        measured["contact"] = recording.contact
-    series = {each: _rows(outputs, each) for each in NUMBERS} | {"contact": outputs["contact"]}
-    return compensation_figure(description, measured, series, title=title, joints=joints)
-
-
-def _rows(outputs: Outputs, name: str) -> NDArray[Any]:
-    """Join the columns name[1], name[2], ... to [N, n]."""
-    count = sum(column.startswith(f"{name}[") for column in outputs)
-    return np.column_stack([outputs[f"{name}[{i}]"] for i in range(1, count + 1)])
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
-
-
 def _label(recording: Recording) -> NDArray[np.bool_]:
     """Return [N] whether somebody pushes."""
     return np.zeros(len(recording), bool) if recording.contact is None else recording.contact
 
 
 def _result(description: Finger, name: str, recording: Recording, outputs: Outputs) -> RecordingResult:
-    torque, left = _rows(outputs, "joint_torque"), _rows(outputs, "compensated_torque")
     label = _label(recording)
-    external = recording.groups.get("external_torque", np.zeros_like(torque))
-    joints = [
-        JointResult(
-            name=joint,
-            measured=_rms(torque[~label, j]),
-            left=_rms(left[~label, j]),
-            load=_rms(external[label, j]),
-            error=_rms(left[label, j] - external[label, j]),
+    joints = []
+    for j, joint in enumerate(description.joint_names):
+        torque, left = outputs[f"joint_torque[{j + 1}]"], outputs[f"compensated_torque[{j + 1}]"]
+        external = recording.groups["external_torque"][:, j] if label.any() else np.zeros_like(torque)
+        joints.append(
+            JointResult(
+                name=joint,
+                measured=rms(torque[~label]),
+                left=rms(left[~label]),
+                load=rms(external[label]),
+                error=rms(left[label] - external[label]),
+            )
         )
-        for j, joint in enumerate(description.joint_names)
-    ]
     return RecordingResult(
         name=name,
         seconds=float(recording.time[-1] - recording.time[0]),

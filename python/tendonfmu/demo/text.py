@@ -12,6 +12,8 @@ from tendonfmu.demo.run import FREE, FREE_X4, PUSHES, RecordingResult
 from tendonfmu.detect import DetectionScore
 from tendonfmu.report import (
     ResidualTable,
+    Row,
+    Table,
     confusion_sentence,
     diagnosis_text,
     error_sentence,
@@ -20,21 +22,17 @@ from tendonfmu.report import (
     rounded,
 )
 
-Row = tuple[str, ...]
-Table = tuple[str, Row, list[Row]]
 
-
-def chapter_tables(story: Story, chapter: str) -> Iterator[Table]:
-    """Yield the tables of a chapter that has run."""
+def chapter_tables(story: Story, chapter: str) -> list[Table]:
+    """Return the tables of a chapter that has run."""
     results = story.finger.results
     if chapter == "calibrate":
-        yield from calibration_text.tables(story.calibration.report)
+        return list(calibration_text.tables(story.calibration.report))
     if chapter == "run":
-        yield _left(story.finger.description.name, [results[FREE], results[FREE_X4]])
+        return [_left(story.finger.description.name, [results[FREE], results[FREE_X4]])]
     if chapter == "detect":
-        yield _pushed(results[PUSHES])
-    if chapter == "fit":
-        yield _fitted(list(residual_tables(story.fit.picture())))
+        return [_pushed(results[PUSHES])]
+    return [_fitted(list(residual_tables(story.fit.picture())))] if chapter == "fit" else []
 
 
 def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
@@ -53,13 +51,18 @@ def chapter_lines(story: Story, chapter: str) -> Iterator[str]:
         yield f"calibrated: {detection_sentence(results[PUSHES].score)}"
         yield f"as given:   {detection_sentence(story.finger.as_given)}"
     if chapter == "diagnose":
-        yield from cause_lines(story)
+        names = names_of(story.diagnosis)
+        yield diagnosis_text.headline(story.diagnosis)
+        for cause in story.diagnosis.causes:
+            yield f"  {cause.where.effect} at {names.place(cause.where) or 'the whole finger'}: {cause.size}"
+            if confusion := confusion_sentence(cause, names):
+                yield f"  {confusion}"
+        yield error_sentence(story.diagnosis)
 
 
 def file_lines(story: Story) -> Iterator[str]:
     """Yield a line for each file that the demo wrote, with its content."""
-    for path, what in story.files.items():
-        yield f"  {path}  {what}"
+    yield from (f"  {path}  {what}" for path, what in story.files.items())
 
 
 def _motion(result: RecordingResult) -> str:
@@ -68,25 +71,23 @@ def _motion(result: RecordingResult) -> str:
 
 
 def _left(finger: str, results: Sequence[RecordingResult]) -> Table:
-    rows = []
-    for joints in zip(*(result.joints for result in results), strict=True):
-        cells = [f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}" for joint in joints]
-        rows.append((joints[0].name, *cells))
-    title = f"{finger}: joint torque → left after compensation, rms in mN·m"
-    return title, ("", *map(_motion, results)), rows
+    rows = [
+        (joints[0].name, *(_pair(joint.measured, joint.left) for joint in joints))
+        for joints in zip(*(result.joints for result in results), strict=True)
+    ]
+    return f"{finger}: joint torque → left after compensation, rms in mN·m", ("", *map(_motion, results)), rows
 
 
 def _pushed(result: RecordingResult) -> Table:
     rows: list[Row] = [
-        (
-            joint.name,
-            f"{1e3 * joint.measured:.1f} → {1e3 * joint.left:.1f}",
-            f"{1e3 * joint.load:.1f} → {1e3 * joint.error:.1f}",
-        )
-        for joint in result.joints
+        (joint.name, _pair(joint.measured, joint.left), _pair(joint.load, joint.error)) for joint in result.joints
     ]
     headings = ("", "nobody pushes\ntorque → left", "while pushed\nexternal → error")
     return f"pushes on the fingertip, {result.mean_force:.0f} N, rms in mN·m", headings, rows
+
+
+def _pair(before: float, after: float) -> str:
+    return f"{1e3 * before:.1f} → {1e3 * after:.1f}"
 
 
 def _fitted(tables: Sequence[ResidualTable]) -> Table:
@@ -106,7 +107,7 @@ def fit_sentence(story: Story) -> str:
     """Say how many numbers were fitted to how much motion, and the effect on a recording that was not trained on."""
     report = story.fit.report_
     unseen = list(residual_tables(story.fit.picture()))[-1]
-    seconds = sum(each["duration"] for each in report["recordings"])
+    seconds = sum(recording["duration"] for recording in report["recordings"])
     return (
         f"{report['identified']['of']} numbers from {seconds:.0f} s of motion in {report['seconds']:.1f} s; on a "
         f"recording that it has not seen the error falls from {rounded(unseen.all.start)} to "
@@ -115,14 +116,9 @@ def fit_sentence(story: Story) -> str:
 
 
 def detection_sentence(score: DetectionScore) -> str:
-    """Say how many pushes were found, and how many alarms there were without one."""
-    return f"{push_sentence(score)}; alarms without a push: {alarms(score)}"
-
-
-def push_sentence(score: DetectionScore) -> str:
-    """Say how many pushes were found, and how soon."""
-    text = f"{score.found} of {len(score.events)} pushes found"
-    return f"{text}, half of them within {1e3 * np.median(score.delays):.0f} ms" if score.found else text
+    """Say how many pushes were found, how soon, and how many alarms there were without one."""
+    soon = f", half of them within {1e3 * np.median(score.delays):.0f} ms" if score.found else ""
+    return f"{score.found} of {len(score.events)} pushes found{soon}; alarms without a push: {alarms(score)}"
 
 
 def alarms(score: DetectionScore) -> str:
@@ -133,15 +129,3 @@ def alarms(score: DetectionScore) -> str:
     many = f"{len(score.false_alarms)}, {100 * score.free_alarm_share:.1f} % of the time"
     feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
     return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
-
-
-def cause_lines(story: Story) -> Iterator[str]:
-    """Yield the verdict, each cause with its size, and the gain."""
-    found = story.diagnosis
-    names = names_of(found)
-    yield diagnosis_text.headline(found)
-    for cause in found.causes:
-        yield f"  {cause.where.effect} at {names.place(cause.where) or 'the whole finger'}: {cause.size}"
-        if confusion := confusion_sentence(cause, names):
-            yield f"  {confusion}"
-    yield error_sentence(found)

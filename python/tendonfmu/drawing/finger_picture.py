@@ -1,4 +1,7 @@
-"""Draws the routing of a finger. Its geometry comes from `model/routing_geometry.py`."""
+"""Draws what an FMU carries: the routing of its finger, and the signs of its terminals.
+
+The geometry of the routing comes from `model/routing_geometry.py`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import IO
 
 import numpy as np
 
-from tendonfmu.drawing.panel_styles import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY
+from tendonfmu.drawing.panel import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY
 from tendonfmu.drawing.raster import Raster
 from tendonfmu.model import DrawnTendon, FingerDrawing
 
@@ -15,6 +18,7 @@ EDGE_RED = "#CC1F1A"
 TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
 
 PICTURE_DPI, ICON_DPI = 130, 26
+TERMINAL_PIXELS = 32
 SIZE = 0.145  # of letters, in drawing units; widths and marks are parts of it
 THIN = 0.13 * SIZE
 DASH = (5.0 * THIN, 2.0 * THIN)  # of a cable loop
@@ -119,3 +123,13 @@ def _legend(tendons: list[DrawnTendon]) -> list[tuple[Mark, str]]:
             (lambda picture, x, y: picture.line([(x - ends, y), (x + ends, y)], GREY, THIN, DASH), "cable loop")
         )
     return entries
+
+
+# --- terminals --------------------------------------------------------------------------------------------------------
+
+
+def draw_terminal(target: IO[bytes], *, is_input: bool) -> None:
+    """Draw a triangle that points to the right as PNG: filled for inputs, outlined for outputs."""
+    picture = Raster(0.0, 1.0, 0.0, 1.0, TERMINAL_PIXELS)
+    picture.polygon([(0.1, 0.1), (0.9, 0.5), (0.1, 0.9)], BLUE if is_input else "white", BLUE, 0.07)
+    picture.save(target)

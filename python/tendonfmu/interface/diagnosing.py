@@ -18,7 +18,7 @@ from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource, finger_from_data
 from tendonfmu.options import DiagnoseOptions
 from tendonfmu.recordings import RecordingSource, listed_sources
-from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text, write_diagnosis
+from tendonfmu.report import build_report, diagnosis_sheets, diagnosis_text, write_diagnosis
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import PhaseState
 
@@ -71,7 +71,7 @@ class Diagnosis:
     @property
     def report(self) -> Mapping[str, Any]:
         """All results, as diagnosis.json has them."""
-        return diagnosis_report.build_report(self.found, [])
+        return build_report(self.found, [])
 
     @property
     def warnings(self) -> list[str]:

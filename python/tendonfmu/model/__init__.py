@@ -50,6 +50,6 @@ if TYPE_CHECKING:
     )
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
-    from .routing_geometry import DrawnTendon, FingerDrawing, Points, finger_drawing
+    from .routing_geometry import DrawnTendon, FingerDrawing, finger_drawing
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis show: sheets of panels (`drawing/panel_data.py`), ready to be drawn."""
+"""What the figures of a diagnosis show: sheets of panels (`drawing/panel.py`), ready to be drawn."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_numbers import unit_of
-from tendonfmu.report.diagnosis_text import Names, at_place, names_of
+from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
+from tendonfmu.report.numbers import capital, unit_text, with_ends
 
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
 _TITLES = {
@@ -39,47 +39,49 @@ _CHANGE_KEYS = (
 _ROOM = 3.0  # times the largest mean: the y axis shows no more of the scatter, so that the means stay visible
 
 
-def diagnosis_sheets(found: Diagnosis) -> list[Sheet]:
+def diagnosis_sheets(diagnosis: Diagnosis) -> list[Sheet]:
     """Make the sheets of a diagnosis: the evidence for each cause, then the residual at each joint."""
-    names = names_of(found)
+    names = names_of(diagnosis)
     return [
-        *(_cause_sheet(found, names, k, cause) for k, cause in enumerate(found.causes, start=1) if cause.evidence),
-        *(_joint_sheet(found, names, j, views) for j, views in _by_joint(found.views)),
+        *(
+            _cause_sheet(diagnosis, names, k, cause)
+            for k, cause in enumerate(diagnosis.causes, start=1)
+            if cause.evidence
+        ),
+        *(_joint_sheet(diagnosis, names, j, views) for j, views in _by_joint(diagnosis.views)),
     ]
 
 
 # --- evidence for a cause ---------------------------------------------------------------------------------------------
 
 
-def _cause_sheet(found: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
-    factor, unit = unit_of(found)
-    panels = tuple(_evidence_panel(each, names, factor, unit) for each in cause.evidence)
+def _cause_sheet(diagnosis: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
+    factor, unit = unit_of(diagnosis)
+    panels = tuple(_evidence_panel(evidence, names, factor, unit) for evidence in cause.evidence)
     return Sheet(
         section=f"cause_{number}",
         name=f"cause_{number}",
-        title=f"{number}. {at_place(cause.title[:1].upper() + cause.title[1:], cause.where, names)}",
+        title=f"{number}. {at_place(capital(cause.title), cause.where, names)}",
         caption="",
         keys=_CHANGE_KEYS if cause.changed else _CAUSE_KEYS,
-        panels=(*_same_scale(panels), *_by_recording(found, cause)),
+        panels=(*_same_scale(panels), *_by_recording(diagnosis, cause)),
     )
 
 
-def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
+def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
     """Show how large a change is in each of several new recordings."""
     changed = cause.changed
     if changed is None or not changed.by:
         return
-    factor, told = (100.0, "%") if changed.unit in ("", "1") else (1.0, changed.unit.replace(".", "·"))
+    factor, unit = (1.0, unit_text(changed.unit)) if unit_text(changed.unit) else (100.0, "%")
     x = np.arange(1.0, len(changed.by) + 1.0)
-    value, low, high = (
-        factor * np.array([getattr(each, end) for each in changed.by]) for end in ("value", "low", "high")
-    )
+    value, low, high = with_ends(changed.by, factor)
     then = np.full(2, factor * changed.reference.value)
     yield Panel(
         title="In each of the new recordings",
         alt=f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
         x_label="new recording, in the order given",
-        y_label=f"{changed.number.replace('_', ' ')} ({told})",
+        y_label=f"{changed.number.replace('_', ' ')} ({unit})",
         curves=(Curve("after_line", x, value), Curve("start", np.array([1.0, x[-1]]), then)),
         bars=(Bars("after", x, low, high),),
         dots=(Dots("after_dots", x, value),),
@@ -87,15 +89,15 @@ def _by_recording(found: Diagnosis, cause: Cause) -> Iterator[Panel]:
     )
 
 
-def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> Panel:
-    shown = [("before", found.before, found.before_std), ("after", found.after, found.after_std)]
-    if found.reference is not None and found.reference_std is not None:
-        shown.append(("reference", found.reference, found.reference_std))
-    x, x_unit = (factor * found.coordinate, unit) if found.unit == "N·m" else (found.coordinate, found.unit)
+def _evidence_panel(evidence: Evidence, names: Names, factor: float, unit: str) -> Panel:
+    shown = [("before", evidence.before, evidence.before_std), ("after", evidence.after, evidence.after_std)]
+    if evidence.reference is not None and evidence.reference_std is not None:
+        shown.append(("reference", evidence.reference, evidence.reference_std))
+    x, x_unit = (factor * evidence.coordinate, unit) if evidence.unit == "N·m" else (evidence.coordinate, evidence.unit)
     return Panel(
-        title=f"Residual at {names.joint(found.joint)}",
-        alt=f"Mean residual at {names.joint(found.joint)} over {found.label}, without and with this in the model",
-        x_label=f"{found.label} ({x_unit})",
+        title=f"Residual at {names.joint(evidence.joint)}",
+        alt=f"Mean residual at {names.joint(evidence.joint)} over {evidence.label}, without and with this in the model",
+        x_label=f"{evidence.label} ({x_unit})",
         y_label=f"residual ({unit})",
         curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
         bars=tuple(
@@ -103,7 +105,7 @@ def _evidence_panel(found: Evidence, names: Names, factor: float, unit: str) -> 
             for style, mean, std in shown
         ),
         dots=tuple(Dots(f"{style}_dots", x, factor * mean) for style, mean, _ in shown),
-        near_x=_near(found.coordinate) if found.label.startswith("travel") else 0.0,
+        near_x=_near(evidence.coordinate) if evidence.label.startswith("travel") else 0.0,
     )
 
 
@@ -141,9 +143,9 @@ def _order(kind: str) -> int:
     return list(_TITLES).index(kind) if kind in _TITLES else len(_TITLES)
 
 
-def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
-    factor, unit = unit_of(found)
-    if not found.causes:  # the extended model is the nominal one
+def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
+    factor, unit = unit_of(diagnosis)
+    if not diagnosis.causes:  # the extended model is the nominal one
         views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
     limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
     return Sheet(
@@ -152,15 +154,15 @@ def _joint_sheet(found: Diagnosis, names: Names, joint: int, views: Sequence[Res
         title=f"Residual at {names.joint(joint)}",
         caption="",
         keys=(
-            *(_before_after(found) if found.causes else _before_after(found)[:1]),
-            ("before_scatter", f"scatter within a bin, {words_of(found.kind).nominal}"),
+            *(_before_after(diagnosis) if diagnosis.causes else _before_after(diagnosis)[:1]),
+            ("before_scatter", f"scatter within a bin, {words_of(diagnosis.kind).nominal}"),
         ),
-        panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(found.kind)) for view in views),
+        panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(diagnosis.kind)) for view in views),
     )
 
 
-def _before_after(found: Diagnosis) -> tuple[tuple[str, str], ...]:
-    words = words_of(found.kind)
+def _before_after(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
+    words = words_of(diagnosis.kind)
     return ("before", words.refitted), ("after", words.extended)
 
 
@@ -207,7 +209,7 @@ def _view_panel(
 
 def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Panel:
     shown = view.x > 0
-    curves = tuple(replace(each, x=each.x[shown], y=each.y[shown]) for each in _curves(view, factor**2))
+    curves = tuple(replace(curve, x=curve.x[shown], y=curve.y[shown]) for curve in _curves(view, factor**2))
     return replace(panel, y_label=f"power (({unit})²/Hz)", curves=curves, log_x=True, log_y=True)
 
 

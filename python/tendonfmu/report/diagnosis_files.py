@@ -1,4 +1,7 @@
-"""Which files a diagnosis writes. The output folder gets all of them, or stays as it was."""
+"""Which files a diagnosis writes, and its report. The output folder gets all of them, or stays as it was.
+
+The report is "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,45 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
-from tendonfmu.diagnosis import Diagnosis
+import numpy as np
+
+from tendonfmu.diagnosis import (
+    Cause,
+    ChangedSize,
+    DetectionGain,
+    Diagnosis,
+    Experiment,
+    ResidualView,
+    Where,
+    reported_causes,
+)
 from tendonfmu.errors import OutputError, own_fault
-from tendonfmu.files import check_output, check_output_folder, in_use, is_about, remove_left_behind, write_text
+from tendonfmu.files import (
+    check_output,
+    check_output_folder,
+    finite,
+    in_use,
+    is_about,
+    remove_left_behind,
+    write_text,
+)
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
-from tendonfmu.report.diagnosis_page import PAGE, write_diagnosis_page
-from tendonfmu.report.diagnosis_report import EXTENDED, EXTENDED_FMU, NOMINAL, REPORT, build_report, report_text
+from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page
+from tendonfmu.report.diagnosis_text import at_place, names_of
+from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.statistics import Interval
 from tendonfmu.tasks import uninterrupted
 
+FORMAT = "tendonfmu-diagnosis-1"
+REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
+DIGITS = 6  # significant digits of the curves
 _SUFFIXES = (".html", ".json", ".fmu", ".png")  # .png: earlier versions wrote figures beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
@@ -31,7 +60,7 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
             check_output(folder / name, *inputs)
 
 
-def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
+def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     """Write the report, both descriptions, the FMU and the page."""
     beside = folder.absolute().parent
     try:
@@ -39,7 +68,7 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
         with _folder_beside(folder) as made_in:
             (made_in / "new").mkdir()
             with own_fault("the files of the diagnosis"):
-                made = _make_for(found, made_in / "new", folder)
+                made = _make_for(diagnosis, made_in / "new", folder)
             with uninterrupted():
                 _move(made, folder, made_in / "old")
     except OSError as error:
@@ -49,10 +78,10 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
     return {folder / file.name: what for file, what in made.items()}
 
 
-def _make_for(found: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
+def _make_for(diagnosis: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
     """Make the files in a folder. A refusal tells the folder that the user has named."""
     try:
-        return _make(found, folder)
+        return _make(diagnosis, folder)
     except OutputError as refused:
         raise OutputError(str(refused).replace(str(folder), str(named))) from None
 
@@ -91,23 +120,22 @@ def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
         raise
 
 
-def _make(found: Diagnosis, folder: Path) -> dict[Path, str]:
+def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     """Write all files to an empty folder."""
-    page = write_diagnosis_page(found, folder)
-    causes = len(found.causes)
+    write_text(folder / PAGE, diagnosis_page(diagnosis))
+    causes = len(diagnosis.causes)
     added = "nothing added" if causes == 0 else "its cause" if causes == 1 else f"its {causes} causes"
-    for name, data in ((NOMINAL, found.nominal_data), (EXTENDED, found.extended_data)):
+    for name, data in ((NOMINAL, diagnosis.nominal_data), (EXTENDED, diagnosis.extended_data)):
         write_text(folder / name, description_text(dict(data)))
     build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # drawing takes longer than all the rest
     files = {
-        folder / PAGE: page.pop(folder / PAGE),
+        folder / PAGE: "all results, to be read in a browser",
         folder / REPORT: "the same numbers",
         folder / EXTENDED: f"the finger with {added}, fitted",
         folder / EXTENDED_FMU: "the same as an FMU",
         folder / NOMINAL: "the given structure, fitted",
-        **page,
     }
-    write_text(folder / REPORT, report_text(build_report(found, [file.name for file in files])))
+    write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
     return files
 
 
@@ -119,3 +147,149 @@ def _earlier(folder: Path) -> list[str]:
         return []
     texts = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
     return [name for name in texts if Path(name).name == name and Path(name).suffix in _SUFFIXES]
+
+
+# --- the report -------------------------------------------------------------------------------------------------------
+
+
+def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
+    """Make the report of a diagnosis."""
+    effect = ("title", "surviving_share", "ordinary_gain", "needed_gain", "experiment")
+    report = {
+        "format": FORMAT,
+        **_fields(diagnosis, "kind", "verdict"),
+        "nominal": _plain(diagnosis.nominal) | {"bias_only_rms": diagnosis.bias_only_rms, "finger": NOMINAL},
+        "extended": _plain(diagnosis.extended) | {"finger": EXTENDED, "fmu": EXTENDED_FMU},
+        **_fields(diagnosis, "noise_floor", "gain"),
+        "causes": [_cause(cause, diagnosis.kind) for cause in reported_causes(diagnosis)],
+        "too_small": [_cause(cause, diagnosis.kind) for cause in diagnosis.too_small],
+        "unexplained": _fields(diagnosis.unexplained, "share", "description", "by_joint", "gain"),
+        "next_experiment": diagnosis.experiment.sentence,
+        "waterfall": _waterfall(diagnosis),
+        **_fields(diagnosis, "signals", "least_gain", "finger"),
+        "joints": [joint.get("name") for joint in diagnosis.nominal_data["joints"]],
+        "tendons": [tendon.get("name") for tendon in diagnosis.nominal_data["tendons"]],
+        **_fields(diagnosis, "references", "repeated", "recordings", "tests", "held_out", "seed", "tested"),
+        "floor_source": diagnosis.floor_source,
+        "whiteness": [{"nominal": before, "extended": after} for before, after in diagnosis.whiteness],
+        "invisible": [_where(invisible.where) | _fields(invisible, *effect) for invisible in diagnosis.invisible],
+        "events": [_plain(event, start="start_s", end="end_s") for event in diagnosis.events],
+        "experiment": _experiment(diagnosis.experiment),
+        "detection": None if diagnosis.detection is None else _detection(diagnosis.detection),
+        **_fields(diagnosis, "warnings", "seconds"),
+        "files": files,
+        "views": [_view(view) for view in diagnosis.views],
+    }
+    return {key: finite(value) for key, value in report.items()}
+
+
+def report_text(report: Mapping[str, Any]) -> str:
+    """Format a report as JSON. Each entry of a list of objects and each curve is on a line of its own."""
+    parts = []
+    for key, value in report.items():
+        listed = isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+        text = "[\n  " + ",\n  ".join(_entry(entry) for entry in value) + "]" if listed else _in_line(value)
+        parts.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _entry(entry: Mapping[str, Any]) -> str:
+    if "evidence" not in entry:
+        return _in_line(entry)
+    return "{" + ",\n   ".join(f"{json.dumps(key)}: {_in_line(value)}" for key, value in entry.items()) + "}"
+
+
+def _in_line(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any, **renamed: str) -> Any:
+    """Return a dataclass as JSON has it; fields may have other names there, and those without a value are left out."""
+    if isinstance(value, Interval):
+        return {"value": value.value, "interval": [value.low, value.high]}
+    if isinstance(value, np.ndarray):
+        return [float(f"{number:.{DIGITS}g}") for number in value.astype(float).tolist()]
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    if is_dataclass(value):
+        known = {field.name: getattr(value, field.name) for field in fields(value)}
+        return {renamed.get(name, name): _plain(part) for name, part in known.items() if part is not None}
+    return value
+
+
+def _fields(source: Any, *names: str) -> dict[str, Any]:
+    return {name: _plain(getattr(source, name)) for name in names}
+
+
+def _where(where: Where) -> dict[str, Any]:
+    return _fields(where, "effect", "joint", "tendon")
+
+
+def _cause(cause: Cause, kind: str) -> dict[str, Any]:
+    return {
+        **_where(cause.where),
+        **_fields(cause, "p_value", "gain"),
+        "confusable_with": [_where(other) for other in cause.confusable_with],
+        **_numbers_of(cause.parameters),
+        **(_changed(cause.changed) if kind == "change" else {}),
+        "places": [_fields(place, "joint", "tendon") | _numbers_of(place.parameters) for place in cause.places],
+        **_fields(cause, "size", "title", "explanation", "evidence"),
+    }
+
+
+def _changed(changed: ChangedSize | None) -> dict[str, Any]:
+    """Return the main number in the reference and now; null where there is none, as for contact."""
+    if changed is None:
+        return {"reference": None, "now": None}
+    return {
+        **_fields(changed, "number", "unit"),
+        "reference": changed.reference.value,
+        "now": changed.now.value,
+        "now_interval": [changed.now.low, changed.now.high],
+        "change": _plain(changed.change),
+        "by_recording": _plain(changed.by),
+    }
+
+
+def _numbers_of(parameters: Mapping[str, tuple[float, str]]) -> dict[str, Any]:
+    return {
+        "parameters": {path: value for path, (value, _) in parameters.items()},
+        "units": {path: unit for path, (_, unit) in parameters.items()},
+    }
+
+
+def _waterfall(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """List the rms over all joints on unseen data: of the nominal model, then after each cause."""
+    names = names_of(diagnosis)
+    steps = [(words_of(diagnosis.kind).nominal, Where("", None, None))]
+    steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in diagnosis.causes]
+    return [
+        {"label": label, "effect": where.effect or None, "joint": where.joint, "tendon": where.tendon, "rms": rms}
+        for (label, where), rms in zip(steps, diagnosis.steps, strict=True)
+    ]
+
+
+def _experiment(experiment: Experiment) -> dict[str, Any]:
+    return {
+        **_fields(experiment, "sentence", "distance"),
+        "separates": [[_where(one), _where(other)] for one, other in experiment.separates],
+        "makes_visible": [_where(where) for where in experiment.makes_visible],
+        "motion": dict(experiment.motion),
+    }
+
+
+def _detection(gain: DetectionGain) -> dict[str, Any]:
+    def of(when: str) -> dict[str, Any]:
+        return {
+            "found": getattr(gain, f"found_{when}"),
+            "false_alarms": getattr(gain, f"false_alarms_{when}"),
+            "median_delay_s": getattr(gain, f"median_delay_{when}"),
+            "thresholds": getattr(gain, f"thresholds_{when}"),
+        }
+
+    return {"events": gain.events, "nominal": of("before"), "extended": of("after")}
+
+
+def _view(view: ResidualView) -> dict[str, Any]:
+    names = {"before": "nominal", "after": "extended", "before_std": "nominal_std"}
+    return {"nominal_std": None, **_plain(view, **names)}

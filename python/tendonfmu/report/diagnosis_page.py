@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 from tendonfmu.diagnosis import (
@@ -14,9 +15,8 @@ from tendonfmu.diagnosis import (
     size_at,
     thresholds,
 )
-from tendonfmu.files import counted, whole_file
+from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
-from tendonfmu.report.diagnosis_numbers import left_of, percent, percent_interval, probability, together, unit_of
 from tendonfmu.report.diagnosis_text import (
     Names,
     at_place,
@@ -27,21 +27,31 @@ from tendonfmu.report.diagnosis_text import (
     headline,
     hidden,
     hidden_sentences,
+    left_of,
     left_sentence,
     meaning_of_gain,
     names_of,
     next_sentence,
-    parameter_rows,
     place_rows,
     tested_sentence,
     title_of,
     too_small_sentence,
+    unit_of,
     unseen,
 )
-from tendonfmu.report.diagnosis_waterfall import waterfall_of
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.fit_summary import rounded
-from tendonfmu.report.page import Tile, render
+from tendonfmu.report.numbers import (
+    Row,
+    capital,
+    decimals,
+    magnitude,
+    percent,
+    percent_interval,
+    probability,
+    rounded,
+    together,
+)
+from tendonfmu.report.page import Tile, drawn, render
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs listed at most
@@ -49,92 +59,83 @@ _LONG = 90  # characters; a longer size is set as a sentence
 _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unexplained": "bad"}
 
 
-def write_diagnosis_page(found: Diagnosis, folder: Path) -> dict[Path, str]:
-    """Write `diagnosis.html` to an existing folder, whole or not at all."""
-    page = folder / PAGE
-    text = diagnosis_page(found)
-    with whole_file(page) as partial:
-        partial.write_text(text, encoding="utf-8")
-    return {page: "all results, to be read in a browser"}
-
-
-def diagnosis_page(found: Diagnosis) -> str:
+def diagnosis_page(diagnosis: Diagnosis) -> str:
     """Return the HTML text of the page of a diagnosis."""
-    names, (factor, unit) = names_of(found), unit_of(found)
+    names, (factor, unit) = names_of(diagnosis), unit_of(diagnosis)
     return render(
         "diagnosis.html.jinja",
-        diagnosis_sheets(found),
-        found=found,
-        words=words_of(found.kind),
+        drawn(diagnosis_sheets(diagnosis)),
+        diagnosis=diagnosis,
+        words=words_of(diagnosis.kind),
         unit=unit,
-        first=_first_screen(found, names),
-        fall=waterfall_of(found, names),
-        cards=cards_of(found, names),
-        too_small=_too_small(found, names),
-        errors=_errors(found, names, factor),
-        events=_events(found, names, factor),
-        detection=None if found.detection is None else _detection(found.detection, factor, unit),
-        method=list(_method(found)),
+        first=_first_screen(diagnosis, names),
+        fall=waterfall_of(diagnosis, names),
+        cards=cards_of(diagnosis, names),
+        too_small=_too_small(diagnosis, names),
+        errors=_errors(diagnosis, names, factor),
+        events=_events(diagnosis, names, factor),
+        detection=None if diagnosis.detection is None else _detection(diagnosis.detection, factor, unit),
+        method=list(_method(diagnosis)),
         invisible=[
             (
-                each.title,
-                each.places or "everywhere",
-                percent(each.share),
-                "" if each.gain is None else percent(each.gain),
-                each.experiment,
+                effect.title,
+                effect.places or "everywhere",
+                percent(effect.share),
+                "" if effect.gain is None else percent(effect.gain),
+                effect.experiment,
             )
-            for each in hidden(found, names)
+            for effect in hidden(diagnosis, names)
         ],
-        recordings=list(_recordings(found)),
+        recordings=list(_recordings(diagnosis)),
     )
 
 
 # --- the first screen -------------------------------------------------------------------------------------------------
 
 
-def _first_screen(found: Diagnosis, names: Names) -> dict[str, Any]:
+def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     return {
-        "tone": _TONES[found.verdict],
-        "headline": headline(found),
-        "error": error_sentence(found),
-        "left": left_sentence(found),
-        "tiles": list(_tiles(found)),
-        "untold": list(_untold(found, names)),
-        "next": next_sentence(found),
-        "experiment": list(_experiment(found, names)),
+        "tone": _TONES[diagnosis.verdict],
+        "headline": headline(diagnosis),
+        "error": error_sentence(diagnosis),
+        "left": left_sentence(diagnosis),
+        "tiles": list(_tiles(diagnosis)),
+        "untold": list(_untold(diagnosis, names)),
+        "next": next_sentence(diagnosis),
+        "experiment": list(_experiment(diagnosis, names)),
     }
 
 
-def _tiles(found: Diagnosis) -> Iterator[Tile]:
-    words, (factor, unit) = words_of(found.kind), unit_of(found)
-    before, after = (rounded(factor * together(each.test_rms)) for each in (found.nominal, found.extended))
-    data = "held-out parts" if found.held_out else "unseen data"
-    if found.causes:
+def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
+    words, (factor, unit) = words_of(diagnosis.kind), unit_of(diagnosis)
+    before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
+    data = "held-out parts" if diagnosis.held_out else "unseen data"
+    if diagnosis.causes:
         yield Tile(
             f"{before} → {after}",
             unit,
             f"error on {data}, all joints, with the {words.nominal} and the {words.extended}",
         )
-        low, high = percent(found.gain.low).split("\u00a0")[0], percent(found.gain.high)
-        yield Tile(percent(found.gain.value), "", f"less error, 95 % interval {low} to {high}")
+        low, high = percent(diagnosis.gain.low).split("\u00a0")[0], percent(diagnosis.gain.high)
+        yield Tile(percent(diagnosis.gain.value), "", f"less error, 95 % interval {low} to {high}")
     else:
         yield Tile(before, unit, f"error on {data}, all joints")
-    if left := left_of(found):
+    if left := left_of(diagnosis):
         noise = "that nothing recorded predicts" if left.memory else "is noise: nothing recorded predicts it"
-        yield Tile(left.told(left.noise), unit, f"of what is left {noise}")
-        if left.nameless > 0.0:
-            yield Tile(left.told(left.nameless), unit, f"of what is left {words.no_name}")
+        yield Tile(left.text(left.noise), unit, f"of what is left {noise}")
+        if left.predictable > 0.0:
+            yield Tile(left.text(left.predictable), unit, f"of what is left {words.no_name}")
 
 
-def _untold(found: Diagnosis, names: Names) -> Iterator[str]:
-    for k, cause in enumerate(found.causes, start=1):
+def _untold(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
+    for k, cause in enumerate(diagnosis.causes, start=1):
         if text := confusion_sentence(cause, names):
             yield f"Cause {k}, {at_place(cause.title, cause.where, names)}: {text[0].lower()}{text[1:]}"
-    yield from hidden_sentences(found, names)
+    yield from hidden_sentences(diagnosis, names)
 
 
-def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
-    plan = found.experiment
+def _experiment(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
+    plan = diagnosis.experiment
     for one, other in plan.separates[:_MOST]:
         first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
         yield f"Distinguishes: {first}; from {second}."
@@ -150,55 +151,55 @@ def _experiment(found: Diagnosis, names: Names) -> Iterator[str]:
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
-def cards_of(found: Diagnosis, names: Names) -> list[dict[str, Any]]:
+def cards_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Return what a page shows of each cause."""
-    return [_card(found, cause, names) for cause in reported_causes(found)]
+    return [_card(diagnosis, cause, names) for cause in reported_causes(diagnosis)]
 
 
-def _card(found: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
+def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     """Return what a page shows of one cause."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
     # the tiles and the waterfall show r itself
-    numbers = thresholds(found.extended_data)
-    sizes = [size_at(cause.where.effect, each.parameters, numbers) for each in cause.places]
+    numbers = thresholds(diagnosis.extended_data)
+    sizes = [size_at(cause.where.effect, place.parameters, numbers) for place in cause.places]
     return {
-        "title": _capital(cause.title),
-        "full": at_place(_capital(cause.title), cause.where, names),
-        "place": _capital(names.places(cause)),
+        "title": capital(cause.title),
+        "full": at_place(capital(cause.title), cause.where, names),
+        "place": capital(names.places(cause)),
         "size": cause.size,
         "long": len(cause.size) > _LONG,
-        "gain": f"{percent_interval(cause.gain)} {meaning_of_gain(found, cause)}",
+        "gain": f"{percent_interval(cause.gain)} {meaning_of_gain(diagnosis, cause)}",
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
         "places": place_rows(cause, names, sizes) if cause.parameters else [],
-        "parameters": parameter_rows(cause.parameters),
-        "sizes": change_rows(cause, found.recordings),
+        "parameters": [(path, magnitude(*number)) for path, number in cause.parameters.items()],
+        "sizes": change_rows(cause, diagnosis.recordings),
     }
 
 
-def _too_small(found: Diagnosis, names: Names) -> dict[str, Any]:
+def _too_small(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     return {
-        "sentence": too_small_sentence(found),
+        "sentence": too_small_sentence(diagnosis),
         "rows": [
-            (_capital(cause.title), names.places(cause), percent_interval(cause.gain), probability(cause.p_value))
-            for cause in found.too_small
+            (capital(cause.title), names.places(cause), percent_interval(cause.gain), probability(cause.p_value))
+            for cause in diagnosis.too_small
         ],
     }
 
 
-def _errors(found: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
+def _errors(diagnosis: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
     """List the errors: a row per joint, then one for all joints; rms values first, then the lag-one correlations."""
     rows = []
-    for j, row in enumerate(error_rows(found, names, factor)):
-        total = j == len(found.nominal.train_rms)
-        known = j < len(found.whiteness) and not total
-        white = [rounded(value, 2) for value in found.whiteness[j]] if known else ["", ""]
+    for j, row in enumerate(error_rows(diagnosis, names, factor)):
+        total = j == len(diagnosis.nominal.train_rms)
+        known = j < len(diagnosis.whiteness) and not total
+        white = [rounded(value, 2) for value in diagnosis.whiteness[j]] if known else ["", ""]
         rows.append({"total": total, "cells": [*row, *white]})
     return rows
 
 
-def _events(found: Diagnosis, names: Names, factor: float) -> list[tuple[str, ...]]:
+def _events(diagnosis: Diagnosis, names: Names, factor: float) -> list[Row]:
     """List the events as (recording, from, to, joints, peak, what)."""
     return [
         (
@@ -209,11 +210,11 @@ def _events(found: Diagnosis, names: Names, factor: float) -> list[tuple[str, ..
             rounded(factor * event.peak),
             event.description,
         )
-        for event in found.events
+        for event in diagnosis.events
     ]
 
 
-def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]:
+def _detection(gain: DetectionGain, factor: float, unit: str) -> dict[str, Any]:
     def seconds(value: float | None) -> str:
         return "–" if value is None else f"{1e3 * value:.0f} ms"
 
@@ -221,35 +222,106 @@ def _detection(found: DetectionGain, factor: float, unit: str) -> dict[str, Any]
         return ", ".join(rounded(factor * value) for value in values)
 
     return {
-        "events": found.events,
+        "events": gain.events,
         "rows": [
-            ("found", found.found_before, found.found_after),
-            ("false alarms", found.false_alarms_before, found.false_alarms_after),
-            ("median delay", seconds(found.median_delay_before), seconds(found.median_delay_after)),
-            (f"thresholds ({unit})", levels(found.thresholds_before), levels(found.thresholds_after)),
+            ("found", gain.found_before, gain.found_after),
+            ("false alarms", gain.false_alarms_before, gain.false_alarms_after),
+            ("median delay", seconds(gain.median_delay_before), seconds(gain.median_delay_after)),
+            (f"thresholds ({unit})", levels(gain.thresholds_before), levels(gain.thresholds_after)),
         ],
     }
 
 
-def _recordings(found: Diagnosis) -> Iterator[tuple[str, str]]:
+def _recordings(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     """List the recordings as (name, what it was used for)."""
-    now = "now, " if found.kind == "change" else ""
-    training = "training, parts held out" if found.held_out else "training"
-    yield from ((name, "reference") for name in found.references)
-    yield from ((name, now + training) for name in found.recordings)
-    yield from ((name, "test") for name in found.tests)
+    now = "now, " if diagnosis.kind == "change" else ""
+    training = "training, parts held out" if diagnosis.held_out else "training"
+    yield from ((name, "reference") for name in diagnosis.references)
+    yield from ((name, now + training) for name in diagnosis.recordings)
+    yield from ((name, "test") for name in diagnosis.tests)
 
 
-def _method(found: Diagnosis) -> Iterator[str]:
+def _method(diagnosis: Diagnosis) -> Iterator[str]:
     """Describe the method and its main numbers in sentences."""
-    yield words_of(found.kind).method.format(least=percent(found.least_gain))
-    yield f"The numbers were estimated from {found.signals}; errors and gains are those of the raw signals."
-    if text := tested_sentence(found):
+    yield words_of(diagnosis.kind).method.format(least=percent(diagnosis.least_gain))
+    yield f"The numbers were estimated from {diagnosis.signals}; errors and gains are those of the raw signals."
+    if text := tested_sentence(diagnosis):
         yield text
-    if found.repeated:
-        yield f"{counted(found.repeated, 'motion')} of the reference, made again, were compared sample by sample."
-    yield f"The gain was measured on {unseen(found)}, by running both models. Seed {found.seed}."
+    if diagnosis.repeated:
+        yield f"{counted(diagnosis.repeated, 'motion')} of the reference, made again, were compared sample by sample."
+    yield f"The gain was measured on {unseen(diagnosis)}, by running both models. Seed {diagnosis.seed}."
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+# --- how much error each cause takes away -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Part:
+    """Part of a bar."""
+
+    tone: str  # "nominal", "cause", "more", "noise" or "predictable"
+    start: float  # per cent of the widest bar
+    width: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """Row of a waterfall."""
+
+    label: str  # what the row shows, in plain words, with its place
+    value: str  # length of the bar as text, with a sign where it is taken away
+    parts: tuple[Part, ...]  # parts of the bar
+
+
+@dataclass(frozen=True)
+class Waterfall:
+    """What each cause takes away from the error."""
+
+    unit: str  # unit of the values
+    rows: tuple[Step, ...]  # from the error of the nominal model to what is left
+    floor: float | None  # position of the noise floor, per cent of the widest bar; None if unknown
+    predictable: str  # legend of the parts with the tone "predictable"
+    taken: str  # legend of the parts with the tone "cause"
+
+
+def waterfall_of(diagnosis: Diagnosis, names: Names) -> Waterfall:
+    """Return the waterfall of a diagnosis."""
+    factor, unit = unit_of(diagnosis)
+    steps = [factor * step for step in diagnosis.steps]
+    widest = max([step for step in steps if math.isfinite(step)], default=0.0) or 1.0
+    noise = _noise(diagnosis, steps[-1])
+    floor = None if noise is None else 100.0 * noise / widest
+    words = words_of(diagnosis.kind)
+    return Waterfall(unit, tuple(_steps(diagnosis, names, steps, widest)), floor, words.left, words.taken)
+
+
+def _steps(diagnosis: Diagnosis, names: Names, steps: list[float], widest: float) -> Iterator[Step]:
+    digits = decimals(widest)
+    shown = [round(step, digits) for step in steps]
+
+    def part(tone: str, begin: float, end: float) -> Part:
+        low, high = sorted((100.0 * begin / widest, 100.0 * end / widest))
+        return Part(tone, round(low, 2), round(high - low, 2))
+
+    if diagnosis.causes:
+        label = f"error of the {words_of(diagnosis.kind).nominal}"
+        yield Step(label, f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),))
+    for k, cause in enumerate(diagnosis.causes):
+        change = shown[k + 1] - shown[k]
+        tone, sign = ("cause", "−") if change <= 0 else ("more", "+")
+        label = f"{k + 1}. {at_place(cause.title, cause.where, names)}"
+        yield Step(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),))
+    noise = _noise(diagnosis, steps[-1])
+    parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
+    if noise is not None:
+        parts = (part("noise", 0.0, noise), part("predictable", noise, steps[-1]))
+    label = "what is left" if diagnosis.causes else "error of the model"
+    yield Step(label, f"{shown[-1]:.{digits}f}", parts)
+
+
+def _noise(diagnosis: Diagnosis, last: float) -> float | None:
+    """Return the noise part of the last step; all of it where the remainder would round to 0."""
+    left = left_of(diagnosis)
+    if left is None:
+        return None
+    return min(left.noise, last) if left.predictable > 0.0 else last

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import (
     CONTACT,
     TITLES,
@@ -20,23 +23,25 @@ from tendonfmu.diagnosis import (
     reported_causes,
 )
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_numbers import (
-    left_of,
-    magnitude,
+from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.report.numbers import (
+    Row,
+    Table,
+    capital,
+    decimals,
     percent,
     percent_interval,
+    rounded,
     together,
-    unit_of,
+    torque_unit,
 )
-from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.fit_summary import rounded
 from tendonfmu.statistics import Interval
 
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 _MOST_PLACES = 4  # listed at most
 _TOLD = 2  # invisible effects described one by one; more share a sentence
 _PLACED = 4  # of which so many are listed with their places
-Row = tuple[str, ...]
+_FALLEN = math.exp(-1.0)  # a correlation that has fallen to this is over, as that of one time constant
 
 
 @dataclass(frozen=True)
@@ -68,12 +73,10 @@ def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
     return plain if name.replace("_", " ").lower() in ("", plain, str(number)) else f"{plain} ({name})"
 
 
-def names_of(found: Diagnosis) -> Names:
+def names_of(diagnosis: Diagnosis) -> Names:
     """Return the names of joints and tendons from the fitted description."""
-    return Names(*(tuple(str(each.get("name") or "") for each in found.nominal_data[key]) for key in _KINDS))
-
-
-_KINDS = ("joints", "tendons")
+    kinds = (diagnosis.nominal_data["joints"], diagnosis.nominal_data["tendons"])
+    return Names(*(tuple(str(part.get("name") or "") for part in parts) for parts in kinds))
 
 
 def title_of(effect: str) -> str:
@@ -90,88 +93,138 @@ def at_place(title: str, where: Where, names: Names) -> str:
     return f"{title}, at {place}" if place else title
 
 
+def unit_of(diagnosis: Diagnosis) -> tuple[float, str]:
+    """Return factor and name of the unit in which all torques of a diagnosis are shown."""
+    rms = [*diagnosis.nominal.train_rms, *diagnosis.nominal.test_rms, *diagnosis.bias_only_rms]
+    return torque_unit(max((value for value in rms if math.isfinite(value)), default=0.0))
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left on unseen data, in the unit of `unit_of`."""
+
+    whole: float  # rms over all joints
+    noise: float  # the part that nothing recorded predicts
+    predictable: float  # the rest
+    digits: int  # decimals shown
+    memory: str  # how long what is left stays correlated, in words; empty for white noise, or where it is unknown
+
+    def text(self, value: float) -> str:
+        return f"{value:.{self.digits}f}"
+
+
+def left_of(diagnosis: Diagnosis) -> Left | None:
+    """Return what is left on unseen data; None where the noise floor is unknown."""
+    factor, _ = unit_of(diagnosis)
+    whole, noise = factor * together(diagnosis.extended.test_rms), factor * together(diagnosis.noise_floor)
+    if not (math.isfinite(whole) and math.isfinite(noise)):
+        return None
+    digits = decimals(whole)
+    whole, noise = round(whole, digits), round(min(noise, whole), digits)
+    return Left(whole, noise, round(whole - noise, digits), digits, _memory(diagnosis))
+
+
+def _memory(diagnosis: Diagnosis) -> str:
+    """Say over which time what is left is correlated, at the joint where it is longest: until 1/e of it remains."""
+    views = [view for view in diagnosis.views if view.kind == "autocorrelation"]
+    times = [_time_to_fall(view.x, view.after) for view in views if view.after[0] > _FALLEN]
+    if not times:
+        return ""
+    longest = max(times)
+    return f"{1e3 * longest:.2g} ms" if longest < math.inf else f"{views[0].x[-1]:.2g} s or more"
+
+
+def _time_to_fall(lag: Numbers, correlation: Numbers) -> float:
+    """Return the lag (s) at which a correlation above `_FALLEN` first meets it; infinite if it stays above."""
+    below = np.flatnonzero(correlation <= _FALLEN)
+    if not len(below):
+        return math.inf
+    pair = [below[0], below[0] - 1]  # the lower value first, as np.interp wants
+    return float(np.interp(_FALLEN, correlation[pair], lag[pair]))
+
+
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
-def headline(found: Diagnosis) -> str:
+def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence, and a second one where something touches the finger."""
-    count = len(found.causes)
-    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {words_of(found.kind).one}s"
-    text = words_of(found.kind).headlines[found.verdict][min(count, 2)].format(Many=many, many=many.lower())
+    count = len(diagnosis.causes)
+    many = f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {words_of(diagnosis.kind).one}s"
+    text = words_of(diagnosis.kind).headlines[diagnosis.verdict][min(count, 2)].format(Many=many, many=many.lower())
     if count == 1:
-        cause = found.causes[0]
+        cause = diagnosis.causes[0]
         size = f", {cause.size}" if cause.changed else ""
-        text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(found))}{size}."
-    for cause in reported_causes(found):
+        text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(diagnosis))}{size}."
+    for cause in reported_causes(diagnosis):
         if cause.where.effect == CONTACT and cause.changed is None:
             text += f" In some stretches {cause.title}: they were left out ({cause.size})."
         elif cause.where.effect == CONTACT:
-            told = f"{at_place(cause.title, cause.where, names_of(found))}, {cause.size}."
-            text = f"{text} And {told}" if count else f"{told[0].upper()}{told[1:]}"
+            contact = f"{at_place(cause.title, cause.where, names_of(diagnosis))}, {cause.size}."
+            text = f"{text} And {contact}" if count else capital(contact)
     return text
 
 
-def error_sentence(found: Diagnosis) -> str:
+def error_sentence(diagnosis: Diagnosis) -> str:
     """Return a sentence on the error on unseen data."""
-    factor, unit = unit_of(found)
-    nominal, extended = (together(each.test_rms) for each in (found.nominal, found.extended))
-    where = unseen(found)
-    if found.causes:
+    factor, unit = unit_of(diagnosis)
+    nominal, extended = (together(each.test_rms) for each in (diagnosis.nominal, diagnosis.extended))
+    where = unseen(diagnosis)
+    if diagnosis.causes:
         text = (
-            f"On {where} the error{words_of(found.kind).error} falls from {rounded(factor * nominal)} to "
+            f"On {where} the error{words_of(diagnosis.kind).error} falls from {rounded(factor * nominal)} to "
             f"{rounded(factor * extended)} {unit} rms, "
-            f"by {percent_interval(found.gain)}"
+            f"by {percent_interval(diagnosis.gain)}"
         )
     else:
-        text = f"On {where} the error{words_of(found.kind).error} is {rounded(factor * nominal)} {unit} rms"
-    bias = together(found.bias_only_rms)
+        text = f"On {where} the error{words_of(diagnosis.kind).error} is {rounded(factor * nominal)} {unit} rms"
+    bias = together(diagnosis.bias_only_rms)
     if math.isfinite(bias):
         text += f"; without any friction model it would be {rounded(factor * bias)}"
     return f"{text}."
 
 
-def left_sentence(found: Diagnosis) -> str:
+def left_sentence(diagnosis: Diagnosis) -> str:
     """Return a sentence on what is left on unseen data."""
-    left, (_, unit) = left_of(found), unit_of(found)
+    left, (_, unit) = left_of(diagnosis), unit_of(diagnosis)
     if left is None:
         return ""
-    whole = f"{left.told(left.whole)} {unit} are left" + (f", correlated over {left.memory}" if left.memory else "")
-    if left.nameless <= 0.0:
+    whole = f"{left.text(left.whole)} {unit} are left" + (f", correlated over {left.memory}" if left.memory else "")
+    if left.predictable <= 0.0:
         noise = "" if left.memory else ": to these sensors it is noise"
         return f"{whole}. Nothing that was recorded predicts any of it{noise}."
     rest = "nothing that was recorded predicts" if left.memory else "is noise to these sensors"
-    little = "" if found.unexplained.unknown or found.kind == "change" else ", and is too little to matter"
+    little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else ", and is too little to matter"
     return (
-        f"{whole}. {left.told(left.nameless)} of it {words_of(found.kind).no_name}{little}; "
-        f"the rest, {left.told(left.noise)}, {rest}."
+        f"{whole}. {left.text(left.predictable)} of it {words_of(diagnosis.kind).no_name}{little}; "
+        f"the rest, {left.text(left.noise)}, {rest}."
     )
 
 
-def unknown_sentence(found: Diagnosis) -> str:
+def unknown_sentence(diagnosis: Diagnosis) -> str:
     """Say where the part is that can be predicted but has no name; empty where it is too little to matter."""
-    where = found.unexplained.description.strip().rstrip(".") if found.unexplained.unknown else ""
-    return f"{where[0].upper()}{where[1:]}." if where else ""
+    where = diagnosis.unexplained.description.strip().rstrip(".") if diagnosis.unexplained.unknown else ""
+    return f"{capital(where)}." if where else ""
 
 
-def too_small_sentence(found: Diagnosis) -> str:
+def too_small_sentence(diagnosis: Diagnosis) -> str:
     """Introduce the list of effects that are too small to matter."""
-    return words_of(found.kind).small.format(least=percent(found.least_gain))
+    return words_of(diagnosis.kind).small.format(least=percent(diagnosis.least_gain))
 
 
-def unseen(found: Diagnosis) -> str:
+def unseen(diagnosis: Diagnosis) -> str:
     """Name the data on which the gain was measured."""
-    if found.held_out:
+    if diagnosis.held_out:
         return "parts of the recordings that were held out"
-    return "a recording that it has not seen" if len(found.tests) == 1 else "recordings that it has not seen"
+    return "a recording that it has not seen" if len(diagnosis.tests) == 1 else "recordings that it has not seen"
 
 
-def tested_sentence(found: Diagnosis) -> str:
+def tested_sentence(diagnosis: Diagnosis) -> str:
     """Say how many candidate causes were tested, and what the p-values mean."""
-    if not found.tested:
+    if not diagnosis.tested:
         return ""
     return (
-        f"{found.tested} candidate causes were tested. A p-value is the probability that the strongest of them looks "
-        "like this by chance if nothing is missing."
+        f"{diagnosis.tested} candidate causes were tested. A p-value is the probability that the strongest of them "
+        "looks like this by chance if nothing is missing."
     )
 
 
@@ -197,16 +250,16 @@ class Hidden:
     experiment: str  # experiment that would show it
 
 
-def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
+def hidden(diagnosis: Diagnosis, names: Names) -> list[Hidden]:
     """List the effects that these data cannot show, each with the experiment of its first place, which shows most."""
     by_effect: dict[str, list[Invisible]] = {}
-    for each in found.invisible:
-        by_effect.setdefault(each.where.effect, []).append(each)
+    for invisible in diagnosis.invisible:
+        by_effect.setdefault(invisible.where.effect, []).append(invisible)
     effects = []
     for members in by_effect.values():
         best = members[0]
-        places = [names.place(each.where) for each in members]
-        text = "" if places == [""] else "; ".join(each or "the whole finger" for each in places)
+        places = [names.place(member.where) for member in members]
+        text = "" if places == [""] else "; ".join(place or "the whole finger" for place in places)
         if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
         share, gain = best.surviving_share, best.ordinary_gain
@@ -214,38 +267,38 @@ def hidden(found: Diagnosis, names: Names) -> list[Hidden]:
     return effects
 
 
-def _why_hidden(found: Invisible) -> str:
-    if found.absorbed or found.ordinary_gain is None:
-        return f"Refitting absorbs it; {percent(found.surviving_share)} would be left."
-    gain = percent(found.ordinary_gain)
-    limit = "" if found.needed_gain is None else f": it takes {percent(found.needed_gain)}"
+def _why_hidden(effect: Invisible) -> str:
+    if effect.absorbed or effect.ordinary_gain is None:
+        return f"Refitting absorbs it; {percent(effect.surviving_share)} would be left."
+    gain = percent(effect.ordinary_gain)
+    limit = "" if effect.needed_gain is None else f": it takes {percent(effect.needed_gain)}"
     return f"One of ordinary size would raise the error by {gain}, too little to be a cause{limit}."
 
 
-def hidden_sentences(found: Diagnosis, names: Names) -> Iterator[str]:
+def hidden_sentences(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
     """Describe what these data cannot show: up to `_TOLD` effects with an experiment each, more in one sentence."""
-    effects = hidden(found, names)
+    effects = hidden(diagnosis, names)
     if len(effects) > _TOLD:
-        absorbs = "what is shared with the reference" if found.kind == "change" else "refitting"
-        absorbed = [each for each in effects if each.absorbed]
-        small = [each for each in effects if not each.absorbed]
+        absorbs = "what is shared with the reference" if diagnosis.kind == "change" else "refitting"
+        absorbed = [effect for effect in effects if effect.absorbed]
+        small = [effect for effect in effects if not effect.absorbed]
         if absorbed:
             since = f"since {absorbs} absorbs {'it' if len(absorbed) == 1 else 'them'}"
             yield f"{_effects_are(absorbed)} not visible in these data, {since}: {_listed(absorbed)}."
         if small:
-            yield f"{_effects_are(small)} visible only if larger than usual{_limit(found)}: {_listed(small)}."
+            yield f"{_effects_are(small)} visible only if larger than usual{_limit(diagnosis)}: {_listed(small)}."
         return
-    for each in effects:
-        place = f", at {each.places}" if each.places else ""
-        what, _, _ = each.experiment.partition(":")  # what to do; the table on the page says what it shows
+    for effect in effects:
+        place = f", at {effect.places}" if effect.places else ""
+        what, _, _ = effect.experiment.partition(":")  # what to do; the table on the page says what it shows
         experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
         if what.startswith("No "):
             experiment = f" {what.rstrip('.')}."
-        yield (f"Not visible in these data: {each.title}{place}. {each.why}{experiment}")
+        yield f"Not visible in these data: {effect.title}{place}. {effect.why}{experiment}"
 
 
-def _limit(found: Diagnosis) -> str:
-    needed = [each.needed_gain for each in found.invisible if each.needed_gain is not None and not each.absorbed]
+def _limit(diagnosis: Diagnosis) -> str:
+    needed = [each.needed_gain for each in diagnosis.invisible if each.needed_gain is not None and not each.absorbed]
     return f" (a cause has to lower the error by {percent(max(needed))})" if needed else ""
 
 
@@ -259,16 +312,16 @@ def _listed(effects: Sequence[Hidden]) -> str:
     return "; ".join(f"{each.title} ({each.places})" if placed and each.places else each.title for each in effects)
 
 
-def next_sentence(found: Diagnosis) -> str:
+def next_sentence(diagnosis: Diagnosis) -> str:
     """Say what to record next."""
-    sentence = found.experiment.sentence.rstrip(".")
-    what = "recording" if found.kind == "change" else "experiment"
+    sentence = diagnosis.experiment.sentence.rstrip(".")
+    what = "recording" if diagnosis.kind == "change" else "experiment"
     return f"{sentence}." if sentence else f"No further {what} is needed: nothing is left to distinguish."
 
 
-def meaning_of_gain(found: Diagnosis, cause: Cause) -> str:
+def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
     """Say what the gain of a cause is less of. The gain of the whole diagnosis is another: that of `error_sentence`."""
-    words = words_of(found.kind)
+    words = words_of(diagnosis.kind)
     if cause.where.effect == CONTACT:
         return (
             "less error about the level of the new recordings than about that of the reference"
@@ -277,14 +330,14 @@ def meaning_of_gain(found: Diagnosis, cause: Cause) -> str:
         )
     if cause.where.effect == UNKNOWN:
         return "less error if the predictable part were known"
-    return words.own_gain + (f"; the other {words.one}s kept" if len(found.causes) > 1 else "")
+    return words.own_gain + (f"; the other {words.one}s kept" if len(diagnosis.causes) > 1 else "")
 
 
-def own_gain_sentences(found: Diagnosis) -> Iterator[str]:
+def own_gain_sentences(diagnosis: Diagnosis) -> Iterator[str]:
     """Explain the column "own gain" of `tables`: one sentence for all causes whose gain has the same meaning."""
     meanings: dict[str, list[str]] = {}
-    for k, cause in enumerate(reported_causes(found), start=1):
-        meanings.setdefault(meaning_of_gain(found, cause), []).append(str(k))
+    for k, cause in enumerate(reported_causes(diagnosis), start=1):
+        meanings.setdefault(meaning_of_gain(diagnosis, cause), []).append(str(k))
     for meaning, numbers in meanings.items():
         of = f" of {', '.join(numbers)}" if len(meanings) > 1 else ""
         yield f"own gain{of}: {meaning}"
@@ -293,11 +346,11 @@ def own_gain_sentences(found: Diagnosis) -> Iterator[str]:
 # --- printed ----------------------------------------------------------------------------------------------------------
 
 
-def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
+def tables(diagnosis: Diagnosis) -> Iterator[Table]:
     """List the tables to print: the causes, and the errors by joint."""
-    names, causes = names_of(found), reported_causes(found)
+    names, causes = names_of(diagnosis), reported_causes(diagnosis)
     if causes:
-        headings: Row = (words_of(found.kind).one, "place", "size", "own gain", "may also be")
+        headings: Row = (words_of(diagnosis.kind).one, "place", "size", "own gain", "may also be")
         rows: list[Row] = [
             (
                 f"{k}. {cause.where.effect}",
@@ -308,57 +361,57 @@ def tables(found: Diagnosis) -> Iterator[tuple[str, Row, list[Row]]]:
             )
             for k, cause in enumerate(causes, start=1)
         ]
-        yield f"{found.finger}: {found.verdict}", headings, rows
-    factor, unit = unit_of(found)
-    words = words_of(found.kind)
+        yield f"{diagnosis.finger}: {diagnosis.verdict}", headings, rows
+    factor, unit = unit_of(diagnosis)
+    words = words_of(diagnosis.kind)
     before, after = words.nominal_column, words.extended_column
     headings = ("joint", "bias only", before, after, f"{before}, test", f"{after}, test", "noise floor")
-    yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(found, names, factor)
+    yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(diagnosis, names, factor)
 
 
-def error_rows(found: Diagnosis, names: Names, factor: float) -> list[Row]:
+def error_rows(diagnosis: Diagnosis, names: Names, factor: float) -> list[Row]:
     """List the errors by joint, then for all joints if there are several."""
     columns = [
-        found.bias_only_rms,
-        found.nominal.train_rms,
-        found.extended.train_rms,
-        found.nominal.test_rms,
-        found.extended.test_rms,
-        found.noise_floor,
+        diagnosis.bias_only_rms,
+        diagnosis.nominal.train_rms,
+        diagnosis.extended.train_rms,
+        diagnosis.nominal.test_rms,
+        diagnosis.extended.test_rms,
+        diagnosis.noise_floor,
     ]
     rows = [
         (
             names.joint(j),
             *(rounded(factor * values[0]) if values else "–" for values in (c[j - 1 : j] for c in columns)),
         )
-        for j in range(1, len(found.nominal.train_rms) + 1)
+        for j in range(1, len(diagnosis.nominal.train_rms) + 1)
     ]
     if len(rows) > 1:
         rows.append(("all joints", *(rounded(factor * together(column)) for column in columns)))
     return rows
 
 
-def lines(found: Diagnosis) -> Iterator[str]:
+def lines(diagnosis: Diagnosis) -> Iterator[str]:
     """List the lines to print: verdict, error, causes, what is left, what cannot be distinguished, what to do next."""
-    names = names_of(found)
-    yield headline(found)
-    yield error_sentence(found)
-    for k, cause in enumerate(found.causes, start=1):
+    names = names_of(diagnosis)
+    yield headline(diagnosis)
+    yield error_sentence(diagnosis)
+    for k, cause in enumerate(diagnosis.causes, start=1):
         yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
         if confusion := confusion_sentence(cause, names):
             yield f"     {confusion}"
-    yield from own_gain_sentences(found)
-    for sentence in (left_sentence(found), unknown_sentence(found)):
+    yield from own_gain_sentences(diagnosis)
+    for sentence in (left_sentence(diagnosis), unknown_sentence(diagnosis)):
         if sentence:
             yield sentence
-    if found.too_small:
-        small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in found.too_small)
+    if diagnosis.too_small:
+        small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
-    yield from hidden_sentences(found, names)
-    for event in found.events:
+    yield from hidden_sentences(diagnosis, names)
+    for event in diagnosis.events:
         yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
-    yield f"estimated from {found.signals}"
-    yield f"next: {next_sentence(found)}"
+    yield f"estimated from {diagnosis.signals}"
+    yield f"next: {next_sentence(diagnosis)}"
 
 
 def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[str, str, str]]:
@@ -376,11 +429,6 @@ def _at(kind: str, place: FoundPlace, names: Names) -> str:
     return "all" if place.joint is None and place.tendon is None else "–"
 
 
-def parameter_rows(parameters: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
-    """List (path, value with unit) of numbers."""
-    return [(path, magnitude(value, unit)) for path, (value, unit) in parameters.items()]
-
-
 def change_rows(cause: Cause, recordings: Sequence[str]) -> list[tuple[str, str]]:
     """List (when, main number with its 95 % interval): in the reference, then now or in each new recording."""
     changed = cause.changed
@@ -393,6 +441,6 @@ def change_rows(cause: Cause, recordings: Sequence[str]) -> list[tuple[str, str]
     ]
 
 
-def _quantity_interval(found: Interval, unit: str) -> str:
-    low, high = (quantity(each, unit) for each in (found.low, found.high))
-    return f"{quantity(found.value, unit)} ({low} to {high})"
+def _quantity_interval(interval: Interval, unit: str) -> str:
+    low, high = (quantity(end, unit) for end in (interval.low, interval.high))
+    return f"{quantity(interval.value, unit)} ({low} to {high})"

@@ -8,13 +8,13 @@ from itertools import groupby
 from tendonfmu.estimate import EffectCoverage, Verdict, counts_by_kind, identifiability
 from tendonfmu.excite import ExciteResult
 from tendonfmu.files import counted
+from tendonfmu.report.numbers import Row, Table
 
-Row = tuple[str, ...]
 KEYS = ("static", "coulomb", "stribeck_velocity", "viscous")
 NEVER = ("side", "working_point", "slow")  # causes that another motion removes
 
 
-def tables(result: ExciteResult) -> Iterator[tuple[str, Row, list[Row]]]:
+def tables(result: ExciteResult) -> Iterator[Table]:
     """List the tables to print: joints, friction effects, kinds of numbers."""
     motion = result.motion
     yield (

@@ -1,27 +1,42 @@
-"""What the figures of a fit show: torque, modelled friction and residual, ready to be drawn.
+"""What the figures of a fit show, ready to be drawn; the friction laws are in `fit_laws.py`.
 
-Torque and friction over time are figs. 6 and 7 of the paper. The residual is shown over time, angle and velocity.
-The friction laws are in `fit_law_figures.py`, the figures of the covariance in `fit_error_figures.py`.
+Torque and friction over time are figs. 6 and 7 of the paper. The residual is shown over time, angle and velocity. How
+well the numbers are known: standard error over value of each, and the correlations of all unknowns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet
-from tendonfmu.estimate import FitPicture, FitSeries
+from tendonfmu.drawing import DIVERGING, Band, Curve, Dots, Heat, Interval, Panel, Sheet, pooled
+from tendonfmu.estimate import FitPicture, FitSeries, identifiability
+from tendonfmu.files import are, counted
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.fit_error_figures import correlation_sheet, error_sheet
-from tendonfmu.report.fit_law_figures import law_sheets
+from tendonfmu.report.fit_laws import law_sheets
+from tendonfmu.report.numbers import rms, torque_unit
 
 SHOWN = 10.0  # s of motion, starting at BEGIN as in the paper's figs. 6 and 7 if the recording is long enough
 BEGIN = 60.0
 COMPARED = 3  # recordings not trained on that are drawn; more would make the page too large
 _BINS, _TIME_BINS = 36, 150
+_SHOWN = (1e-3, 10.0)  # standard error over value
+_TICKS = ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %"), (10.0, "1000 %"))
+_MOST_CELLS = 400  # rows of a correlation matrix; in larger ones the strongest of neighbours is drawn
+_NARROWEST = 0.035  # share of all unknowns; smaller groups share a name beside the correlation matrix
+_KINDS = {
+    "friction": "joint friction",
+    "load_friction": "load friction",
+    "pulley_friction": "pulley",
+    "edge_friction": "edge",
+}
+_ORDER = ("static", "coulomb", "stribeck_velocity", "viscous")
+_PLACE = re.compile(r"(joints|tendons)\[(\d+)\]")
 _FEWEST = 8  # samples in a bin; emptier bins are left out
 _TORQUE_KEYS = (
     ("measured", "measured joint torque"),
@@ -46,16 +61,9 @@ def fit_sheets(picture: FitPicture) -> list[Sheet]:
     ]
 
 
-def rms(values: Numbers) -> float:
-    """Return the root of the mean square of the finite values; NaN if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known.size else float("nan")
-
-
-def torque_unit(series: Sequence[FitSeries]) -> tuple[float, str]:
+def unit_of(series: Sequence[FitSeries]) -> tuple[float, str]:
     """Return factor and unit in which the torques of these recordings read well."""
-    largest = max((float(np.nanmax(np.abs(each.torque))) for each in series), default=0.0)
-    return (1.0, "N·m") if largest >= 2.0 else (1e3, "mN·m")
+    return torque_unit(max((float(np.nanmax(np.abs(one.torque))) for one in series), default=0.0))
 
 
 # --- torque over time -------------------------------------------------------------------------------------------------
@@ -67,7 +75,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
     explanation = (
         " The residual is taken before the bias has seen the sample. Its share is that of the rms in the time shown."
     )
-    if any(each.get("external_torque") for each in picture.report["recordings"]):
+    if any(recording.get("external_torque") for recording in picture.report["recordings"]):
         explanation += " A measured external torque is subtracted from the torque shown."
     for number, (part, series, where) in enumerate(_parts(picture), start=1):
         shown = _window(series.time, where, first)
@@ -75,7 +83,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
         if number == 1:
             first = begin - float(series.time[0])
         joints, name = picture.joint_names, f"torque_{number}"
-        scale = torque_unit([series])
+        scale = unit_of([series])
         panels = [_torque_panel(series, shown, j, joint, scale, name) for j, joint in enumerate(joints)]
         yield Sheet(
             section="torque",
@@ -120,11 +128,11 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
     predicted = torque - residual
     bias = predicted - series.model_torque[shown, j]
     left, size = rms(residual), rms(torque)
-    note = f"residual {_share(left, size)} of torque"
+    share = f"{100 * left / size:.0f} %" if size > 0 and np.isfinite(left) else "unknown"
     gaps = _gaps(series.time, time)
     return Panel(
         title=name,
-        note=note,
+        note=f"residual {share} of torque",
         alt=f"Joint {name}, {time[0]:.0f} to {time[-1]:.0f} s of {series.label}: measured torque, the model's "
         f"prediction and the bias in it. Torque rms {factor * size:.3g} {unit}, residual rms {factor * left:.3g} "
         f"{unit}.",
@@ -138,10 +146,6 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
         x_limits=(float(time[0]), float(time[-1])),
         zoom=zoom,
     )
-
-
-def _share(left: float, size: float) -> str:
-    return f"{100 * left / size:.0f} %" if size > 0 and np.isfinite(left) else "unknown"
 
 
 def _gaps(all_times: Numbers, time: Numbers) -> NDArray[np.intp]:
@@ -164,12 +168,12 @@ def residual_sheets(picture: FitPicture) -> Iterator[Sheet]:
 
 
 def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str, number: int) -> Sheet:
-    scale = torque_unit(series)
+    scale = unit_of(series)
     zoom = f"residual_{number}"
     panels = [
         panel for j, name in enumerate(picture.joint_names) for panel in _residual_panels(series, j, name, scale, zoom)
     ]
-    held_out = any(each.held_out is not None for each in series)
+    held_out = any(one.held_out is not None for one in series)
     return Sheet(
         section="residual",
         name=zoom,
@@ -184,11 +188,11 @@ def _residual_panels(
     series: Sequence[FitSeries], j: int, name: str, scale: tuple[float, str], zoom: str
 ) -> Iterator[Panel]:
     factor, unit = scale
-    residual = factor * np.concatenate([each.residual[:, j] for each in series])
-    judged = np.isfinite(residual) & np.concatenate([_judged(each) for each in series])  # NaN: no kinematics there
+    residual = factor * np.concatenate([one.residual[:, j] for one in series])
+    judged = np.isfinite(residual) & np.concatenate([_judged(one) for one in series])  # NaN: no kinematics there
     time, stripes = _end_to_end(series)
     angle, speed = (
-        np.concatenate([getattr(each, key)[:, j] for each in series]) for key in ("joint_angle", "joint_speed")
+        np.concatenate([getattr(one, key)[:, j] for one in series]) for key in ("joint_angle", "joint_speed")
     )
     spread = np.quantile(residual[judged], (0.02, 0.98)) if judged.any() else np.array([-1.0, 1.0])
     limit = 1.25 * float(np.max(np.abs(spread)))
@@ -208,7 +212,7 @@ def _residual_panels(
             y_label=f"residual ({unit})",
             bands=(Band("spread", centre, low, high),),
             curves=(Curve("median", centre, middle),),
-            stripes=tuple(stripes) if even else (),
+            stripes={"held_out": stripes} if even else {},
             y_limits=(-limit, limit) if limit > 0 else None,
             zoom=zoom if even else "",
         )
@@ -224,11 +228,11 @@ def _judged(series: FitSeries) -> Flags:
 def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
     """Return the times of recordings joined end to end, from 0, and the intervals that were held out."""
     times, stripes, begin = [], [], 0.0
-    for each in series:
-        time = each.time - each.time[0] + begin
+    for one in series:
+        time = one.time - one.time[0] + begin
         times.append(time)
-        if each.held_out is not None:
-            stripes += flagged_stretches(time, each.held_out)
+        if one.held_out is not None:
+            stripes += flagged_stretches(time, one.held_out)
         begin = float(time[-1])
     return np.concatenate(times), stripes
 
@@ -254,3 +258,179 @@ def _binned(x: Numbers, y: Numbers, even: bool) -> tuple[Numbers, Numbers, Numbe
     ]
     table = np.array(rows).reshape(-1, 4)
     return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
+
+
+# --- standard error over value ----------------------------------------------------------------------------------------
+
+
+def kind_of(path: str) -> tuple[int, int, str]:
+    """Return rank and name of the kind of a number: where it acts, and which number of a law it is."""
+    key = path.rsplit(".", 1)[-1]
+    for rank, (place, name) in enumerate(_KINDS.items()):
+        if re.search(rf"\.{place}(\[|\.)", path) and key in _ORDER:
+            return rank, _ORDER.index(key), f"{name}: {key.replace('_', ' ')}"
+    if ".cover." in path:
+        return len(_KINDS), 0, "cover: stiffness"
+    name = re.sub(r"\[\d+\]", "", path).replace("_", " ").replace(".", ": ", 1)
+    return len(_KINDS) + 1, 0, name
+
+
+def relative_error(entry: Mapping[str, Any]) -> float:
+    """Return standard error over value of a number of the report; infinite where there is none."""
+    error, value = entry.get("standard_error"), entry.get("value")
+    if error is None or not value or not np.isfinite(error):
+        return float("inf")
+    return abs(float(error) / float(value))
+
+
+def error_sheet(picture: FitPicture) -> Sheet:
+    """Show every estimated number as a dot, by kind."""
+    entries = picture.report["parameters"]
+    kinds = sorted({kind_of(entry["path"]) for entry in entries})
+    row_of = {kind: row for row, kind in enumerate(kinds)}
+    members: list[list[Mapping[str, Any]]] = [[] for _ in kinds]
+    for entry in entries:
+        members[row_of[kind_of(entry["path"])]].append(entry)
+    names = tuple(
+        f"{name}  {sum(bool(entry['identified']) for entry in of_kind)}/{len(of_kind)}"
+        for (_, _, name), of_kind in zip(kinds, members, strict=True)
+    )
+    known, of = sum(bool(entry["identified"]) for entry in entries), len(entries)
+    panel = Panel(
+        title="Standard error over value",
+        alt=f"Standard error over value of {of} numbers by kind, on a logarithmic axis; {known} are identified: "
+        + "; ".join(names)
+        + ".",
+        x_label="standard error / value",
+        y_label="",
+        size="large",
+        dots=tuple(_dots(members)),
+        log_x=True,
+        x_limits=_SHOWN,
+        ticks=_TICKS,
+        rows=names,
+        line=identifiability.LIMIT,
+        height=90 + 24 * len(names),
+    )
+    return Sheet(
+        section="errors",
+        name="standard_errors",
+        title="How well each number is known",
+        caption="Each kind shows how many of its numbers are identified. The line is at "
+        f"{100 * identifiability.LIMIT:.0f} % of the value. Dots beyond the axis are drawn at its end.",
+        keys=(("identified", "identified"), ("unidentified", "not identified")),
+        panels=(panel,),
+    )
+
+
+def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Dots]:
+    """Place the dots of a row side by side in the order of the description, so that none hides another."""
+    for style, wanted in (("identified", True), ("unidentified", False)):
+        x, y = [], []
+        for row, entries in enumerate(members):
+            for k, entry in enumerate(entries):
+                if bool(entry["identified"]) == wanted:
+                    x.append(float(np.clip(relative_error(entry), *_SHOWN)))
+                    y.append(row + (0.6 * (k + 0.5) / len(entries) - 0.3))
+        yield Dots(style, np.array(x), np.array(y))
+
+
+# --- correlation ------------------------------------------------------------------------------------------------------
+
+
+class Pair(NamedTuple):
+    """Two unknowns and the correlation of their errors."""
+
+    first: str
+    second: str
+    correlation: float
+
+
+def correlation(covariance: Numbers) -> Numbers:
+    """Return the correlations [p, p] of a covariance; 0 where the variance is 0."""
+    size = np.sqrt(np.diag(covariance))
+    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    return np.asarray(np.clip(covariance * scale[:, None] * scale[None, :], -1.0, 1.0))
+
+
+def unknown_name(path: str, role: str) -> str:
+    """Return the path of an unknown in the fit's own form: the last part says its role."""
+    return path if role == "value" else f"{path.rsplit('.', 1)[0]}.{role}"
+
+
+def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
+    """Return the pairs of unknowns whose errors are most strongly correlated, strongest first."""
+    values = correlation(picture.covariance)
+    rows, columns = np.triu_indices(len(values), 1)
+    best = np.argsort(-np.abs(values[rows, columns]), kind="stable")[:count]
+    names = [unknown_name(unknown.path, unknown.role) for unknown in picture.unknowns]
+    return [Pair(names[a], names[b], float(values[a, b])) for a, b in zip(rows[best], columns[best], strict=True)]
+
+
+def correlation_sheet(picture: FitPicture) -> Sheet:
+    """Show the correlations of all unknowns, ordered by where they act."""
+    places = [_place(unknown.path) for unknown in picture.unknowns]
+    order = sorted(range(len(places)), key=lambda k: places[k])
+    matrix = correlation(picture.covariance)[np.ix_(order, order)]
+    groups = _groups(picture, [places[k] for k in order])
+    above = int(np.count_nonzero(np.abs(np.triu(matrix, 1)) > 0.9))
+    shown, (every, _) = pooled(np.round(100 * matrix).astype(np.int8), (_MOST_CELLS, _MOST_CELLS))
+    more = f" and {every - 1} more" if every > 1 else ""
+    names = [unknown_name(picture.unknowns[k].path, picture.unknowns[k].role) + more for k in order[::every]]
+    ticks = tuple((((begin + end - 1) / 2 + 0.5) / every - 0.5, name) for name, begin, end in groups)
+    panel = Panel(
+        title="Correlation of the estimates",
+        alt=f"Correlation matrix of {len(order)} unknowns, ordered by joint and tendon; {counted(above, 'pair')} "
+        f"{are(above)} correlated by more than 0.9.",
+        x_label="the same order",
+        y_label="",
+        size="large",
+        heat=Heat(shown, names, names, DIVERGING, -100, 100, "%"),
+        ticks=ticks,
+        y_ticks=ticks,
+        x_limits=(-0.5, len(shown) - 0.5),
+        y_limits=(len(shown) - 0.5, -0.5),
+        borders=tuple(begin / every - 0.5 for _, begin, _ in groups),
+    )
+    return Sheet(
+        section="correlation",
+        name="correlation",
+        title="What the data cannot distinguish",
+        caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
+        "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
+        "either of them; blue: their sum is. "
+        + (f"Each entry is the strongest of {every} × {every}." if every > 1 else ""),
+        keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
+        panels=(panel,),
+    )
+
+
+def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[str, int, int], ...]:
+    """Return name, begin and end of the unknowns of each joint and tendon; small neighbours of a kind share a name."""
+    begins = [k for k in range(len(places)) if k == 0 or places[k] != places[k - 1]]
+    merged: list[tuple[int, int]] = []
+    for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
+        if merged and places[merged[-1][0]][0] == places[begin][0]:
+            before, middle = merged[-1]
+            if min(end - begin, middle - before) < _NARROWEST * len(places):
+                merged[-1] = (before, end)
+                continue
+        merged.append((begin, end))
+    names = []
+    for begin, end in merged:
+        first, last = (_place_name(picture, places[k]) for k in (begin, end - 1))
+        names.append((first if first == last else f"{first} … {last}", begin, end))
+    return tuple(names)
+
+
+def _place(path: str) -> tuple[int, int]:
+    """Return a sort key: joints before tendons before the rest, then the number of the joint or tendon."""
+    place = _PLACE.match(path)
+    return (2, 0) if place is None else ((0 if place[1] == "joints" else 1), int(place[2]))
+
+
+def _place_name(picture: FitPicture, place: tuple[int, int]) -> str:
+    kind, number = place
+    if kind == 2:
+        return "others"
+    return (picture.joint_names if kind == 0 else picture.tendon_names)[number - 1]

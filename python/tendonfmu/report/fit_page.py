@@ -2,74 +2,80 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.drawing import Sheet
-from tendonfmu.errors import InputError
-from tendonfmu.estimate import FitPicture
-from tendonfmu.files import whole_file
-from tendonfmu.report.fit_error_figures import strongest_pairs
-from tendonfmu.report.fit_figures import fit_sheets
-from tendonfmu.report.fit_summary import (
-    NumberGroup,
+from tendonfmu.estimate import FitPicture, verdicts
+from tendonfmu.files import write_text
+from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
+from tendonfmu.report.fit_text import (
     ResidualTable,
-    Summary,
-    Told,
-    UncertaintyRow,
-    rounded,
-    summarise,
+    apart,
+    consistency,
+    page_tables,
+    range_of,
+    residual_tables,
+    state_of,
+    summary_sentences,
 )
-from tendonfmu.report.page import render
+from tendonfmu.report.numbers import Row, percent, rounded, unit_text
+from tendonfmu.report.page import Drawn, Tile, drawn, render, write_figures
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
+_GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
-Cells = tuple[str, ...]
 Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     """Write `report.html` and one PNG file per sheet to a folder. Files appear whole or not at all."""
-    from tendonfmu.drawing import draw_panel, write_sheet
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    sheets, written = fit_sheets(picture), {}
-    for sheet in sheets:
-        file = folder / f"{sheet.name}.png"
-        write_sheet(sheet, [draw_panel(panel) for panel in sheet.panels], file)
-        written[file] = sheet.title
-    page = folder / PAGE
-    text = fit_page(picture, summarise(picture), sheets)
-    with whole_file(page) as partial:
-        partial.write_text(text, encoding="utf-8")
-    return {page: "all results, to be read in a browser"} | written
+    sheets = drawn(fit_sheets(picture))
+    pictures = write_figures(sheets, folder)
+    write_text(folder / PAGE, fit_page(picture, sheets))
+    return {folder / PAGE: "all results, to be read in a browser"} | pictures
 
 
-def fit_page(picture: FitPicture, summary: Summary, sheets: Sequence[Sheet]) -> str:
+def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:
     """Return the HTML text of the page of a fit."""
-    pairs = [
-        (f"{each.correlation:+.3f}".replace("-", "−"), each.first, each.second)
-        for each in strongest_pairs(picture, PAIRS)
-    ]
+    report, tables = picture.report, list(residual_tables(picture))
     return render(
         "fit.html.jinja",
         sheets,
-        report=picture.report,
+        report=report,
+        state=state_of(report),
+        tiles_shown=_tiles(report, tables),
+        sentences=list(summary_sentences(picture, tables)),
         joint_names=picture.joint_names,
-        summary=summary,
-        residuals=[_residuals(each) for each in summary.residuals],
-        uncertainty=[tuple(_uncertainty(row)) for row in summary.uncertainty],
-        doubts=[(each.reason, [_doubtful(entry) for entry in each.numbers]) for each in summary.doubts],
-        pairs=pairs,
-        recordings=[_recording(each) for each in picture.report["recordings"]],
-        options=_options(picture.report),
-        groups=[_group(each) for each in summary.groups],
+        residuals=[_residuals(table) for table in page_tables(picture)],
+        consistency=list(consistency(picture)),
+        uncertainty=list(_uncertainty(picture)),
+        doubts=list(_doubts(report)),
+        pairs=[
+            (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
+            for pair in strongest_pairs(picture, PAIRS)
+        ],
+        recordings=[_recording(recording) for recording in report["recordings"]],
+        options={name: _option(value) for name, value in report.get("options", {}).items()},
+        groups=list(_groups(picture)),
     )
+
+
+def _tiles(report: Entry, tables: Sequence[ResidualTable]) -> list[Tile]:
+    few, many = apart(tables)
+    tiles = [
+        Tile(percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
+        for table in few
+        if table.all.left is not None
+    ]
+    if many:
+        tiles.append(Tile(range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
+    bias = tables[0].all.share(tables[0].all.bias_only) if tables else None
+    if bias is not None:
+        tiles.append(Tile(percent(bias), "", "would be left by the bias alone"))
+    return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "", "numbers identified")]
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -77,45 +83,70 @@ def fit_page(picture: FitPicture, summary: Summary, sheets: Sequence[Sheet]) -> 
 
 def _residuals(table: ResidualTable) -> dict[str, Any]:
     """Return title and rows (name, torque, fitted, left, before the fit, bias alone, friction alone) of a table."""
-
-    def cells(values: Sequence[float | None]) -> Iterator[str]:
-        return (rounded(value) for value in values)
-
     rows = [
         (
             row.name,
-            *cells((row.torque, row.fitted)),
+            rounded(row.torque),
+            rounded(row.fitted),
             "" if row.left is None else f"{rounded(100 * row.left, 2)} %",
-            *cells((row.start, row.bias_only, row.model_only)),
+            *map(rounded, (row.start, row.bias_only, row.model_only)),
         )
         for row in table.rows
     ]
     return {"title": f"{table.title}: rms in {table.unit}", "rows": rows}
 
 
-def _uncertainty(row: UncertaintyRow) -> Iterator[str]:
-    yield from (row.joint, _number(row.inflation), str(row.directions), f"{rounded(100 * row.captured, 2)} %")
-    for told in row.sets:
-        known = told or Told(float("nan"), None, None)
-        yield rounded(known.std)
-        yield from ("–" if each is None else f"{rounded(100 * each, 2)} %" for each in (known.error, known.worst))
+def _uncertainty(picture: FitPicture) -> Iterator[Row]:
+    """List what is unknown of the friction torque, a row per joint; empty where it was not computed."""
+    uncertainty = picture.report.get("uncertainty")
+    if not uncertainty:
+        return
+    for j, joint in enumerate(picture.joint_names):
+        row = [joint, _number(uncertainty["inflation"][j]), str(uncertainty["directions"][j])]
+        row.append(f"{rounded(100 * uncertainty['captured'][j], 2)} %")
+        for name in ("train", "held_out", "loaded"):
+            data = uncertainty[name]
+            std = data["std"][j] if data else None
+            row.append(rounded(None if std is None else 1e3 * std))
+            errors = [data["error_rms"][j], data["error_worst"][j]] if std else [None, None]
+            row += ["–" if error is None else f"{rounded(100 * error / std, 2)} %" for error in errors]
+        yield tuple(row)
 
 
-def _doubtful(entry: Entry) -> Cells:
-    return entry["path"], *_value(entry), _unit(entry["unit"]), entry["advice"] or ""
+def _doubts(report: Entry) -> Iterator[tuple[str, list[Row]]]:
+    """List the numbers that are not identified by reason, most frequent first."""
+    by_reason: dict[str, list[Entry]] = {}
+    for entry in report["parameters"]:
+        if not entry["identified"]:
+            by_reason.setdefault(entry.get("reason") or "unknown", []).append(entry)
+    for reason, entries in sorted(by_reason.items(), key=lambda item: -len(item[1])):
+        rows: list[Row] = [
+            (entry["path"], *_value(entry), unit_text(entry["unit"]), entry["advice"] or "") for entry in entries
+        ]
+        yield verdicts.CAUSES.get(reason, reason), rows
 
 
-def _group(group: NumberGroup) -> dict[str, Any]:
-    """Return a group with rows (number, start, fitted, standard error, unit, identified)."""
-    return {
-        "name": group.name,
-        "identified": group.identified,
-        "doubtful": [not entry["identified"] for _, entry in group.numbers],
-        "rows": [
-            (path, _number(entry["start"], 4), *_value(entry), _unit(entry["unit"]), _identified(entry))
-            for path, entry in group.numbers
-        ],
-    }
+def _groups(picture: FitPicture) -> Iterator[dict[str, Any]]:
+    """List all numbers by joint and tendon: (number, start, fitted, standard error, unit, identified)."""
+    groups: dict[str, list[tuple[str, Entry]]] = {}
+    for entry in picture.report["parameters"]:
+        match = _GROUP.fullmatch(entry["path"])
+        if match is None:
+            groups.setdefault("Others", []).append((entry["path"], entry))
+            continue
+        names = picture.joint_names if match[1] == "joints" else picture.tendon_names
+        number = int(match[2])
+        groups.setdefault(f"{match[1][:-1].capitalize()} {number}: {names[number - 1]}", []).append((match[3], entry))
+    for name, numbers in groups.items():
+        yield {
+            "name": name,
+            "identified": sum(bool(entry["identified"]) for _, entry in numbers),
+            "doubtful": [not entry["identified"] for _, entry in numbers],
+            "rows": [
+                (path, _number(entry["start"], 4), *_value(entry), unit_text(entry["unit"]), _identified(entry))
+                for path, entry in numbers
+            ],
+        }
 
 
 def _value(entry: Entry) -> tuple[str, str]:
@@ -127,25 +158,16 @@ def _identified(entry: Entry) -> str:
     return ("yes" if entry["identified"] else "no") + bound
 
 
-def _recording(each: Entry) -> Cells:
-    counts = (str(each[key]) for key in ("samples", "used", "held_out", "contact_left_out"))
-    return each["path"], _number(each["duration"], 4), *counts, _number(each["mean_force"]), str(each["kinematics"])
+def _recording(recording: Entry) -> Row:
+    counts = (str(recording[key]) for key in ("samples", "used", "held_out", "contact_left_out"))
+    length, force = _number(recording["duration"], 4), _number(recording["mean_force"])
+    return recording["path"], length, *counts, force, str(recording["kinematics"])
 
 
-def _options(report: Mapping[str, Any]) -> dict[str, str]:
-    """Return the options that were given, as text."""
-
-    def text(value: Any) -> str:
-        if isinstance(value, list | tuple):
-            return ", ".join(map(text, value)) or "none"
-        return {True: "yes", False: "no", None: "none"}.get(value, str(value)) if not value else str(value)
-
-    return {key: text(value) for key, value in report.get("options", {}).items()}
-
-
-def _unit(name: str) -> str:
-    """Format a unit; empty for a plain number."""
-    return "" if name == "1" else name.replace(".", "·")
+def _option(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_option, value)) or "none"
+    return {True: "yes", False: "no", None: "none"}.get(value, str(value)) if not value else str(value)
 
 
 def _number(value: float | None, digits: int = 3) -> str:

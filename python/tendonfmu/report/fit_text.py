@@ -1,41 +1,238 @@
-"""How a finished fit reads in the terminal: tables and lines that `cli/fit.py` prints."""
+"""How a fit reads in plain words: tables and lines that `cli/fit.py` prints, and sentences of the page."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-from tendonfmu.estimate import Fitted, FrictionFit, verdicts
+from tendonfmu.estimate import FitPicture, Fitted, FrictionFit, identifiability, verdicts
 from tendonfmu.files import counted
+from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit
 
-Row = tuple[str, ...]
+Report = Mapping[str, Any]
 EXAMPLES = 3  # paths listed for each reason
+_METHODS = {
+    "batch": "Maximum likelihood over all samples at once (batch)",
+    "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
+}
+_LIMIT = f"{100 * identifiability.LIMIT:.0f}\u00a0%"
+_COMPARED = "Not trained on: "
 
 
-def tables(fit: FrictionFit) -> Iterator[tuple[str, Row, list[Row]]]:
+# --- residuals --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ResidualRow:
+    """Residuals of one joint, or of all together: rms in `ResidualTable.unit`, None where unknown."""
+
+    name: str  # of the joint, or of the set of data
+    torque: float | None
+    start: float | None
+    bias_only: float | None
+    model_only: float | None
+    fitted: float | None
+
+    @property
+    def left(self) -> float | None:
+        """Return the residual over the torque."""
+        return self.share(self.fitted)
+
+    def share(self, value: float | None) -> float | None:
+        return value / self.torque if value is not None and self.torque else None
+
+
+@dataclass(frozen=True)
+class ResidualTable:
+    """Residuals of one set of data, a row per joint; or of all sets if the finger has one joint."""
+
+    title: str
+    unit: str  # of the torques
+    rows: list[ResidualRow]
+    all: ResidualRow  # all joints together
+
+
+def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
+    """List the residuals of a fit by set of data."""
+    residual = picture.report["residual"]
+    sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
+    sets += [(f"{_COMPARED}{run['label']}", run) for run in residual.get("comparisons") or []]
+    for title, data in sets:
+        if data and data.get("rms"):
+            yield _residual_table(title, data, picture.joint_names)
+
+
+def _residual_table(title: str, data: Report, joints: Sequence[str]) -> ResidualTable:
+    keys = ("torque_rms", "start_rms", "bias_only_rms", "model_only_rms", "rms")
+    columns = [column(data.get(key) or [None] * len(joints)) for key in keys]
+    factor, unit = torque_unit(max(columns[0], default=0.0))
+    rows = [
+        ResidualRow(name, *(factor * value if math.isfinite(value) else None for value in values))
+        for name, *values in zip([*joints, "all joints"], *([*each, together(each)] for each in columns), strict=True)
+    ]
+    return ResidualTable(title, unit, rows if len(joints) > 1 else rows[:1], rows[-1])
+
+
+def page_tables(picture: FitPicture) -> list[ResidualTable]:
+    """List the residuals as the page shows them: those of a finger with one joint are joined, a row per set of data."""
+    tables = list(residual_tables(picture))
+    if len(picture.joint_names) > 1:
+        return tables
+    by_unit: dict[str, list[ResidualRow]] = {}
+    for table in tables:
+        by_unit.setdefault(table.unit, []).append(replace(table.all, name=table.title))
+    return [ResidualTable(picture.joint_names[0], unit, rows, rows[0]) for unit, rows in by_unit.items()]
+
+
+# --- sentences of the page --------------------------------------------------------------------------------------------
+
+
+def state_of(report: Report) -> str:
+    """Say what is wrong with the fit; empty if nothing is."""
+    if not report["finished"]:
+        return "Unfinished: the fit was interrupted. These are the best values so far."
+    return "" if report["converged"] else "Not converged: the values may still change with more iterations."
+
+
+def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> Iterator[str]:
+    """Say what was estimated, how, how well the model fits, and how well its numbers are known."""
+    report = picture.report
+    yield from _what(picture)
+    method = _METHODS.get(report["method"], str(report["method"]))
+    rounds = "" if report["method"] == "ekf" else f", {counted(report['passes'], 'pass', 'passes')} over the data"
+    yield f"{method}{rounds}, {report['seconds']:.3g} s."
+    yield from _how_well(tables)
+    count, of = report["identified"]["count"], report["identified"]["of"]
+    if count == of:
+        yield f"All {of} numbers are identified: their standard errors are at most {_LIMIT} of their values."
+    else:
+        yield (
+            f"{count} of {of} numbers are identified: their standard errors are at most {_LIMIT} of their values. What "
+            f"would identify the {'last one' if of - count == 1 else f'other {of - count}'} is listed below."
+        )
+
+
+def _what(picture: FitPicture) -> Iterator[str]:
+    report, recordings = picture.report, picture.report["recordings"]
+    seconds = sum(recording["duration"] or 0.0 for recording in recordings)
+    used, held = (sum(recording[key] for recording in recordings) for key in ("used", "held_out"))
+    one = len(recordings) == 1
+    source = f"one recording of {seconds:.4g} s" if one else f"{len(recordings)} recordings of {seconds:.4g} s together"
+    finger = f"{counted(len(picture.joint_names), 'joint')}, {counted(len(picture.tendon_names), 'tendon')}"
+    sentence = (
+        f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
+        f"from {source}: {_thousands(used)} samples"
+    )
+    yield sentence + (f"; {_thousands(held)} more were held out to judge the result." if held else ".")
+    out = sum(recording.get("contact_left_out") or 0 for recording in recordings)
+    if out:
+        samples = "sample with contact was" if out == 1 else "samples with contact were"
+        yield f"{_thousands(out)} {samples} left out."
+
+
+def _thousands(number: int) -> str:
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
+    few, many = apart(tables)
+    for table in few:
+        row = table.all
+        if row.left is None:
+            continue
+        amounts = f"{rounded(row.fitted)} of {rounded(row.torque)} {table.unit}"
+        text = f"{table.title}: {amounts} of torque are left, {percent(row.left)}"
+        start, bias, model = (row.share(value) for value in (row.start, row.bias_only, row.model_only))
+        if start is not None:
+            text += f"; with the starting values {percent(start)}"
+        if table is tables[0] and bias is not None and model is not None:
+            text += (
+                f". The bias alone, without friction, leaves {percent(bias)}; the friction alone, with a constant "
+                f"bias, {percent(model)}"
+            )
+        yield text + "."
+    if many:
+        yield f"{counted(len(many), 'recording')} not trained on: {range_of(many)} of the torque are left."
+
+
+def apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:
+    """Split tables into those described one by one and comparisons that are too many for that."""
+    compared = [table for table in tables if table.title.startswith(_COMPARED)]
+    if len(compared) <= 2:
+        return list(tables), []
+    return [table for table in tables if table not in compared], compared
+
+
+def range_of(tables: Sequence[ResidualTable]) -> str:
+    """Return the least and the largest share of the torque that is left."""
+    shares = [table.all.left for table in tables if table.all.left is not None]
+    return f"{percent(min(shares))} to {percent(max(shares))}" if shares else "an unknown share"
+
+
+def consistency(picture: FitPicture) -> Iterator[str]:
+    """Describe the size (NIS) and whiteness of the innovations in words."""
+    innovations = picture.report["innovations"]
+    nis, lag_one = innovations["nis"], innovations["whiteness"]["lag_one"]
+    if nis.get("mean") is not None:
+        low, high = nis["interval"]
+        meaning = "as large as the noise that the description states"
+        if not nis["consistent"]:
+            size, far = ("larger", "small") if nis["mean"] > 1 else ("smaller", "large")
+            meaning = (
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; this "
+                f"alone makes the standard errors too {far} by about the same factor"
+            )
+        yield (
+            f"Mean squared standardised innovation (NIS) {nis['mean']:.3g}; expected 1, in 95 % of cases between "
+            f"{low:.4g} and {high:.4g}. The innovations are {meaning}."
+        )
+    strong = [
+        f"{name} {value:.2f}"
+        for name, value in zip(picture.joint_names, lag_one, strict=True)
+        if value is not None and abs(value) > 0.1
+    ]
+    if strong:
+        effective = innovations.get("effective") or {"samples": [0.0], "worth": [0.0]}
+        samples, worth = sum(effective["samples"]), sum(effective["worth"])
+        count = "the standard errors count each sample as new"
+        if worth < samples:
+            count = f"estimates and standard errors count the {samples:.0f} samples as {worth:.0f}"
+        yield (
+            f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none. The residual "
+            f"has a shape in time that the model lacks; {count}."
+        )
+
+
+# --- printed ----------------------------------------------------------------------------------------------------------
+
+
+def tables(fit: FrictionFit) -> Iterator[Table]:
     """List the tables to print: what is left of the torque, and the numbers by kind."""
-    report, numbers, joints = fit.report_, fit.numbers_, fit.description_.joint_names
-    known = report["identified"]
-    yield _residuals(report, joints)
+    report, known = fit.report_, fit.report_["identified"]
+    yield _residuals(report, fit.description_.joint_names)
     yield (
         f"numbers with a standard error of at most 30 %: {known['count']} of {known['of']}",
         ("kind", "numbers", "identified", "median change", "at a bound"),
-        list(_kinds(numbers)),
+        list(_kinds(fit.numbers_)),
     )
 
 
-def _residuals(report: Mapping[str, Any], joints: Sequence[str]) -> tuple[str, Row, list[Row]]:
+def _residuals(report: Report, joints: Sequence[str]) -> Table:
     residual = report["residual"]
     sets = [("training", residual["train"]), ("held out", residual["held_out"])]
-    sets += [(f"{each['label']}, {each['mean_force']:.3g} N", each) for each in residual["comparisons"]]
+    sets += [(f"{run['label']}, {run['mean_force']:.3g} N", run) for run in residual["comparisons"]]
     rows = []
-    for label, found in sets:
-        if not found or "rms" not in found:
+    for label, data in sets:
+        if not data or "rms" not in data:
             continue
         for j, joint in enumerate(joints):
             names = ("torque_rms", "bias_only_rms", "model_only_rms", "start_rms", "rms")
-            rows.append((label if j == 0 else "", joint, *(_milli(found[name][j]) for name in names), _share(found, j)))
+            left, torque = data["rms"][j], data["torque_rms"][j]
+            share = f"{100 * left / torque:.0f} %" if left is not None and torque else "-"
+            rows.append((label if j == 0 else "", joint, *(_milli(data[name][j]) for name in names), share))
     headings = ("", "joint", "torque", "bias only", "model only", "before", "fitted", "left")
     return f"{report['finger']}: residual before the bias learns from it, rms in mN·m", headings, rows
 
@@ -44,15 +241,12 @@ def _milli(value: float | None) -> str:
     return "-" if value is None else f"{1e3 * value:.2f}"
 
 
-def _share(found: Mapping[str, Any], j: int) -> str:
-    left, torque = found["rms"][j], found["torque_rms"][j]
-    return f"{100 * left / torque:.0f} %" if left is not None and torque else "-"
-
-
 def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
     by_kind: dict[str, list[Fitted]] = {}
     for number in numbers:
-        by_kind.setdefault(_kind(number), []).append(number)
+        path = number.number.path
+        kind = path.split("[")[0] if path.startswith("bias") else f"{number.number.kind}.{number.number.key}"
+        by_kind.setdefault(kind, []).append(number)
     for kind, members in sorted(by_kind.items()):
         known = [number for number in members if number.identified]
         changes = sorted(abs(number.value / number.start - 1) for number in known if number.start)
@@ -61,22 +255,16 @@ def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
         yield kind, str(len(members)), str(len(known)), change, str(bound) if bound else "-"
 
 
-def _kind(number: Fitted) -> str:
-    path = number.number.path
-    return path.split("[")[0] if path.startswith("bias") else f"{number.number.kind}.{number.number.key}"
-
-
 def lines(fit: FrictionFit) -> Iterator[str]:
     """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers."""
     report, numbers = fit.report_, fit.numbers_
-    used = sum(each["used"] for each in report["recordings"])
-    held = sum(each["held_out"] for each in report["recordings"])
-    left = sum(each["contact_left_out"] + each["faulty_left_out"] for each in report["recordings"])
+    keys = ("used", "held_out", "contact_left_out", "faulty_left_out")
+    used, held, contact, faulty = (sum(recording[key] for recording in report["recordings"]) for key in keys)
     ended = "converged" if report["converged"] else "NOT converged"
     passes = f", {counted(report['passes'], 'pass', 'passes')}" if report["passes"] else ""
     yield (
         f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {counted(used, 'sample')}, "
-        f"{held} held out, {left} left out"
+        f"{held} held out, {contact + faulty} left out"
     )
     innovations = report["innovations"]
     low, high = innovations["nis"]["interval"]
@@ -88,7 +276,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
         )
     samples, worth = (innovations["effective"][key] for key in ("samples", "worth"))
     if sum(worth) < sum(samples):
-        by_joint = ", ".join(f"{each:.0f}" for each in worth)
+        by_joint = ", ".join(f"{count:.0f}" for count in worth)
         yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
     if report["uncertainty"]:
         yield _uncertainty(report["uncertainty"])
@@ -101,10 +289,10 @@ def lines(fit: FrictionFit) -> Iterator[str]:
             yield f"    ... and {count - EXAMPLES} more; --report lists all"
 
 
-def _uncertainty(found: Mapping[str, Any]) -> str:
-    std, error = found["train"]["std"], found["train"]["error_rms"]
+def _uncertainty(uncertainty: Report) -> str:
+    std, error = uncertainty["train"]["std"], uncertainty["train"]["error_rms"]
     size = ", ".join(_milli(value) for value in std)
-    times = ", ".join(f"{value:.3g}" for value in found["inflation"])
+    times = ", ".join(f"{value:.3g}" for value in uncertainty["inflation"])
     left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
     return (
         f"uncertainty of the modelled friction torque: {size} mN·m rms, the residuals counting as {times} times the "

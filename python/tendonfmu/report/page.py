@@ -5,85 +5,70 @@ All texts are escaped.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from tendonfmu.drawing import (
-    STYLES,
-    MatrixPanel,
-    Panel,
-    Sheet,
-    dark_colours,
-    figures_json,
-    height_in_page,
-    packed_plotly,
-    size_of,
-)
+from tendonfmu.drawing import STYLES, Sheet
+from tendonfmu.errors import InputError
 from tendonfmu.files import html_template
+
+Drawn = tuple[Sheet, Sequence[Any]]  # a sheet and the Plotly figure of each of its panels
 
 
 class Tile(NamedTuple):
     """An important number and what it is."""
 
-    value: str  # the number as text
-    unit: str  # its unit; may be empty
-    meaning: str  # what it is
+    value: str
+    unit: str  # may be empty
+    meaning: str
 
 
-@dataclass(frozen=True)
-class PagePanel:
-    """A panel as a page shows it."""
+class PageSheet(NamedTuple):
+    """A sheet as the templates show it."""
 
-    number: int  # index of its figure in the page
-    title: str  # texts of the panel
-    note: str
-    alt: str
-    width: int  #
-    height: int
+    sheet: Sheet
+    first: int  # index of the figure of its first panel in the page
+    keys: list[tuple[str, Any, str]]  # (name of the style, the style, meaning)
 
 
-@dataclass(frozen=True)
-class PageSheet:
-    """A sheet as a page shows it."""
+def drawn(sheets: Iterable[Sheet]) -> list[Drawn]:
+    """Make the figures of sheets."""
+    from tendonfmu.drawing import figures_of  # a page is checked for before Plotly is needed
 
-    sheet: Sheet  # the sheet
-    size: str  # size of its panels
-    keys: list[tuple[str, str, float, str]]  # (CSS class, CSS colour, opacity, meaning)
-    panels: list[PagePanel]  # its panels
+    return [(sheet, figures_of(sheet)) for sheet in sheets]
 
 
-def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
+def render(template: str, sheets: Iterable[Drawn] = (), **content: Any) -> str:
     """Return the HTML text of a page."""
-    figures: dict[str, list[PageSheet]] = {}
-    panels: list[Panel | MatrixPanel] = []
-    names: list[dict[str, str]] = []
-    for sheet in sheets:
-        figures.setdefault(sheet.section, []).append(_placed(sheet, len(panels)))
-        panels += sheet.panels
-        names += [dict(sheet.keys)] * len(sheet.panels)
-    drawing = {"plotly": packed_plotly(), "dark_colours": dark_colours()} if panels else {}
-    drawn = figures_json(panels, names) if panels else ""
-    return html_template(template).render(figures=figures, drawn=drawn, **drawing, **content)
+    by_section: dict[str, list[PageSheet]] = {}
+    figures: list[Any] = []
+    for sheet, of_sheet in sheets:
+        keys = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
+        by_section.setdefault(sheet.section, []).append(PageSheet(sheet, len(figures), keys))
+        figures += zip(sheet.panels, of_sheet, strict=True)
+    return html_template(template).render(figures=by_section, **_embedded(figures), **content)
 
 
-def _placed(sheet: Sheet, first: int) -> PageSheet:
-    panels = [
-        PagePanel(
-            number,
-            panel.title,
-            panel.note if isinstance(panel, Panel) else "",
-            panel.alt,
-            size_of(panel)[0],
-            height_in_page(panel),
-        )
-        for number, panel in enumerate(sheet.panels, start=first)
-    ]
-    return PageSheet(sheet, sheet.panels[0].size if sheet.panels else "small", _keys(sheet), panels)
+def _embedded(figures: list[Any]) -> dict[str, Any]:
+    if not figures:
+        return {"drawn": ""}
+    from tendonfmu.drawing import dark_colours, figures_json, packed_plotly
+
+    return {"drawn": figures_json(figures), "plotly": packed_plotly(), "dark_colours": dark_colours()}
 
 
-def _keys(sheet: Sheet) -> list[tuple[str, str, float, str]]:
-    """List the keys of a sheet."""
-    # Keys of the correlation also have their style's name as a class, since a dark page inverts its colours.
-    styles = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
-    return [(f"{style.shape} {name}", style.colour, style.alpha, meaning) for name, style, meaning in styles]
+def write_figures(sheets: Iterable[Drawn], folder: Path) -> dict[Path, str]:
+    """Write the figures of each sheet as a PNG file to a folder, which is made if missing."""
+    from tendonfmu.drawing import write_sheet
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+    written = {}
+    for sheet, figures in sheets:
+        file = folder / f"{sheet.name}.png"
+        write_sheet(sheet, figures, file)
+        written[file] = sheet.caption or sheet.title
+    return written

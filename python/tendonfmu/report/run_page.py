@@ -1,18 +1,34 @@
-"""The page of a run: `tendonfmu run --report`."""
+"""The page of a run, `tendonfmu run --report`: torques by joint, contact and slack, motion, numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet, line_of
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
-from tendonfmu.report.page import Tile, render
-from tendonfmu.report.run_figures import run_sheets
+from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.numbers import Row, rms, torque_unit
+from tendonfmu.report.page import Tile, drawn, render
+
+Table = Mapping[str, NDArray[Any]]
 
 PAGE = "run.html"
+ZOOM = "time"  # all panels are zoomed together
+_TIME = "time (s)"
+_MOST = 1000  # stretches of a band; curves are thinned where they are drawn
+_KEYS = (
+    ("measured", "joint torque"),
+    ("predicted", "friction torque"),
+    ("after", "compensated torque"),
+    ("confidence", "± one standard deviation"),
+    ("in_contact", "contact"),
+)
 
 
 def page_of(report: Path) -> Path:
@@ -29,9 +45,7 @@ def check_page(report: Path, *inputs: Path) -> None:
         check_output(page, *inputs)
 
 
-def write_run_page(
-    report: Path, numbers: Mapping[str, Any], table: Mapping[str, NDArray[Any]], label: NDArray[Any] | None = None
-) -> Path:
+def write_run_page(report: Path, numbers: Mapping[str, Any], table: Table, label: NDArray[Any] | None = None) -> Path:
     """Write the page of a run, whole or not at all."""
     # table: [N]
     page = page_of(report)
@@ -41,18 +55,20 @@ def write_run_page(
     return page
 
 
-def run_page(numbers: Mapping[str, Any], table: Mapping[str, NDArray[Any]], label: NDArray[Any] | None = None) -> str:
+def run_page(numbers: Mapping[str, Any], table: Table, label: NDArray[Any] | None = None) -> str:
     """Return the HTML text of the page of a run."""
-    joints = [each["name"] for each in numbers["joints"]]
-    tendons = [each["name"] for each in numbers["tendons"]]
+    joints = [joint["name"] for joint in numbers["joints"]]
+    tendons = [tendon["name"] for tendon in numbers["tendons"]]
     return render(
         "run.html.jinja",
-        list(run_sheets(table, joints, tendons, label)),
+        drawn(run_sheets(table, joints, tendons, label)),
         run=numbers,
         headline_numbers=list(_tiles(numbers)),
-        joints=[_joint_row(each) for each in numbers["joints"]],
+        joints=[_joint_row(joint) for joint in numbers["joints"]],
         slack=[
-            (each["name"], f"{100 * each['slack_share']:.2g} %") for each in numbers["tendons"] if each["slack_share"]
+            (tendon["name"], f"{100 * tendon['slack_share']:.2g} %")
+            for tendon in numbers["tendons"]
+            if tendon["slack_share"]
         ],
         files=[
             ("model", numbers["model"]),
@@ -67,23 +83,24 @@ def _tiles(run: Mapping[str, Any]) -> Iterator[Tile]:
     seconds, contact = run["duration"], run["contact"]
     length = (f"{seconds / 60:.3g}", "min") if seconds >= 120 else (f"{seconds:.3g}", "s")
     yield Tile(*length, f"recorded, {counted(run['samples'], 'sample')}")
-    free = [(each["free_joint_torque_rms"], each["free_compensated_torque_rms"]) for each in run["joints"]]
+    free = [(joint["free_joint_torque_rms"], joint["free_compensated_torque_rms"]) for joint in run["joints"]]
     if all(None not in pair for pair in free):
         torque, left = (sum(value**2 for value in values) ** 0.5 for values in zip(*free, strict=True))
         yield Tile(*_torque(torque), "rms of the joint torque without contact, all joints together")
         yield Tile(*_torque(left), "rms of what compensation leaves of it")
     count = len(contact["intervals"])
     yield Tile(str(count), "", f"{'contact' if count == 1 else 'contacts'}, {100 * contact['share']:.2g} % of the time")
-    slack = max((each["slack_share"] for each in run["tendons"]), default=0.0)
+    slack = max((tendon["slack_share"] for tendon in run["tendons"]), default=0.0)
     yield Tile(f"{100 * slack:.2g}", "%", "of the time slack, at most, of all tendons")
 
 
 def _torque(value: float) -> tuple[str, str]:
     """Format a torque (N·m) with its unit."""
-    return (f"{value:.3g}", "N·m") if value >= 1.0 else (f"{1e3 * value:.3g}", "mN·m")
+    factor, unit = torque_unit(value, 1.0)
+    return f"{factor * value:.3g}", unit
 
 
-def _joint_row(joint: Mapping[str, Any]) -> tuple[str, ...]:
+def _joint_row(joint: Mapping[str, Any]) -> Row:
     low, high = joint["angle"]
     names = ("joint", "friction", "compensated", "free_joint", "free_compensated")
     torques = (joint[f"{name}_torque_rms"] for name in names)
@@ -94,3 +111,130 @@ def _joint_row(joint: Mapping[str, Any]) -> tuple[str, ...]:
         f"{1e3 * joint['largest_compensated_torque']:.3g}",
         f"{100 * joint['contact_share']:.2g} %",
     )
+
+
+# --- figures ----------------------------------------------------------------------------------------------------------
+
+
+def run_sheets(
+    table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None = None
+) -> Iterator[Sheet]:
+    """Yield the figures of a run."""
+    # table: [N]
+    torques = (table[f"joint_torque[{j}]"] for j in range(1, len(joints) + 1))
+    factor, unit = torque_unit(max(float(np.abs(torque).max()) for torque in torques), 1.0)
+    for j, name in enumerate(joints, start=1):
+        yield Sheet(
+            section="joints",
+            name=f"joint_{j}",
+            title=name,
+            caption="",
+            keys=tuple(_keys_of(table, j)),
+            panels=tuple(_torque_panels(table, j, name, factor, unit)),
+        )
+    yield _events_sheet(table, joints, tendons, label)
+    yield Sheet(
+        section="motion",
+        name="motion",
+        title="Joint angles and speeds",
+        caption="",
+        keys=(("fitted", "angle"), ("slow", "speed")),
+        panels=tuple(_motion_panels(table, joints)),
+        folded=True,
+    )
+
+
+def _keys_of(table: Table, j: int) -> Iterator[tuple[str, str]]:
+    drawn = {"in_contact": table[f"joint_contact[{j}]"], "confidence": table[f"compensated_torque_std[{j}]"]}
+    yield from (key for key in _KEYS if np.any(drawn.get(key[0], True)))
+
+
+def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[Panel]:
+    time = table["time"]
+    torque, friction, left, std = (
+        factor * np.asarray(table[f"{key}[{j}]"], dtype=np.float64)
+        for key in ("joint_torque", "friction_torque", "compensated_torque", "compensated_torque_std")
+    )
+    both = Panel(
+        title="Torque and friction",
+        note=f"{rms(torque):.3g} {unit} rms",
+        alt=f"Joint torque of {name} and its friction torque over time",
+        x_label=_TIME,
+        y_label=f"torque ({unit})",
+        size="medium",
+        curves=(Curve("measured", time, torque), Curve("predicted", time, friction)),
+        stripes={"in_contact": flagged_stretches(time, table[f"joint_contact[{j}]"])},
+        zoom=ZOOM,
+    )
+    yield both
+    yield replace(
+        both,
+        title="Compensated torque",
+        note=f"{rms(left):.3g} {unit} rms",
+        alt=f"Compensated torque of {name} over time, and when contact was detected there",
+        bands=(Band("confidence", *_thinned_band(time, left - std, left + std)),) if std.any() else (),
+        curves=(Curve("after", time, left),),
+    )
+
+
+def _thinned_band(
+    time: NDArray[Any], low: NDArray[Any], high: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Thin a band to the extremes of at most `_MOST` stretches of samples."""
+    if len(time) <= 2 * _MOST:
+        return time, low, high
+    begins = np.unique(np.linspace(0, len(time), _MOST, endpoint=False).astype(int))
+    middles = (begins + np.append(begins[1:], len(time)) - 1) // 2
+    return time[middles], np.minimum.reduceat(low, begins), np.maximum.reduceat(high, begins)
+
+
+def _events_sheet(table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None) -> Sheet:
+    time = table["time"]
+    rows: list[tuple[str, str, list[Interval]]] = []
+    if label is not None:
+        rows.append(("labelled contact", "labelled", flagged_stretches(time, label)))
+    rows += [
+        (f"contact, {name}", "contact", flagged_stretches(time, table[f"joint_contact[{j}]"]))
+        for j, name in enumerate(joints, start=1)
+    ]
+    slack = [
+        (f"slack, {name}", "slack", flagged_stretches(time, table[f"slack[{i}]"])) for i, name in enumerate(tendons, 1)
+    ]
+    rows += [row for row in slack if row[2]]  # only tendons that have been slack
+    used = {style for _, style, stretches in rows if stretches}
+    meanings = (("labelled", "contact as labelled"), ("contact", "contact as detected"), ("slack", "tendon slack"))
+    panel = Panel(
+        title="Over time",
+        alt="When contact was detected at each joint, and when a tendon was slack",
+        x_label=_TIME,
+        y_label="",
+        size="large" if len(rows) > 8 else "medium",
+        curves=tuple(
+            Curve(style, *line_of(stretches, row)) for row, (_, style, stretches) in enumerate(rows) if stretches
+        ),
+        rows=tuple(name for name, _, _ in rows),
+        x_limits=(float(time[0]), float(time[-1])) if time[-1] > time[0] else None,
+        zoom=ZOOM,
+    )
+    return Sheet(
+        section="events",
+        name="events",
+        title="Contact and slack",
+        caption="" if used else "No contact was detected, and no tendon was slack.",
+        keys=tuple(key for key in meanings if key[0] in used),
+        panels=(panel,) if used else (),
+    )
+
+
+def _motion_panels(table: Table, joints: Sequence[str]) -> Iterator[Panel]:
+    time = table["time"]
+    for key, style, unit in (("angle", "fitted", "rad"), ("speed", "slow", "rad/s")):
+        for j, name in enumerate(joints, start=1):
+            yield Panel(
+                title=f"{name}: {key}",
+                alt=f"Joint {key} of {name} over time",
+                x_label=_TIME,
+                y_label=f"{key} ({unit})",
+                curves=(Curve(style, time, np.asarray(table[f"joint_{key}[{j}]"], dtype=np.float64)),),
+                zoom=ZOOM,
+            )

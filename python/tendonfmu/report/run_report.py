@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
+from tendonfmu.report.numbers import rms
 
 FORMAT = "tendonfmu-run-1"
 
@@ -53,15 +54,11 @@ def _joint(table: Table, j: int, name: str) -> dict[str, Any]:
     return {
         "name": name,
         "angle": [float(angle.min()), float(angle.max())],
-        **{f"{key}_torque_rms": _rms(values) for key, values in torques.items()},
-        **{f"free_{key}_torque_rms": _rms(values[free]) if free.any() else None for key, values in torques.items()},
+        **{f"{key}_torque_rms": rms(values) for key, values in torques.items()},
+        **{f"free_{key}_torque_rms": rms(values[free]) if free.any() else None for key, values in torques.items()},
         "largest_compensated_torque": float(np.abs(torques["compensated"]).max()),
         "contact_share": _share(table[f"joint_contact[{j}]"]),
     }
-
-
-def _rms(values: NDArray[Any]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _count(table: Table, name: str) -> int:

@@ -1,4 +1,4 @@
-"""What the figures of a score show, computed for `score_plots.py`.
+"""What the figures of a score show, ready to be drawn.
 
 Torques and detection over time (fig. 8 of the paper), every event from its onset on, the ROC, and the delays.
 """
@@ -6,17 +6,19 @@ Torques and detection over time (fig. 8 of the paper), every event from its onse
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
+from tendonfmu.drawing import BLUE, SKY, Band, Bars, Curve, Dots, Heat, Panel, Sheet, line_of
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.figure_data import Interval
+from tendonfmu.report.numbers import with_ends
+from tendonfmu.report.page import drawn, write_figures
 from tendonfmu.statistics import intervals as statistics_intervals
 
 SHOWN = 20.0  # s of the recording, where most events are
@@ -25,110 +27,111 @@ BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, af
 TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
+_HEAT = ("#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B")
+_WORDS = {
+    "contacts": "torques, compensated torques, label and detection over time",
+    "events": "every event from its onset on",
+    "roc": "found events against false alarms, over thresholds",
+    "delays": "how soon events are found",
+}
 
 
-@dataclass(frozen=True)
-class JointTorques:
-    """Torques of one joint."""
-
-    name: str  # its name
-    measured: Numbers  #
-    compensated: Numbers
-    external: Numbers | None
+def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
+    """Write the figures of a score as PNG files."""
+    return {file: _WORDS[file.stem] for file in write_figures(drawn(score_sheets(scored)), folder)}
 
 
-@dataclass(frozen=True)
-class ContactFigure:
-    """Torques and detection over time."""
-
-    title: str  # heading
-    time: Numbers
-    joints: list[JointTorques]  # torques of the joints drawn
-    force: Numbers | None
-    labelled: list[Interval]
-    found: list[Interval]  # alarm during an event that is found, or missed
-    masked: list[Interval]
-    outside: list[Interval]
+def score_sheets(scored: Scored) -> Iterator[Sheet]:
+    """Make all figures that the recordings allow."""
+    yield contact_sheet(scored)
+    if scored.summary.events:
+        yield event_sheet(scored)
+    if scored.roc and scored.summary.events and scored.summary.free_minutes:
+        yield roc_sheet(scored, scored.roc)
+    if scored.summary.found:
+        yield delay_sheet(scored)
 
 
-@dataclass(frozen=True)
-class EventFigure:
-    """Every event as a row, found ones in order of delay, then missed ones, last those that began in an alarm."""
-
-    title: str  # heading
-    begin: float  # time drawn, from the onset
-    end: float
-    torque: Numbers
-    most: float
-    groups: list[tuple[str, int]]  # (what, how many rows)
-    delay: Numbers  # the delay is NaN for missed events
-    length: Numbers
+def _sheet(name: str, title: str, keys: Sequence[tuple[str, str]], panels: Sequence[Panel]) -> Sheet:
+    return Sheet("score", name, title, "", tuple(keys), tuple(panels))
 
 
-@dataclass(frozen=True)
-class RocFigure:
-    """Found events against false alarms, over factors on the thresholds."""
-
-    title: str  # heading
-    factors: Numbers
-    found: Numbers  # share of the events, with its 95 % interval
-    found_low: Numbers
-    found_high: Numbers
-    rate: Numbers  # false alarms
-    rate_low: Numbers
-    rate_high: Numbers
-    in_alarm: Numbers
-    masked: Numbers
-    own: int  # index of the description's own thresholds
-    named: list[int]  # indices of points whose factor is written beside them
-    least: float
+# --- over time --------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class DelayFigure:
-    """How soon events are found."""
-
-    title: str  # heading
-    delays: Numbers
-    share: Numbers  # share of all events found within that time, with its 95 % interval
-    low: Numbers
-    high: Numbers
-    median: float  # delays within which 50 % and 90 % are found
-    ninety: float
-    end: float
-    later: int  # how many delays are beyond `end`
-    bins: int  # bins of the histogram
-
-
-def contact_figure(scored: Scored) -> ContactFigure:
+def contact_sheet(scored: Scored) -> Sheet:
     """Show the `SHOWN` seconds with most events, or with most false alarms if there is no event."""
     counts = [_busiest(track, score) for track, score in zip(scored.tracks, scored.scores, strict=True)]
     most = max(range(len(counts)), key=lambda k: counts[k][:2])
-    begin = counts[most][2]
-    track, score = scored.tracks[most], scored.scores[most]
+    track, begin = scored.tracks[most], counts[most][2]
     time = track.recording.time
     shown = (time >= begin) & (time <= begin + SHOWN)
-    rows, alarm = np.flatnonzero(shown), track.alarm
-    found, masked = _by_event(track, score)
+    rows = np.flatnonzero(shown)
     rows = rows[:: max(1, len(rows) // _POINTS)]
-    torque, left = track.outputs["joint_torque"], track.outputs["compensated_torque"]
-    names = scored.subject.finger.joint_names
-    joints = [
-        JointTorques(
-            names[j], torque[rows, j], left[rows, j], None if track.external is None else track.external[rows, j]
+    names, joints = scored.subject.finger.joint_names, _strongest(track)
+    labelled = flagged_stretches(time, track.label & shown)
+
+    def panel(title: str, unit: str, curves: Sequence[Curve]) -> Panel:
+        return Panel(
+            title=title,
+            alt=f"{title} over time",
+            x_label="time (s)",
+            y_label=unit,
+            size="wide",
+            curves=tuple(curves),
+            stripes={"label_stripe": labelled},
+            x_limits=(float(time[rows[0]]), float(time[rows[-1]])),
+            zoom="time",
         )
-        for j in _strongest(track)
+
+    def by_joint(style: str, torque: Numbers) -> list[Curve]:
+        return [Curve(f"{style}_{k}", time[rows], 1e3 * torque[rows, j]) for k, j in enumerate(joints, start=1)]
+
+    sensor = [] if track.external is None else by_joint("sensor", track.external)
+    panels = [
+        panel("Joint torque", "torque (mN·m)", by_joint("joint", track.outputs["joint_torque"])),
+        panel(
+            "Compensated: estimate of the external torque",
+            "torque (mN·m)",
+            [*sensor, *by_joint("joint", track.outputs["compensated_torque"])],
+        ),
     ]
-    return ContactFigure(
-        title=f"{scored.subject.finger.name}: {track.recording.path.name}",
-        time=time[rows],
-        joints=joints,
-        force=None if track.force is None else np.abs(track.force[rows]),
-        labelled=flagged_stretches(time, track.label & shown),
-        found=flagged_stretches(time, alarm & found & shown),
-        masked=flagged_stretches(time, alarm & masked & ~found & shown),
-        outside=flagged_stretches(time, alarm & ~masked & ~found & shown),
+    if track.force is not None:
+        panels.append(panel("Sensed force", "force (N)", [Curve("measured", time[rows], np.abs(track.force[rows]))]))
+    bars = _detection(track, scored.scores[most], shown, labelled)
+    panels.append(
+        Panel(
+            title="Detection",
+            alt="When contact is labelled, and when it is detected",
+            x_label="time (s)",
+            y_label="",
+            size="wide",
+            height=150,
+            curves=tuple(Curve(style, *line_of(spans, style != "label")) for style, _, spans in bars),
+            rows=("label", "alarm"),
+            x_limits=panels[0].x_limits,
+            zoom="time",
+        )
     )
+    keys = [(f"joint_{k}", names[j]) for k, j in enumerate(joints, start=1)]
+    keys += [("sensor", "reference sensor")] if sensor else []
+    keys += [(style, meaning) for style, meaning, _ in bars]
+    return _sheet("contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", keys, panels)
+
+
+def _detection(
+    track: Track, score: DetectionScore, shown: NDArray[np.bool_], labelled: list[tuple[float, float]]
+) -> list[tuple[str, str, list[tuple[float, float]]]]:
+    """Return (style, meaning, stretches) of labels and alarms; those without a stretch are left out."""
+    time, alarm = track.recording.time, track.alarm & shown
+    found, others = _by_event(track, score)
+    bars = [
+        ("label", "contact, as labelled", labelled),
+        ("alarm", "alarm, event found", flagged_stretches(time, alarm & found)),
+        ("missed", "alarm, event missed", flagged_stretches(time, alarm & others & ~found)),
+        ("false_alarm", "alarm without contact", flagged_stretches(time, alarm & ~others & ~found)),
+    ]
+    return [bar for bar in bars if bar[2]]
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
@@ -170,32 +173,57 @@ def _strongest(track: Track) -> list[int]:
 # --- events -----------------------------------------------------------------------------------------------------------
 
 
-def event_figure(scored: Scored) -> EventFigure:
-    """Show every event of every recording."""
-    rows: list[tuple[Event, Track]] = [
+def event_sheet(scored: Scored) -> Sheet:
+    """Show every event as a row: found ones in order of delay, then missed ones, last those that began in an alarm."""
+    events: list[tuple[Event, Track]] = [
         (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
     ]
-    rows.sort(key=lambda row: _order(row[0]))
-    length = np.array([event.end - event.onset for event, _ in rows])
+    events.sort(key=lambda row: _order(row[0]))
+    length = np.array([event.end - event.onset for event, _ in events])
+    delay = np.array([event.delay for event, _ in events])  # NaN for missed events
     end = min(float(length.max()) + AFTER, LONGEST)
     grid = np.linspace(-BEFORE, end, _COLUMNS)
-    torque = np.array([_row(track, event.onset + grid) for event, track in rows])
-    found = scored.summary
+    torque = 1e3 * np.array([_row(track, event.onset + grid) for event, track in events])
+    count, summary = len(events), scored.summary
     groups = {
-        "found": found.found,
-        "missed": found.events - found.found - found.masked,
-        "missed, in\nan alarm before": found.masked,
+        "found": summary.found,
+        "missed": summary.events - summary.found - summary.masked,
+        "in an alarm before": summary.masked,
     }
-    return EventFigure(
-        title=f"{scored.subject.finger.name}: {counted(len(rows), 'event')}",
-        begin=-BEFORE,
-        end=end,
-        torque=torque,
-        most=float(np.nanquantile(torque, 0.99)),
-        groups=[(name, count) for name, count in groups.items() if count],
-        delay=np.array([event.delay for event, _ in rows]),
-        length=length,
+    borders = np.cumsum([0, *groups.values()])
+    middles = 0.5 * (borders[:-1] + borders[1:]) - 0.5
+    rows, inside, half = np.arange(float(count)), length < end, 0.36
+    panel = Panel(
+        title="Compensated torque, all joints",
+        alt=f"Compensated torque of {counted(count, 'event')} from their onset on, and the first alarm of each",
+        x_label="time from the onset (s)",
+        y_label="",
+        size="wide",
+        height=int(min(max(280, 150 + 30 * count), 900)),
+        heat=Heat(torque, grid, rows, _HEAT, 0.0, float(np.nanquantile(torque, 0.99)), "mN·m"),
+        curves=(
+            Curve("onset", np.zeros(2), np.array([-0.5, count - 0.5])),
+            *(
+                Curve("start", np.array([-BEFORE, end]), np.full(2, border - 0.5))
+                for border in np.unique(borders)
+                if 0 < border < count
+            ),
+        ),
+        bars=(
+            Bars("onset", length[inside], rows[inside] - half, rows[inside] + half),
+            Bars("first_alarm", delay, rows - half, rows + half),
+        ),
+        y_ticks=tuple(
+            (float(middle), f"{number} {name}")
+            for middle, (name, number) in zip(middles, groups.items(), strict=True)
+            if number
+        ),
+        x_limits=(-BEFORE, end),
+        y_limits=(count - 0.5, -0.5),
+        note=f"white: 0, dark blue: {float(np.nanquantile(torque, 0.99)):.3g} mN·m and more",
     )
+    keys = (("first_alarm", "first alarm"), ("onset", "onset, and end of the event"))
+    return _sheet("events", f"{scored.subject.finger.name}: {counted(count, 'event')}", keys, [panel])
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -215,51 +243,129 @@ def _row(track: Track, at: Numbers) -> Numbers:
 # --- ROC and delays ---------------------------------------------------------------------------------------------------
 
 
-def roc_figure(scored: Scored, points: Sequence[RocPoint]) -> RocFigure:
-    shares, rates = [point.found_share for point in points], [point.false_alarms_per_hour for point in points]
+def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
+    """Show found events against false alarms, and both over the factor on the thresholds."""
     events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
-    return RocFigure(
-        title=f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time",
-        factors=np.array([point.factor for point in points]),
-        found=np.array([each.value for each in shares]),
-        found_low=np.array([each.low for each in shares]),
-        found_high=np.array([each.high for each in shares]),
-        rate=np.array([each.value for each in rates]),
-        rate_low=np.array([each.low for each in rates]),
-        rate_high=np.array([each.high for each in rates]),
-        in_alarm=np.array([point.free_alarm_share for point in points]),
-        masked=np.array([point.masked / point.events for point in points]),
-        own=int(np.argmin([abs(math.log(point.factor)) for point in points])),
-        named=_named(points),
-        least=60.0 / minutes,
+    factors = np.array([point.factor for point in points])
+    found, found_low, found_high = with_ends((point.found_share for point in points), 100.0)
+    rate, rate_low, rate_high = with_ends(point.false_alarms_per_hour for point in points)
+    in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
+    own = [int(np.argmin(np.abs(np.log(factors))))]
+    named, least = _named(points), 60.0 / minutes  # one alarm in all free time, 1/h
+    against = Panel(
+        title="Events found, over false alarms",
+        alt="Share of the events that are found over the rate of false alarms, at several factors on all thresholds",
+        x_label="false alarms per hour of free time",
+        y_label="events found (%)",
+        size="medium",
+        height=400,
+        curves=(Curve("predicted", rate, found),),
+        bars=(Bars("interval", rate, found_low, found_high), Bars("interval", found, rate_low, rate_high, lying=True)),
+        dots=(
+            Dots("after_dots", rate, found),
+            Dots("after_dots", rate[named], found[named], tuple(f"×{factors[k]:g}" for k in named)),
+            Dots("own_dots", rate[own], found[own]),
+        ),
+        near_x=least,
+        x_limits=(-0.15 * least, 2.0 * max(float(rate_high.max()), least)),
+        y_limits=(-3.0, 103.0),
     )
+    over = Panel(
+        title="Over the factor on all thresholds",
+        alt="Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
+        x_label="factor on all thresholds",
+        y_label="share (%)",
+        size="medium",
+        height=400,
+        bands=(Band("confidence", factors, found_low, found_high),),
+        curves=(
+            Curve("fitted", factors, found),
+            Curve("negative", factors, in_alarm),
+            Curve("share", factors, 100.0 * np.array([point.masked / point.events for point in points])),
+        ),
+        dots=(Dots("after_dots", factors, found), Dots("before_dots", factors, in_alarm)),
+        ticks=tuple((factor, f"{factor:g}") for factor in (*NAMED, 8.0) if factors.min() <= factor <= factors.max()),
+        log_x=True,
+        line=1.0,
+        y_limits=(-3.0, 103.0),
+    )
+    keys = (
+        ("own_dots", "the description's thresholds"),
+        ("fitted", "events found"),
+        ("confidence", "95 % interval"),
+        ("negative", "free time in alarm"),
+        ("share", "missed: in alarm before"),
+    )
+    title = f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time"
+    return _sheet("roc", title, keys, [against, over])
 
 
 def _named(points: Sequence[RocPoint]) -> list[int]:
     """Choose the points of `NAMED` factors, one of those in the same place."""
     places: dict[tuple[int, int], int] = {}
     for k, point in enumerate(points):
-        if any(math.isclose(point.factor, each) for each in NAMED):
+        if any(math.isclose(point.factor, factor) for factor in NAMED):
             places[(point.found, point.false_alarms)] = k
     return list(places.values())
 
 
-def delay_figure(scored: Scored) -> DelayFigure:
+def delay_sheet(scored: Scored) -> Sheet:
+    """Show the share of all events found within a time, with its interval, and the number of delays."""
     delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
-    total, known = scored.summary.events, scored.summary.delay
+    total, delay = scored.summary.events, scored.summary.delay
+    median, ninety = delay["median"].value, delay["ninety_percent"].value
     end = float(delays[-1])
-    if end > TAIL * known["ninety_percent"].value > 0:
-        end = TAIL * known["ninety_percent"].value
-    within = [statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)]
-    return DelayFigure(
-        title=f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found",
-        delays=delays,
-        share=np.array([each.value for each in within]),
-        low=np.array([each.low for each in within]),
-        high=np.array([each.high for each in within]),
-        median=known["median"].value,
-        ninety=known["ninety_percent"].value,
-        end=end,
-        later=int((delays > end).sum()),
-        bins=int(np.clip(len(delays) // 2, 12, 40)),
+    if end > TAIL * ninety > 0:
+        end = TAIL * ninety
+    later, bins = int((delays > end).sum()), int(np.clip(len(delays) // 2, 12, 40))
+    ms = 1e3 * delays
+    share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
+    counts, edges = np.histogram(ms, bins, (0.0, 1e3 * end))
+    limits, top = (0.0, 1.03e3 * max(end, 1e-3)), min(100.0, 1.3 * float(high.max()))
+
+    def marks(height: float) -> list[Curve]:
+        marked = (("limit", median), ("ninety", ninety))
+        return [Curve(style, np.full(2, 1e3 * delay), np.array([0.0, height])) for style, delay in marked]
+
+    shared = Panel(
+        title="Found so far",
+        note=f"{later} later, up to {ms[-1]:.0f} ms →" if later else "",
+        alt=f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
+        x_label="delay from the onset (ms)",
+        y_label="share of events (%)",
+        size="wide",
+        height=330,
+        bands=(Band("confidence", np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1]),),
+        curves=(Curve("fitted", *_stairs(ms, share)), *marks(top)),
+        x_limits=limits,
+        y_limits=(0.0, top),
+        zoom="delay",
     )
+    most = max(1.0, 1.05 * float(counts.max()))
+    apart = np.column_stack([edges[:-1], edges[1:], edges[1:]]) - 0.02 * (edges[1] - edges[0]) * np.array([0, 1, 1])
+    gap = np.column_stack([counts, counts, np.full(len(counts), math.nan)]).ravel().astype(float)
+    histogram = Panel(
+        title="Events",
+        alt="How many events are found with which delay",
+        x_label="delay from the onset (ms)",
+        y_label="events",
+        size="wide",
+        bands=(Band("histogram", apart.ravel(), 0.0 * gap, gap),),
+        curves=tuple(marks(most)),
+        x_limits=limits,
+        y_limits=(0.0, most),
+        zoom="delay",
+    )
+    keys = (
+        ("fitted", "found so far"),
+        ("confidence", "95 % interval"),
+        ("limit", f"median {1e3 * median:.0f} ms"),
+        ("ninety", f"90 % within {1e3 * ninety:.0f} ms"),
+    )
+    title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
+    return _sheet("delays", title, keys, [shared, histogram])
+
+
+def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
+    """Return the line that rises to y at each x, from 0 on."""
+    return np.concatenate([[0.0], np.repeat(x, 2)]), np.concatenate([[0.0], [0.0], np.repeat(y, 2)[:-1]])

@@ -8,17 +8,16 @@ import numpy as np
 
 from tendonfmu.detect import ContactTuning, rate_limit
 from tendonfmu.files import are, counted
+from tendonfmu.report.numbers import Row, Table
 
-Row = tuple[str, ...]
 
-
-def tables(tuning: ContactTuning) -> Iterator[tuple[str, Row, list[Row]]]:
+def tables(tuning: ContactTuning) -> Iterator[Table]:
     """List the tables to print: bounds by joint, then results by pretension."""
     yield _bounds(tuning)
     yield _pretensions(tuning)
 
 
-def _bounds(tuning: ContactTuning) -> tuple[str, Row, list[Row]]:
+def _bounds(tuning: ContactTuning) -> Table:
     headings, columns = ["joint"], []
     for name, bound in reversed(tuning.bounds_.items()):
         headings += [f"{name}\nmN·m", "+ per N\nmN·m/N"]
@@ -36,7 +35,7 @@ def _bounds(tuning: ContactTuning) -> tuple[str, Row, list[Row]]:
     return f"{tuning.description_.name}: {tuning.method}, bounds{also}", tuple(headings), rows
 
 
-def _pretensions(tuning: ContactTuning) -> tuple[str, Row, list[Row]]:
+def _pretensions(tuning: ContactTuning) -> Table:
     headings: Row = ("mean force, N", "minutes", "residual rms\nmN·m", "false alarms", "at most,\nper hour", "(r/std)²")
     rows: list[Row] = [
         (

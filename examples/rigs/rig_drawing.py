@@ -1,4 +1,4 @@
-"""Where the parts of a rig's finger lie in a drawing to scale, in mm; `plots.py` draws it.
+"""Where the parts of a rig's finger lie in a drawing to scale, in mm; `rig_plots.py` draws it.
 
 Links have their lengths, tendons the distance of their moment arms. The finger is stretched out (all angles 0) and
 seen from the side and from above.

@@ -143,8 +143,7 @@ class _Desk:
             y_label=y_label,
             bands=(Band("confidence", x, both("high", "low"), both("low", "high")),),
             curves=(Curve("start", x, both("start", "start")), Curve("fitted", x, both("fitted", "fitted"))),
-            stripes=((-unit * threshold, unit * threshold),) if threshold else (),
-            stripe_style="standstill",
+            stripes={"standstill": [(-unit * threshold, unit * threshold)]} if threshold else {},
             data=_histogram(unit * sliding, -limit, limit),
             x_limits=(-limit, limit),
             y_limits=(-top, top),
@@ -160,10 +159,10 @@ class _Desk:
         drawn = [("slow", 1, threshold), ("fitted", 1, median)]
         if asymmetric(fitted):
             drawn = [("negative", -1, median), ("fitted", 1, median)]
-        found = [self._bands.over_angle(start, fitted, sign, speed, angle) for _, sign, speed in drawn]
-        factor, y_label = _unit(fitted, found)
+        laws = [self._bands.over_angle(start, fitted, sign, speed, angle) for _, sign, speed in drawn]
+        factor, y_label = _unit(fitted, laws)
         bands, curves = [], []
-        for (style, _, _), curve in zip(drawn, found, strict=True):
+        for (style, _, _), curve in zip(drawn, laws, strict=True):
             curves.append(Curve("start", angle, factor * curve.start))
             if style == "slow":
                 curves += [Curve("slow_limit", angle, factor * limit) for limit in (curve.low, curve.high)]
@@ -171,7 +170,7 @@ class _Desk:
                 bands.append(Band(f"{style}_confidence", angle, factor * curve.low, factor * curve.high))
             curves.append(Curve(style, angle, factor * curve.fitted))
         before = self._picture.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
-        lowest, highest = factor * found[-1].fitted.min(), factor * found[-1].fitted.max()
+        lowest, highest = factor * laws[-1].fitted.min(), factor * laws[-1].fitted.max()
         return Panel(
             title=self._title(fitted),
             note=self._note(fitted),
@@ -183,7 +182,7 @@ class _Desk:
             curves=tuple(curves),
             data=_histogram(visited, float(angle[0]), float(angle[-1])),
             x_limits=(float(angle[0]), float(angle[-1])),
-            y_limits=(0.0, factor * _top(found)),
+            y_limits=(0.0, factor * _top(laws)),
         )
 
 

@@ -1,4 +1,4 @@
-"""What the figures of the simulated finger show, computed for `plots.py`.
+"""What the figures of the simulated finger show, computed for `rig_plots.py`.
 
 One joint moves to and fro: its friction, and what the friction model makes of the same motion.
 """
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from tendonfmu.arrays import Array
 from tendonfmu.model import Instance
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.figure_data import Interval
 from tendonfmu.simulate import Plant, Rig, simulate
 
 Signals = Mapping[str, Array]
+Interval = tuple[float, float]
 WAYS = tuple[tuple[float, float], ...]
 
 STEP = 1e-3  # s, between the rows of a run

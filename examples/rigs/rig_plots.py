@@ -1,165 +1,18 @@
-"""Draws the figures of fingers, recordings and rigs. It computes nothing: the data come ready-made."""
+"""Draws the figures of make_figures.py. It computes nothing: the data come ready-made."""
 
 from __future__ import annotations
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import FancyBboxPatch, Patch
+from matplotlib.patches import FancyBboxPatch
+from plant_figures import LoopFigure, PreslidingFigure, TruthFigure
+from rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
 
-from tendonfmu.drawing import (
-    BLUE,
-    DARK,
-    EDGE_RED,
-    GREEN,
-    GREY,
-    LIGHT,
-    ORANGE,
-    PURPLE,
-    SKIN,
-    SKY,
-    VERMILION,
-    Target,
-    clean,
-    save,
-)
-from tendonfmu.model import Points
-from tendonfmu.report.figure_data import CompensationFigure, JointCurves, ReferenceCurves, ReferenceFigure, StoryFigure
-from tendonfmu.report.plant_figures import LoopFigure, PreslidingFigure, TruthFigure
-from tendonfmu.report.rig_drawing import DrawnBody, DrawnRoute, RigDrawing, View
-
-# --- compensated recordings ------------------------------------------------------------------------------------------
-
-
-def draw_story(data: StoryFigure, target: Target) -> None:
-    """Draw free motions side by side and a recording with pushes below them, as PNG (the paper's figs. 6 to 8)."""
-    pushed = data.pushed
-    figure = Figure(figsize=(15.0, 6.4 + 4.4 * len(pushed.joints)), layout="constrained")
-    heights = [1.0, 0.8] + [1.0, 0.9] * len(pushed.joints) + [0.42]
-    grid = figure.add_gridspec(len(heights), len(data.free), height_ratios=heights)
-    for k, free in enumerate(data.free):
-        above = figure.add_subplot(grid[0, k])
-        below = figure.add_subplot(grid[1, k], sharex=above)
-        _draw_torques(above, free, free.joints[0])
-        _draw_compensated(below, free, free.joints[0])
-        below.set_xlabel("time (s)", fontsize=12)
-    panels = [figure.add_subplot(grid[2, :])]
-    panels += [figure.add_subplot(grid[row, :], sharex=panels[0]) for row in range(3, len(heights))]
-    for k, joint in enumerate(pushed.joints):
-        _draw_torques(panels[2 * k], pushed, joint)
-        _draw_compensated(panels[2 * k + 1], pushed, joint)
-    for axes in panels[:-1]:
-        axes.tick_params(labelbottom=False)
-    _draw_contacts(panels[-1], pushed)
-    panels[-1].set_xlabel("time (s)", fontsize=12)
-    _draw_story_legend(figure, data.title)
-    figure.align_ylabels(panels)
-    save(figure, target, 100)
-
-
-def _draw_story_legend(figure: Figure, title: str) -> None:
-    handles = [
-        Line2D([], [], color=DARK, linewidth=1.4, label="measured joint torque"),
-        Line2D([], [], color=SKY, linewidth=1.8, label="predicted friction and bias"),
-        Line2D([], [], color=BLUE, linewidth=1.4, label="compensated torque"),
-        Line2D([], [], color=GREEN, linewidth=3.4, alpha=0.55, label="external torque (sensor)"),
-        Patch(color=ORANGE, label="contact found"),
-        Patch(color=PURPLE, label="found without a push"),
-        Patch(color=GREY, label="contact labelled"),
-    ]
-    legend = figure.legend(
-        handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=13, title=title
-    )
-    legend.get_title().set(fontsize=17, color=DARK)
-
-
-def _shade(axes: Axes, data: CompensationFigure) -> None:
-    for found, colour in ((data.found, ORANGE), (data.false, PURPLE)):
-        for begin, end in found:
-            axes.axvspan(begin, end, color=colour, alpha=0.2, linewidth=0)
-
-
-def _draw_torques(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
-    clean(axes)
-    axes.plot(data.time, joint.measured, color=DARK, linewidth=1.1)
-    axes.plot(data.time, joint.predicted, color=SKY, linewidth=1.4)
-    axes.set_xlim(data.time[0], data.time[-1])
-    axes.tick_params(labelbottom=False)
-    axes.set_ylabel("N·m", fontsize=12)
-    axes.set_title(f"{data.title}: {joint.name}", loc="left", fontsize=14, fontweight="bold", color=DARK)
-
-
-def _draw_compensated(axes: Axes, data: CompensationFigure, joint: JointCurves) -> None:
-    clean(axes)
-    _shade(axes, data)
-    if joint.external is not None:
-        axes.plot(data.time, joint.external, color=GREEN, linewidth=3.4, alpha=0.55)
-    axes.plot(data.time, joint.compensated, color=BLUE, linewidth=1.1)
-    axes.set_ylabel("N·m", fontsize=12)
-
-
-def _draw_contacts(axes: Axes, data: CompensationFigure) -> None:
-    rows = [("found", [(data.found, ORANGE), (data.false, PURPLE)])]
-    if data.labelled is not None:
-        rows.append(("labelled", [(data.labelled, GREY)]))
-    for row, (_, bars) in enumerate(rows):
-        for found, colour in bars:
-            spans = [(begin, end - begin) for begin, end in found]
-            axes.broken_barh(spans, (-row - 0.36, 0.72), color=colour, linewidth=0)
-    axes.set_ylim(-len(rows) + 0.4, 0.6)
-    axes.set_yticks([-row for row in range(len(rows))], [f"{name}  " for name, _ in rows])
-    axes.tick_params(labelsize=12)
-    axes.tick_params(axis="y", length=0)
-    axes.spines[["top", "right", "left"]].set_visible(False)
-
-
-# --- compensated torque against a reference sensor -------------------------------------------------------------------
-
-
-def draw_reference(data: ReferenceFigure, target: Target) -> None:
-    """Draw the compensated torque and the reference sensor's for some recordings, and all rms errors, as PNG."""
-    rows = len(data.drawn)
-    figure = Figure(figsize=(15.0, 2.9 * rows + 0.8), layout="constrained")
-    grid = figure.add_gridspec(rows, 2, width_ratios=[2.3, 1.0])
-    panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
-    for axes, curves in zip(panels, data.drawn, strict=True):
-        _draw_against_sensor(axes, curves)
-    panels[-1].set_xlabel("time (s)")
-    figure.legend(handles=panels[0].get_lines(), loc="outside lower left", ncols=3, frameon=False, fontsize=11)
-    _draw_errors(figure.add_subplot(grid[:, 1]), data)
-    figure.suptitle(data.title, fontsize=15, color=DARK)
-    figure.align_ylabels(panels)
-    save(figure, target, 100)
-
-
-def _draw_against_sensor(axes: Axes, curves: ReferenceCurves) -> None:
-    clean(axes)
-    axes.plot(curves.time, curves.measured, color=GREY, linewidth=0.9, label="measured torque, friction included")
-    axes.plot(curves.time, curves.external, color=GREEN, linewidth=2.2, alpha=0.75, label="external torque (sensor)")
-    axes.plot(curves.time, curves.compensated, color=BLUE, linewidth=1.1, label="compensated torque")
-    axes.set_xlim(curves.time[0], curves.time[-1])
-    axes.set_ylabel("torque (N·m)")
-    axes.set_title(curves.title, loc="left", fontsize=12.5, fontweight="bold", color=DARK)
-
-
-def _draw_errors(axes: Axes, data: ReferenceFigure) -> None:
-    clean(axes)
-    for errors, shift, colour, label in (
-        (data.error_without, -0.2, LIGHT, "without a friction model"),
-        (data.error, 0.2, BLUE, "compensated"),
-    ):
-        places = [row + shift for row in range(len(errors))]
-        axes.bar(places, errors, width=0.38, color=colour, label=label)
-        for place, error in zip(places, errors, strict=True):
-            axes.text(place, error, f"{1e3 * error:.0f}", ha="center", va="bottom", fontsize=8, color=DARK)
-    axes.axhline(data.limit, color=VERMILION, linestyle="--", linewidth=1.1, label=f"limit {data.limit:g} N·m")
-    axes.set_xticks(range(len(data.names)), data.names)
-    axes.set_xlabel("recording")
-    axes.set_ylabel("rms error (N·m; figures in mN·m)")
-    axes.legend(loc="upper left", frameon=False, fontsize=11)
-
-
-# --- the simulated finger --------------------------------------------------------------------------------------------
+from tendonfmu.drawing.finger_picture import EDGE_RED
+from tendonfmu.drawing.panel import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY, VERMILION
+from tendonfmu.drawing.png import Target, clean, save
+from tendonfmu.model.routing_geometry import Points
 
 FLEXOR_COLOURS = (BLUE, SKY, "#332288", GREEN)
 EXTENSOR_COLOURS = (ORANGE, VERMILION, PURPLE, "#8A5A00")

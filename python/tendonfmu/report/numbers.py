@@ -1,0 +1,98 @@
+"""Numbers as tables and sentences show them, and what several of them give together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.arrays import Numbers
+from tendonfmu.statistics import Interval
+
+NBSP = "\u00a0"
+Row = tuple[str, ...]
+Table = tuple[str, Row, list[Row]]  # title, headings, rows
+
+
+def rms(values: Numbers) -> float:
+    """Return the root of the mean square of the finite values; NaN if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else math.nan
+
+
+def together(values: Iterable[float]) -> float:
+    """Return the rms over all joints from the rms of each; NaN without joints."""
+    return rms(np.array(list(values), dtype=float))
+
+
+def torque_unit(largest: float, least: float = 2.0) -> tuple[float, str]:
+    """Return factor and unit in which torques read well: N·m if the largest has `least` or more, else mN·m."""
+    return (1.0, "N·m") if largest >= least else (1e3, "mN·m")
+
+
+def rounded(value: float | None, digits: int = 3) -> str:
+    """Format a number for a column of numbers to compare."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
+    return f"{value:.{max(digits - whole, 0)}f}"
+
+
+def decimals(value: float) -> int:
+    """Return how many decimals `rounded` shows of a value."""
+    return len(rounded(value).partition(".")[2])
+
+
+def percent(share: float) -> str:
+    """Format a share with two digits where that is enough: 31 %, 4.2 %, −0.3 %."""
+    if not math.isfinite(share):
+        return "–"
+    value = 100 * share
+    text = f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.1f}"
+    text = "0" if float(text) == 0 else text.replace("-", "−")
+    return f"{text}{NBSP}%"
+
+
+def percent_interval(share: Interval) -> str:
+    """Format a share with its interval, such as "31 % (27 to 35 %)"."""
+    if not (math.isfinite(share.low) and math.isfinite(share.high)):
+        return percent(share.value)
+    return f"{percent(share.value)} ({percent(share.low).removesuffix(f'{NBSP}%')} to {percent(share.high)})"
+
+
+def probability(p_value: float) -> str:
+    """Format a p-value, such as 0.008 or 3.4e-5; an upper bound where it is below what floating point resolves."""
+    if not math.isfinite(p_value):
+        return "–"
+    if p_value < 1e-12:
+        return "< 1e-12"
+    mantissa, _, exponent = f"{p_value:.2g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+
+
+def unit_text(unit: str) -> str:
+    """Format a unit; empty for a plain number."""
+    return "" if unit in ("", "1") else unit.replace(".", "·")
+
+
+def magnitude(value: float, unit: str) -> str:
+    """Format a number of the description with its unit."""
+    return f"{value:.4g}".replace("-", "−") + (f"{NBSP}{unit_text(unit)}" if unit_text(unit) else "")
+
+
+def capital(text: str) -> str:
+    """Return a text whose first letter is a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def with_ends(estimates: Iterable[Any], factor: float = 1.0) -> tuple[Numbers, Numbers, Numbers]:
+    """Return values, lower and upper ends of estimates."""
+    value, low, high = factor * np.array([(one.value, one.low, one.high) for one in estimates]).reshape(-1, 3).T
+    return value, low, high
+
+
+def column(values: Sequence[float | None]) -> list[float]:
+    """Return numbers with NaN where one is unknown."""
+    return [math.nan if value is None else float(value) for value in values]
