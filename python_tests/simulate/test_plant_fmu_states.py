@@ -348,7 +348,7 @@ def test_a_damaged_state_of_a_finger_that_has_not_settled_is_refused(plant_fmu: 
         bad[24:32] = struct.pack("<Q", checksum(bytes(bad)))
         before = instance.save()
         assert instance.restore(bytes(bad)) == ERROR
-        assert "a number in it cannot be" in instance.last_message
+        assert "damaged state: a number" in instance.last_message
         assert instance.save() == before
 
 

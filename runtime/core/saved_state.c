@@ -237,7 +237,7 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   if (!scalars_are_sound(f, state) || !joints_are_sound(f, state) || !slots_are_sound(f, state) ||
       !filter_is_sound(f, state) || !motors_rest_is_sound(f, state) || !sensors_are_sound(f, state) ||
       !rests_are_sound(f, state)) {
-    return refuse(message, "damaged saved state: a number in it cannot be");
+    return refuse(message, "damaged saved state: a number is out of its range");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);
   const int same = memcmp(f->candidate, f->parameters, p * sizeof(double)) == 0;

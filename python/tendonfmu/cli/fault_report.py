@@ -35,7 +35,7 @@ def is_own_file(path: object) -> bool:
 
 
 def is_without_memory(error: BaseException) -> bool:
-    """Tell whether memory ran out, in Python or as a library was loaded, which the loader says in words alone."""
+    """Tell whether memory ran out, in Python or as a library was loaded, which the loader reports as text only."""
     return isinstance(error, MemoryError) or (
         isinstance(error, ImportError)
         and any(words in str(error) for words in ("failed to map segment", "Cannot allocate"))

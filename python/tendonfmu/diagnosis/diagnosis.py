@@ -195,8 +195,8 @@ class _Result:
             1e3 * float(np.sqrt(np.mean(each[used] ** 2))) for each in (self._left(found.nominal.data), left)
         )
         return (
-            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples; friction there is "
-            f"whatever balances the load, and misleads a fit: {fitted} where everything slides. There the error falls "
+            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples, in which "
+            f"friction balances the load and misleads a fit: {fitted} where everything slides. There the error falls "
             f"from {before:.3g} to {after:.3g} mN·m rms (means of 10 ms, without the slow bias); the gain of all "
             "causes together counts all samples"
         )

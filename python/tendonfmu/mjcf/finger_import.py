@@ -308,4 +308,4 @@ def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
     try:
         native.image_from_json(json.dumps(data))
     except NativeError as refused:
-        raise InputError(f"{model.path}: these joints and tendons make no finger: {refused}") from None
+        raise InputError(f"{model.path}: these joints and tendons do not make a valid finger: {refused}") from None

@@ -50,7 +50,7 @@ def write_diagnosis(found: Diagnosis, folder: Path) -> dict[Path, str]:
 
 
 def _make_for(found: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
-    """Make the files in a folder. A refusal tells the folder that the user has named."""
+    """Make the files in a folder. A refusal names the folder that the user gave."""
     try:
         return _make(found, folder)
     except OutputError as refused:

@@ -103,5 +103,5 @@ def _time_to_fall(lag: NDArray[np.float64], correlation: NDArray[np.float64]) ->
     below = np.flatnonzero(correlation <= _FALLEN)
     if not len(below):
         return math.inf
-    pair = [below[0], below[0] - 1]  # the lower value first, as np.interp wants
+    pair = [below[0], below[0] - 1]  # the lower value first, as np.interp needs
     return float(np.interp(_FALLEN, correlation[pair], lag[pair]))
