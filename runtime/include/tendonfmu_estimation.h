@@ -81,9 +81,9 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
                                                    size_t* index);
 
 /* Lets each sample of a recording count as a part of one, by joint: cost, gradient, information and fit then have
- * w e²/S in place of e²/S. Residuals that are correlated over several samples count as fewer of them (tendonfmu fit
- * sets their effective number over their number); the bias filter, innovations and variances stay as they are. weight
- * [n] above 0, at most 1; 1 until set */
+ * w e²/S in place of e²/S. Correlated residuals count as fewer samples (tendonfmu fit sets their effective number over
+ * their number); the bias filter, innovations and variances stay as they are.
+ *   weight  [n] above 0, at most 1; 1 until set */
 tendonfmu_status tendonfmu_estimator_set_weights(tendonfmu_estimator* estimator, size_t recording,
                                                  const double* weight);
 
