@@ -60,12 +60,6 @@ def test_every_option_and_column_is_on_the_page(folder: Path) -> None:
     assert {column for column in columns if f"`{column}" not in PAGE} == set()
 
 
-def test_every_cause_is_on_the_page(folder: Path) -> None:
-    causes = {entry["cause"] for entry in json.loads((folder / "excited.json").read_text())["parameters"]}
-    assert causes >= {"noise", "combination"}
-    assert {cause for cause in causes - {None} if f"`{cause}`" not in PAGE} == set()
-
-
 @needs_plant
 @pytest.mark.long
 def test_the_simulated_finger_plays_it(tmp_path: Path) -> None:
