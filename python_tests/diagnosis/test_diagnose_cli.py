@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from html import unescape
@@ -186,11 +185,7 @@ def test_a_test_that_holds_what_is_trained_on_is_refused() -> None:
         check_unseen([monday], [other, copy])
 
 
-def test_options_and_effects_are_on_the_page(call: Call) -> None:
-    shown = call("diagnose", "--help").out
-    options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
-    assert len(options) > 5
-    assert {option for option in options if option not in PAGE} == {"--output"}
+def test_effects_are_on_the_page() -> None:
     rows = [f"| `{each.name}` | {each.title} | {each.excited_by} |" for each in CANDIDATES]
     missing = [row for row in rows if row not in PAGE]
     assert missing == [], "docs/reference/commands/diagnose.md, The effects: \n" + "\n".join(rows)
