@@ -147,7 +147,7 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
     return "damaged state: its checksum does not match";
   }
   if (!life_is_sound(bytes) || !values_are_sound(c, bytes)) {
-    return "damaged state: a number in it cannot be";
+    return "damaged state: a number is out of its range";
   }
   const unsigned char* of_model = (const unsigned char*)bytes + model_offset(c);
   return model_check_state(c->model, of_model, get_number(bytes, AT_PHASE) >= PHASE_STEP_COMPLETE);

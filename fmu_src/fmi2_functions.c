@@ -100,7 +100,7 @@ fmi2Status fmi2CancelStep(fmi2Component instance) {
 
 /* --- status ------------------------------------------------------------------------------------------------------- */
 
-/* Common part of the inquiries: fmi2Discard for what this FMU has no answer to, as the standard wants it. */
+/* Common part of the inquiries: fmi2Discard for what this FMU cannot answer, as the standard requires. */
 static fmi2Status begin_status(component* c, fmu_function function, const void* value, int has_answer) {
   if (!component_may_call(c, function)) {
     return fmi2Error;

@@ -1,5 +1,5 @@
 /* FMI 2.0, what modelDescription.xml says this FMU does not do: derivatives of signals by time, and model exchange. The
- * functions exist, since some importers want every symbol, and refuse by name. */
+ * functions exist, since some importers need every symbol, and refuse by name. */
 #include "component.h"
 #include "fmi2Functions.h"
 #include "refused_call.h"

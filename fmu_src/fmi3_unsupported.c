@@ -1,6 +1,6 @@
 /* FMI 3.0, what modelDescription.xml says this FMU does not do: events, clocks, structural parameters, derivatives by
  * time, dependencies of single elements, model exchange and scheduled execution. The functions exist, since some
- * importers want every symbol, and refuse by name. */
+ * importers need every symbol, and refuse by name. */
 #include "component.h"
 #include "fmi3Functions.h"
 #include "refused_call.h"

@@ -99,7 +99,7 @@ fmu_status life_set_logging(component* c, int on, size_t count, const char* cons
 
 /* --- life cycle --------------------------------------------------------------------------------------------------- */
 
-/* a time that any model takes; says so otherwise */
+/* a time that any model takes; otherwise a message */
 static int time_is_sound(component* c, fmu_function function, const char* name, double time) {
   if (fabs(time) <= 1e15) {
     return 1;
@@ -113,7 +113,7 @@ static int time_is_sound(component* c, fmu_function function, const char* name, 
 }
 
 /* Importers give tolerances of their own (Maestro 0.1), meant for all FMUs of a system: a model that cannot take it
- * uses the nearest that it can, and says so. */
+ * uses the nearest that it can, with a warning. */
 static int set_tolerance(component* c, fmu_function function, double tolerance) {
   double used = tolerance;
   const char* expected = model_set_tolerance(c->model, &used);

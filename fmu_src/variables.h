@@ -18,7 +18,7 @@ typedef struct variables {
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */
   double* number[GROUP_COUNT];      /* inputs, Real and Integer outputs, and parameters, by group; NULL for others */
   unsigned char* flag[GROUP_COUNT]; /* Boolean outputs by group, NULL for others */
-  double* parameters;               /* [p] by path, as the importer wants them; the model may not have them yet */
+  double* parameters;               /* [p] by path, as the importer set them; the model may not have them yet */
   int parameters_pending;           /* they may differ from those of the model */
 } variables;
 

@@ -5,7 +5,7 @@
     python tools/planted_faults.py ../faults                   # an hour on two cores
 
 Each fault is one changed line (`tools/planted_faults.json`). After the change, `./test` runs in the copy: first ctest,
-then pytest up to its first failure, beginning with the tests that are near. A fault that neither notices wants a test.
+then pytest up to its first failure, beginning with the tests that are near. A fault that neither notices needs a test.
 The files are put back after each.
 """
 
@@ -63,7 +63,7 @@ def run(folder: Path, log: Path, *command: str) -> bool:
 
 
 def first_failure(log: Path) -> str:
-    """The name of the first test that failed, as either runner tells it."""
+    """The name of the first test that failed, as either runner reports it."""
     for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         if "***" in line and "Test" in line:
             return line.split(":", 1)[-1].split()[0]

@@ -159,7 +159,7 @@ def number(text: str, where: str) -> float:
 
 
 def expect_whole(fmu: Path) -> None:
-    """Raises BadFile for an archive with a damaged member: its checksums tell."""
+    """Raises BadFile for an archive with a damaged member: its checksums show it."""
     try:
         with zipfile.ZipFile(fmu) as archive:
             damaged = archive.testzip()

@@ -60,7 +60,7 @@ class Model:
 
 
 def fit(start: Path, file: Path, mass: float = MASS, decimation: int = DECIMATION) -> Model:
-    """One description fitted to one file. Two sides of a law and an offset cannot be told apart: it is fixed then."""
+    """One description fitted to one file. With two sides of a law the offset is fixed: they cannot be distinguished."""
     fix = ["bias.initial_torque"] if start.stem.endswith("asymmetric") else []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # residuals are not white: the same in every one of these fits

@@ -1,5 +1,5 @@
 """What detectors of contact need and do, seen on closings that never stop. Until a detector answers, a grasp does not
-depend on it: such a closing tells of each when it would have stopped, and at which force.
+depend on it: such a closing shows for each when it would have stopped, and at which force.
 
 Every detector gets the smallest thresholds per joint that no free closing at the same pretension passes, times 1.25.
 """

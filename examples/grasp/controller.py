@@ -86,7 +86,7 @@ class Plate:
 class Loop:
     """Plate and controller: `step` takes outputs of both FMUs, named by PLANT and FRICTION, and gives their inputs.
 
-    Where a grasp stands is told to the friction FMU by its thresholds. In the warm-up none is passed, so that the bias
+    The friction FMU gets the phase of a grasp through its thresholds. In the warm-up none is passed, so that the bias
     learns: the finger starts at rest, where friction may have either sign. After the stop all are, so that it stays:
     a held force is no friction, however small.
     """

@@ -22,7 +22,7 @@ from tendonfmu.simulate.ssp import FRICTION_FMU
 
 
 class Master(Protocol):
-    """What the loop wants of a master: numbers by component and name, and a step of 1 ms."""
+    """What the loop needs of a master: numbers by component and name, and a step of 1 ms."""
 
     def get(self, component: str, names: Sequence[str]) -> Array: ...
     def contact(self) -> bool: ...

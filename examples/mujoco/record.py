@@ -30,7 +30,7 @@ def motion(seconds: float, seed: int) -> Array:
 
 
 def record(seconds: float, pretension: float, seed: int) -> dict[str, Array]:
-    """Columns of a recording at 1 kHz; the pretension breathes by 30 %, so that friction by force can be told apart."""
+    """Columns at 1 kHz; the pretension varies by 30 %, which shows friction that grows with the force."""
     finger = TendonFinger(pretension, seed)
     finger.data.qpos[:] = 0.3
     rows = []

@@ -104,7 +104,7 @@ class TendonFinger:
         return self.sense()
 
     def press_direction(self) -> Array:
-        """Torque at each joint that the tendons have to bear per newton of the plate's push [n] (m)."""
+        """Torque at each joint that the tendons have to hold per newton of the plate's push [n] (m)."""
         jacobian = np.zeros((3, self.model.nv))
         mujoco.mj_jacSite(self.model, self.data, jacobian, None, self.model.site("fingertip").id)
         return np.asarray(-jacobian[2])  # the plate pushes the fingertip up, along z

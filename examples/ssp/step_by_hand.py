@@ -1,4 +1,4 @@
-"""Steps the two FMUs of an SSP package by hand with fmpy, both at the same time, as masters do that know no order.
+"""Steps the two FMUs of an SSP package by hand with fmpy, both at the same time, as masters do that have no order.
 
 python step_by_hand.py FINGER.ssp [SECONDS]     prints torques and contact at the end of each tenth of a second
 """

@@ -63,7 +63,7 @@ const char* model_check_state(model* m, const void* bytes, int initialised) {
   if (!isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) || !is_flag(life[AT_TOLERANCE_WRITTEN]) ||
       !settings_are_sound(settings, m->joints) ||
       (!initialised && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
-    return "damaged state: a number in it cannot be";
+    return "damaged state: a number is out of its range";
   }
   return NULL; /* the plant looks at its own bytes when it takes them */
 }

@@ -178,11 +178,6 @@ def test_a_candidate_says_what_a_user_needs(candidate: Candidate) -> None:
     assert candidate.title and candidate.excited_by and candidate.unit and candidate.number
 
 
-def test_an_unknown_effect_is_refused() -> None:
-    with pytest.raises(InputError, match="effect 'rust': no candidate of this name; expected one of viscous_friction"):
-        by_name("rust")
-
-
 def test_every_candidate_is_proposed(case: Case) -> None:
     assert {proposal.candidate.name for proposal in case.columns.proposals} == set(CONTRACT)
 
@@ -426,11 +421,6 @@ def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
             wanted.add(path.removesuffix("static") + "drop" if path.endswith(".static") else path)
         assert all(any(each.startswith(path) for each in added | before) for path in wanted), (proposal.place, wanted)
         assert added, (name, proposal.place, shape.shape)
-
-
-def test_magnitudes_are_counted(case: Case) -> None:
-    with pytest.raises(InputError, match="magnitudes: 1 number; expected 2, one per column"):
-        by_name("gravity").extended(case.data, Place(2), {}, [1.0])
 
 
 def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:

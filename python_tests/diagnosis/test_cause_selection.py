@@ -92,11 +92,6 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
     assert all(each.low == [0.0] and each.high == [np.inf] for each in found)
 
 
-def test_a_joint_that_has_all_the_places_is_everywhere(columns: Numbers) -> None:
-    found = hypotheses_of(candidate_columns(columns[:, :, :2], FOUR[:2]))
-    assert [each.level for each in found] == [EVERYWHERE, HERE, HERE]
-
-
 @pytest.mark.parametrize("effect", ["gravity", "force_gain", "backlash", "pulley_eccentricity"])
 def test_effects_of_one_part_are_asked_for_at_single_places(effect: str, columns: Numbers) -> None:
     found = hypotheses_of(candidate_columns(columns[:, :, :2], [Made(effect, 1), Made(effect, 2)]))
@@ -260,14 +255,6 @@ def test_what_is_beside_explains_nothing_else(columns: Numbers, nominal: Numbers
     assert best is not None and best.hypothesis.effect == "gravity"
     assert best.judged.magnitudes == pytest.approx([0.3], rel=0.2)
     assert "backlash" not in {each.hypothesis.effect for each in beside.ranked()}
-
-
-def test_by_stretch_sums_up_to_the_error(columns: Numbers, nominal: Numbers) -> None:
-    selection = selection_of(noise(8) + 0.3 * columns[:, :, 2], nominal, columns[:, :, :5], APART)
-    for judged in selection.ranked():
-        assert judged.by_stretch.sum() == pytest.approx(judged.error, rel=1e-4)
-    gain, error = rms_gain(selection.base, selection.ranked()[0].by_stretch)
-    assert (gain, error) == selection.gain(selection.ranked()[0])
 
 
 # --- places -----------------------------------------------------------------------------------------------------------

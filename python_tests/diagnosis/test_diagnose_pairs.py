@@ -127,42 +127,6 @@ def test_a_pair_gets_a_diagnosis_or_a_refusal(seed: int, tmp_path: Path) -> None
 # --- the pairs themselves ---------------------------------------------------------------------------------------------
 
 
-def test_the_pairs_are_many_and_always_the_same() -> None:
-    assert COUNT >= 300 and 4 * len(QUIRKS) <= COUNT and len(set(USUAL)) == 5
-    first, again = make_pair(17), make_pair(17)
-    assert first.description == again.description and first.quirks == again.quirks
-    for one, other in zip(first.all, again.all, strict=True):
-        assert all(np.array_equal(one[name], other[name]) for name in one)
-
-
-def test_every_quirk_is_met() -> None:
-    assert {make_pair(seed).quirks[0] for seed in range(len(QUIRKS))} == set(QUIRKS)
-
-
-def test_the_pairs_are_short_and_hold_numbers() -> None:
-    for seed in range(0, COUNT, 7):
-        for columns in make_pair(seed).all:
-            assert 1 <= len(columns["time"]) <= 8000
-            assert all(np.isfinite(values).all() for values in columns.values())
-
-
-@pytest.mark.parametrize(
-    "message",
-    [
-        "3 samples; expected 20",
-        "finger.json: too few",
-        "finger.json: KeyError; expected x",
-        "finger.json: a\nexpected b",
-    ],
-)
-def test_a_bad_refusal_is_seen(message: str) -> None:
-    assert list(faults_of_refusal(message, [Path("finger.json")]))
-
-
-def test_a_good_refusal_is_none() -> None:
-    assert not list(faults_of_refusal("a/finger.json: 3 samples; expected 20", [Path("finger.json")]))
-
-
 # --- the options ------------------------------------------------------------------------------------------------------
 
 WORDS = (

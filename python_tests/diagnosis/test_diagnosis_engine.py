@@ -147,10 +147,6 @@ def test_positions_and_forces_tell_their_delay(samples: int) -> None:
     assert delay_of_positions(finger(), [made]) == pytest.approx(samples / RATE, abs=5e-4)
 
 
-def test_what_is_not_late_has_no_delay(sound: FitRecording) -> None:
-    assert delay_of_positions(finger(), [sound]) == pytest.approx(0.0, abs=5e-4)
-
-
 def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     data = finger()
     data["tendons"] = data["tendons"][1:3]

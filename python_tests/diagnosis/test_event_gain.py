@@ -42,20 +42,6 @@ def test_it_is_what_the_pushes_add(recording: Callable[[float], Any]) -> None:
     assert 0.0 < found.low < found.value < found.high < 1.0
 
 
-def test_a_single_push_is_certain_too(recording: Callable[[float], Any]) -> None:
-    found = event_gain({}, [recording(0.01)], PUSHES[:1])
-    assert found is not None and 0.0 < found.low < found.value
-
-
-def test_where_nothing_is_pushed_it_is_nothing(recording: Callable[[float], Any]) -> None:
-    found = event_gain({}, [recording(0.0)], PUSHES)
-    assert found is not None and abs(found.value) < 0.01
-
-
-def test_without_events_there_is_none(recording: Callable[[float], Any]) -> None:
-    assert event_gain({}, [recording(0.01)], ()) is None
-
-
 def test_samples_that_are_not_judged_do_not_count(recording: Callable[[float], Any]) -> None:
     touched = recording(0.01)
     touched.train &= TIME < 5.0

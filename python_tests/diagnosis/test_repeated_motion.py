@@ -103,12 +103,6 @@ def test_another_motion_and_a_short_or_torn_one_are_no_repeats() -> None:
         assert find_repeats(both, forces(both), [0], [1]) == []
 
 
-def test_a_finger_that_rests_repeats_nothing() -> None:
-    still = replace(THEN, angle=np.zeros_like(THEN.angle))
-    both = joined(still, still)
-    assert find_repeats(both, forces(both), [0], [1]) == []
-
-
 # --- differences ------------------------------------------------------------------------------------------------------
 
 
@@ -127,16 +121,6 @@ def test_less_the_reference_a_straight_line_is_its_shift(shift: float) -> None:
     np.testing.assert_allclose(left[now[inside]], np.broadcast_to(shift * slopes, (inside.sum(), 3, 2)), atol=1e-9)
     untouched = np.concatenate([np.flatnonzero(both.recording == 0), now[~inside]])
     assert np.array_equal(left[untouched], line[untouched])
-
-
-def test_values_keep_their_type_and_are_not_changed() -> None:
-    both = joined(THEN, THEN)
-    values = both.angle.astype(np.float32)
-    before = values.copy()
-    left = less_reference(values, both, [Repeat(0, 1, 0.0, THEN.time[0], THEN.time[-1])])
-    assert left.dtype == np.float32 and np.array_equal(values, before)
-    assert np.array_equal(left[: len(THEN.time)], before[: len(THEN.time)])
-    assert np.abs(left[len(THEN.time) : -1]).max() == 0.0
 
 
 def test_outside_are_the_reference_and_what_has_no_partner() -> None:

@@ -15,7 +15,6 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 import sticking_finger
 from tendonfmu.calibrate.fit import fit_all
-from tendonfmu.diagnosis import search as searching
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.remainder import Remainder
@@ -82,11 +81,6 @@ def test_the_fitted_time_stays_if_no_other_is_better() -> None:
     assert settled(given, lambda data: abs(data["extensions"][0]["displacement"] - 0.0053)) is given
 
 
-def test_without_presliding_everywhere_there_is_nothing_to_choose() -> None:
-    given = {"extensions": [{"effect": "presliding", "tendon": 1, "displacement": 1e-3}]}
-    assert settled(given, lambda data: pytest.fail("no error is needed")) is given
-
-
 # --- what is left -----------------------------------------------------------------------------------------------------
 
 
@@ -139,15 +133,6 @@ def test_a_finger_that_sticks_gets_its_true_friction_and_no_false_cause(tmp_path
     true = sticking_finger.friction_at(20.0)
     assert friction_of(found.extended_data) == pytest.approx(true, rel=0.08)
     assert friction_of(found.nominal_data) > 1.3 * true  # the given structure, fitted to all samples
-
-
-@pytest.mark.long
-def test_with_stuck_samples_the_same_finger_gets_a_false_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """So the test above tests something."""
-    monkeypatch.setattr(searching, "sliding_alone", lambda *given: None)
-    found = diagnosed(tmp_path, 3)
-    assert {cause.where.effect for cause in found.causes} - PHYSICS == {"stribeck"}
-    assert not any("stuck" in text for text in found.warnings)
 
 
 @pytest.mark.long

@@ -95,7 +95,7 @@ def test_slack_tendons_are_named() -> None:
     finger = small_finger()
     jam(finger)
     fit = fitted(made_recording(), finger, only=["joints[*].cover"], share=[])
-    assert said(fit, "tendon 1 (tendon_1) is slack", "the training should be modified")
+    assert said(fit, "tendon 1 (tendon_1) is slack", "expected a recording with more pretension")
     throughout = slack_sentences(np.ones((3, len(fit.description_.tendon_names)), dtype=bool), fit.description_)
     assert "is slack in 100 % of the samples" in throughout[0]
 

@@ -216,7 +216,7 @@ def test_the_command_writes_a_finger_that_check_accepts(tmp_path: Path, call: Ca
         (["--joints", "mcp,pip", "--tendons", "deep,elsewhere"], ["tendon elsewhere", "none of the joints mcp, pip"]),
         (["--joints", "mcp,pip", "--tendons", "deep,nerve"], ["tendon nerve", "it has deep"]),
         (["--joints", "mcp,pip", "--tendons", "short,back"], ["joint pip", "none of the tendons"]),
-        (["--joints", "mcp,pip", "--tendons", "deep"], ["no finger", "moment_arms"]),
+        (["--joints", "mcp,pip", "--tendons", "deep"], ["column rank", "moment_arms"]),
         (["--joints", "slider"], ["no tendon", "slider"]),
         (["--joints", "mcp,pip", "--bidirectional", "spring"], ["--bidirectional spring"]),
         (["--joints", "mcp,pip", "--tip", "nail"], ["nail", "no site, geom or body"]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import shutil
@@ -90,26 +89,9 @@ def test_fmpy_compiles_the_sources(folder: Path) -> None:
     assert (folder / "cable_loop.fmu").read_bytes() != (folder / "packed.fmu").read_bytes()
 
 
-@pytest.mark.parametrize("name", CLIENTS)
-def test_a_page_says_whether_it_was_tried(name: str) -> None:
-    assert len(re.findall(r"^\*\*(Tried|Not tried here)\*\*", page(name), re.MULTILINE)) == 1
-    assert f"[{name}.md]({name}.md)" in page("README")
-
-
-@pytest.mark.parametrize("name", ["omsimulator"])
-def test_python_for_other_clients_is_python(name: str) -> None:
-    assert [ast.parse(code) for code in snippets(name, "python")]
-
-
 @pytest.mark.parametrize("name", [*CLIENTS, "README"])
 def test_pages_name_only_variables_that_exist(name: str, small_fmu: Any) -> None:
     groups = {re.sub(r"\[.*", "", each) for each in small_fmu.variables}
     mentioned = set(re.findall(r"\b((?:tendon|joint|compensated|friction|bias|kinematics)_[a-z_]+)\b", page(name)))
     assert mentioned - groups <= {"joint_side_position"}
     assert mentioned
-
-
-@pytest.mark.parametrize("name", [*CLIENTS, "README"])
-def test_links_lead_somewhere(name: str) -> None:
-    for target in re.findall(r"\]\(([^)#:]+)\)", page(name)):
-        assert (PAGES / target).exists(), target

@@ -45,27 +45,6 @@ def test_the_example_interpolates_the_motion(folder: Path) -> None:
     np.testing.assert_allclose([float(word) for word in done.stdout.split()], expected, atol=1e-10)
 
 
-def test_every_option_and_column_is_on_the_page(folder: Path) -> None:
-    shown = subprocess.run(
-        [sys.executable, "-m", "tendonfmu.cli", "excite", "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={"COLUMNS": "200", "PATH": ""},
-    ).stdout
-    options = set(re.findall(r"--[a-z-]+", re.sub(r"\x1b\[[0-9;]*m", "", shown))) - {"--help", "--output"}
-    assert len(options) > 7
-    assert {option for option in options if f"`{option}" not in PAGE} == set()
-    columns = {name.split("[")[0] for name in (folder / "motion.csv").open().readline().strip().split(",")}
-    assert {column for column in columns if f"`{column}" not in PAGE} == set()
-
-
-def test_every_cause_is_on_the_page(folder: Path) -> None:
-    causes = {entry["cause"] for entry in json.loads((folder / "excited.json").read_text())["parameters"]}
-    assert causes >= {"noise", "combination"}
-    assert {cause for cause in causes - {None} if f"`{cause}`" not in PAGE} == set()
-
-
 @needs_plant
 @pytest.mark.long
 def test_the_simulated_finger_plays_it(tmp_path: Path) -> None:

@@ -21,10 +21,6 @@ from repository_paths import ROOT
 
 GUIDE = ROOT / "docs" / "guide"
 PAGES = sorted(path.stem for path in GUIDE.glob("*.md"))
-IN_ORDER = [
-    *("your_finger", "your_recording", "calibrate", "fit", "diagnose", "change", "detect"),
-    *("in_your_loop", "in_your_simulator", "from_python", "simulated_finger"),
-]
 MOST_WORDS = 900
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 START = re.compile(
@@ -38,13 +34,6 @@ FITS = ("calibrate", "fit", "diagnose", "change", "from_python")
 
 def text(name: str) -> str:
     return (GUIDE / f"{name}.md").read_text(encoding="utf-8")
-
-
-def test_the_pages_are_those_of_a_day() -> None:
-    assert sorted(IN_ORDER) == PAGES and len(PAGES) <= 11
-    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
-    places = [index.index(f"(guide/{name}.md)") for name in IN_ORDER]
-    assert places == sorted(places)
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -1,4 +1,4 @@
-"""examples/notebooks: stored without outputs, and run; they show what their texts claim. The pages of the site."""
+"""examples/notebooks: stored without outputs, and run; they show what their texts claim."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from repository_paths import ROOT
 
 sys.path.append(str(ROOT / "tools"))
 
-import site_notebooks
 
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 LONG = pytest.mark.long
 FIGURE = "application/vnd.plotly.v1+json"
-PAIR = {"cell_type": "code", "id": "one", "metadata": {}, "execution_count": 1}
 
 
 def outputs_of(notebook: Any) -> dict[str, list[Any]]:
@@ -113,44 +111,3 @@ def test_an_error_in_a_cell_is_an_error(run_notebook: Any, tmp_path: Path) -> No
     file.write_text(json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
     with pytest.raises(CellExecutionError, match="ZeroDivisionError"):
         run_notebook(file, tmp_path)
-
-
-def test_a_page_has_text_code_and_outputs() -> None:
-    figure = {"data": [{"y": [1.0]}], "layout": {"height": 321.0}}
-    warned = "/tmp/ipykernel_1/2.py:1: FitWarning: not white\n  fit = tf.fit()\n"
-    notebook = {
-        "cells": [
-            {"cell_type": "markdown", "source": ["# Title\n", "[a](2_diagnose_and_extend.ipynb), [b](../README.md)"]},
-            PAIR | {"source": "x = 1", "outputs": [{"output_type": "stream", "name": "stderr", "text": warned}]},
-            PAIR | {"id": "two", "source": "y", "outputs": [{"data": {FIGURE: figure, "text/html": "hidden"}}]},
-            PAIR | {"id": "three", "source": "z", "outputs": [{"data": {"text/html": ["<b>", "t</b>"]}}]},
-            PAIR | {"id": "four", "source": "w", "outputs": [{"data": {"text/plain": "<Path>"}}]},
-        ]
-    }
-    page, scripts = site_notebooks.markdown_of(notebook, "name")
-    assert page.startswith(
-        "# Title\n[a](2_diagnose_and_extend.md), [b](../../examples/README.md)\n\n```python\nx = 1\n```"
-    )
-    assert ">FitWarning: not white</pre>" in page and "/tmp" not in page and "tf.fit()" not in page
-    assert "<b>t</b>" in page and "&lt;Path&gt;" in page and "hidden" not in page
-    assert list(scripts) == ["name-two-0.js"]
-    assert 'id="name-two-0" style="height: 321px"' in page and page.count("plotly.min.js") == 1
-    call = re.fullmatch(r"Plotly\.newPlot\((.*)\);", scripts["name-two-0.js"])
-    assert call and json.loads(f"[{call[1]}]")[:2] == ["name-two-0", figure["data"]]
-
-
-def test_pages_without_outputs_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(site_notebooks, "EXECUTED", tmp_path)
-    pages = site_notebooks.notebook_pages()
-    assert set(pages) == {f"notebooks/{file.stem}.md" for file in NOTEBOOKS}
-    assert all(page.startswith("# ") and "has no outputs" in page for page in pages.values())
-
-
-def test_outputs_of_an_earlier_notebook_are_not_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(site_notebooks, "EXECUTED", tmp_path)
-    stored = json.loads(NOTEBOOKS[0].read_text(encoding="utf-8"))
-    stored["cells"][-1]["source"] = "another text"
-    (tmp_path / NOTEBOOKS[0].name).write_text(json.dumps(stored), encoding="utf-8")
-    (tmp_path / NOTEBOOKS[1].name).write_text(NOTEBOOKS[1].read_text(encoding="utf-8"), encoding="utf-8")
-    noted = ["has no outputs" in page for page in site_notebooks.notebook_pages().values()]
-    assert noted == [True, False, True]

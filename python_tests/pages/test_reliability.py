@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Callable
@@ -17,8 +16,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 sys.path.append(str(ROOT / "bench"))
 
 import reliability
-from reliability_rows import file_rows
-from reliability_rows.row import Outcome, Run, Unavailable, spoken
+from reliability_rows.row import Outcome, Run
 
 PAGE = ROOT / "docs" / "evidence" / "reliability.md"
 
@@ -49,21 +47,6 @@ def test_a_result_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsy
     assert use(monkeypatch, measure, tmp_path, "R2") == 0 and scales == [0.1, 1.0]
 
 
-def test_only_the_rows_named_are_printed(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name, sound in (("R2", True), ("R3", False)):
-        kept = {"number": "5 things", "result": "none", "sound": sound, "seconds": 1.0}
-        (tmp_path / f"{name}.json").write_text(json.dumps(kept))
-
-    def shown(*words: str) -> tuple[int, list[str]]:
-        monkeypatch.setattr(sys, "argv", ["reliability.py", "--work", str(tmp_path), "--table", *words])
-        return reliability.main(), re.findall(r"^\| (R\d+) ", capsys.readouterr().out, re.MULTILINE)
-
-    assert shown("R2") == (0, ["R2"]) and shown("R3", "R2") == (1, ["R2", "R3"])
-    assert shown() == (1, list(reliability.ROWS))
-
-
 def test_full_numbers_and_what_is_left_open_are_those_of_the_page() -> None:
     lines = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines()]
     rows = {cells[0]: cells for cells in lines if len(cells) == 7}
@@ -83,22 +66,3 @@ def test_a_finding_and_an_error_are_said(
     assert use(monkeypatch, measure, tmp_path) == 1
     said = "half a file" if isinstance(finding, Outcome) else "NOT MEASURED: ValueError: lost count"
     assert f"**found:** {said}" in capsys.readouterr().out
-
-
-def test_what_is_missing_is_skipped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def measure(run: Run) -> Outcome:
-        raise Unavailable("no clang++")
-
-    assert use(monkeypatch, measure, tmp_path) == 0
-    assert "SKIPPED: no clang++" in json.loads((tmp_path / "R2.json").read_text())["result"]
-
-
-def test_large_counts_are_spoken() -> None:
-    assert [spoken(x) for x in (7, 20_000, 86_400_000, 1e7)] == ["7", "20,000", "8.64e7", "1e7"]
-
-
-def test_a_beginning_is_told_from_other_samples() -> None:
-    whole = file_rows.np.arange(10.0)
-    columns = {"time": whole, "force": whole**2}
-    assert file_rows.is_beginning({name: values[:4] for name, values in columns.items()}, columns)
-    assert not file_rows.is_beginning({"time": whole[1:4], "force": whole[1:4] ** 2}, columns)

@@ -66,23 +66,3 @@ def without_assertion(trees: Mapping[Path, ast.Module]) -> list[str]:
 def test_every_test_asserts() -> None:
     trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(TESTS.rglob("*.py"))}
     assert without_assertion(trees) == []
-
-
-@pytest.mark.parametrize(
-    ("body", "found"),
-    [
-        ("assert 1", False),
-        ("with pytest.raises(ValueError):\n  f()", False),
-        ("np.testing.assert_allclose(1, 1)", False),
-        ("close(1, 1)", False),
-        ("shared(1)", False),
-        ("f()", True),
-        ("shown(1)", True),
-    ],
-)
-def test_what_counts_as_an_assertion(body: str, found: bool) -> None:
-    lines = "\n".join(f"  {line}" for line in body.splitlines())
-    text = f"from support import shared, shown\ndef close(a, b):\n  assert a == b\ndef test_it():\n{lines}\n"
-    support = "def shared(a):\n  assert a\ndef shown(a):\n  print(a)\n"
-    trees = {Path("support.py"): ast.parse(support), Path("test_it.py"): ast.parse(text)}
-    assert without_assertion(trees) == (["test_it.py: test_it"] if found else [])

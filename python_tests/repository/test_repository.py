@@ -1,4 +1,5 @@
-"""What holds for the repository as a whole: locked requirements, one version number, no trace of a machine."""
+"""What holds for the repository as a whole: locked requirements, one version number, files that pages name, no trace of
+a machine."""
 
 from __future__ import annotations
 
@@ -19,6 +20,9 @@ else:
 
 LOCKS = sorted(ROOT.glob("requirements*.lock"))
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+# A file or folder of the repository in a page, between backticks; `*` stands for any name.
+FOLDERS = "bench|cmake|docs|evidence|examples|fmu_src|modelDescription|python|python_tests|runtime|tools"
+NAMED = re.compile(rf"`(?:python )?((?:{FOLDERS})/[\w./*-]*)")
 # Home and working folders of machines, and hosts of package registries (written apart, to be no match itself).
 MACHINE = re.compile(r"(?<![\w.~}>/-])/(?:work|root|home/[a-z]\w*|Users/[a-z]\w*)/")
 REGISTRY = re.compile(
@@ -92,6 +96,17 @@ def test_the_version_stands_in_one_place() -> None:
     assert metadata.version("tendonfmu") == match[1]
     declared = re.compile(rf"version[\"']?\s*[=:]\s*[\"']{re.escape(match[1])}", re.IGNORECASE)
     assert [name for name, text in tracked_text().items() if declared.search(text)] == []
+
+
+def test_every_file_that_a_page_names_exists() -> None:
+    missing = [
+        f"{page}: {name}"
+        for page, text in tracked_text().items()
+        if page.endswith(".md") and page != "CHANGELOG.md"
+        for name in NAMED.findall(text)
+        if not any(ROOT.glob(name.rstrip("/")))
+    ]
+    assert missing == []
 
 
 def test_no_file_carries_a_machine_or_a_registry() -> None:

@@ -1,14 +1,14 @@
-/* Where a finger is touched, as far as torques tell: the force at the tip and the least link that explains them
+/* Where a finger is touched, as far as the torques show it: the force at the tip and the least link that explains them
  * (docs/reference/semantics.md#link-geometry). */
 #pragma once
 
 #include "finger_memory.h"
 
 typedef struct tip_force {
-  double force[3];     /* N, base frame; 0 along what the torques do not tell */
+  double force[3];     /* N, base frame; 0 along directions that the torques do not show */
   double deviation[3]; /* N, standard deviation of these; 0 where the torques' are not known */
   double misfit;       /* χ² per degree of freedom; 0 where nothing can contradict */
-  int observable;      /* the torques tell all three directions */
+  int observable;      /* the torques show all three directions */
 } tip_force;
 
 /* The force at the tip that explains the torques best.
@@ -17,7 +17,7 @@ typedef struct tip_force {
  *   deviation   [joints] N·m, their standard deviations, all above 0; NULL: not known */
 tip_force find_tip_force(size_t joints, const double* lever, const double* torque, const double* deviation);
 
-/* Contact is on this link, from 1, or beyond; −1 where the torques do not tell. Arrays as above and of
+/* Contact is on this link, from 1, or beyond; −1 where the torques do not show it. Arrays as above and of
  * find_least_links(). */
 int find_contact_link(size_t joints, const int* least, const double* torque, const double* deviation);
 

@@ -278,7 +278,7 @@ typedef struct finger_scratch {
                                                        of the start after it; with start_share only */
   double* turned;                                   /* [N] G, N·m; with start_share only */
   int start_remains;                                /* motion has not turned over all of the start */
-  double* drift_share;                   /* [4] of u, p, s: what they go of the way to e; with contact.drift only */
+  double* drift_share;                   /* [4] of u, p, s: the weight of e in them; with contact.drift only */
   double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
   double* part;                          /* as in the state */
   double* filter;                        /* as in the state, after this sample */

@@ -1,14 +1,14 @@
-/* The rows of R whose tendons tell the joint angles: all but those of failing sensors
+/* The rows of R whose tendons give the joint angles: all but those of failing sensors
  * (docs/reference/semantics.md#sensor-faults). */
 #pragma once
 
 #include "finger_memory.h"
 
-/* A row leaves R⁺, or is told by the others, where that makes the variance of the angles at most so many times larger:
- * 1/(1 − h) of its leverage h. */
+/* A row leaves R⁺, or is predicted by the others, where that makes the variance of the angles at most so many times
+ * larger: 1/(1 − h) of its leverage h. */
 #define LEAST_FREEDOM 0.1
 
-/* Fills R⁺ of the rows in use in scratch, and what the other rows tell of each.
+/* Fills R⁺ of the rows in use in scratch, and what the other rows predict of each.
  *   fault [M]     sensor_fault_kind of each tendon; tendons of failing sensors leave in ascending order */
 void use_rows(tendonfmu_finger* finger, const double* fault);
 

@@ -173,7 +173,7 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
   if (!scalars_are_sound(f, state) || !rows_are_sound(f, state) || !filter_is_sound(f, state) ||
       !sensors_are_sound(f, state) || !rests_are_sound(f, state)) {
-    return refuse(message, "damaged saved state: a number in it cannot be");
+    return refuse(message, "damaged saved state: a number is out of its range");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);
   const int same = memcmp(f->candidate, f->parameters, p * sizeof(double)) == 0;

@@ -20,8 +20,8 @@ const elsewhere no_extensions[] = {
     {"joint_friction", "it is the law friction of a joint"},
     {"joint_load_friction", "it is the law load_friction of a joint"},
     {"cover_stiffness", "it is the number cover.stiffness of a joint"},
-    {"contact", "it is something in a recording, no part of a finger"},
-    {"unknown", "it is something in a recording, no part of a finger"},
+    {"contact", "it belongs to a recording, not to a finger"},
+    {"unknown", "it belongs to a recording, not to a finger"},
 };
 
 const effect_type* read_effect(const json_node& node) {

@@ -23,7 +23,7 @@ description_error syntax_error(const char* text, const char* place, const std::s
 }
 
 /* Builds the tree from the parser's events. The parser's own tree keeps the last of two equal keys without a word, and
- * knows no limit of depth. */
+ * has no limit of depth. */
 class tree_builder : public nlohmann::json_sax<json> {
  public:
   tree_builder(const char* text, std::size_t size) : text_(text), size_(size) {}

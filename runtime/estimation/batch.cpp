@@ -18,7 +18,7 @@ constexpr std::size_t coarse_samples = 40000; /* that a coarse pass looks at, ab
 constexpr double coarse_share = 0.3;          /* of √unknowns, in standard errors: then all samples are looked at */
 constexpr double largest_share = 0.8, smallest_share = 1e-4; /* of a rate, in a step; beyond, its model is not good */
 constexpr double plain_gain = 100.0; /* of what ends the search: after a step that promises less, Gauss and Newton's
-                                      * parabola, without the expansion of the rates, tells whether it was the last */
+                                      * parabola, without the expansion of the rates, decides whether it was the last */
 
 constexpr double least_prior_weight = 1e-10; /* of a covariance: standard deviations up to 1e5 scales */
 
@@ -70,7 +70,7 @@ class batch_search {
 
  private:
   /* From x to where all samples are first looked at: one step of the model of every stride-th sample. What it is worth,
-   * the look at all of them tells. */
+   * the pass over all of them decides. */
   VectorXd approach(const VectorXd& x, std::size_t stride) {
     search_point here;
     if (stride < 2 || result_.stopped || result_.passes >= options_.most_passes ||

@@ -196,7 +196,7 @@ void kalman_filter::add_noise(std::size_t rows) {
 }
 
 /* Cholesky factor, row by row, in place of the innovations' covariance. A measurement that is not used has a row, which
- * tells its own variance, but no column: it says nothing about the others. */
+ * has its own variance, but no column: no covariance with the others. */
 bool kalman_filter::factor(std::size_t rows) {
   const std::size_t n = settings_.joints;
   for (std::size_t row = 0; row < gathered_ * n; ++row) {
@@ -241,7 +241,8 @@ void kalman_filter::find_innovations(std::size_t rows) {
   }
 }
 
-/* W = L⁻¹ times the products, in their place: a sample at a time, what the samples before it tell is taken away at once
+/* W = L⁻¹ times the products, in their place: a sample at a time, what the samples before it predict is subtracted at
+ * once
  */
 void kalman_filter::whiten(std::size_t rows) {
   const std::size_t n = settings_.joints;

@@ -223,7 +223,7 @@ void finger_learner::finish() {
     return;
   }
   if (!filter_.update()) {
-    throw refused("the covariance is no longer finite: expected inputs and expected magnitudes of sane size");
+    throw refused("the covariance is no longer finite: expected smaller inputs and scales");
   }
   written_ = false;
 }

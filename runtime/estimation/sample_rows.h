@@ -43,7 +43,7 @@ class sample_rows {
   const std::vector<double>& entries() const { return entries_; }
   void resume(const std::vector<double>& entries) { entries_ = entries; }
   void forget() { std::fill(entries_.begin(), entries_.end(), 0.0); }
-  /* a sample whose derivative nobody wants: read only where it is remembered */
+  /* a sample without a derivative: read only where it is remembered */
   void follow() {
     if (!entries_.empty() && sees_event()) {
       read();

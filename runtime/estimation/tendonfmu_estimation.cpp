@@ -29,7 +29,7 @@ struct tendonfmu_estimator {
 
 namespace {
 
-/* unknowns within their boxes, a rounding aside */
+/* unknowns within their boxes, up to rounding */
 std::vector<double> checked(const fit_problem& problem, const double* z) {
   std::vector<double> values(z, z + problem.unknowns.count());
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -69,7 +69,7 @@ void known_recording(const fit_problem& problem, std::size_t recording) {
   }
 }
 
-/* [u × u] symmetric, without a direction that is known less than nothing, a rounding aside */
+/* [u × u] symmetric, positive semidefinite up to rounding */
 Eigen::MatrixXd checked_information(const double* information, Eigen::Index u) {
   const Eigen::MatrixXd given = Eigen::Map<const Eigen::MatrixXd>(information, u, u);
   if (u == 0) {

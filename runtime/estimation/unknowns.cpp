@@ -234,7 +234,7 @@ class column_maker {
     if (kinds_[column] == ITEM_INITIAL_TORQUE) {
       return 1.0;
     }
-    throw refused(list[column].path + " = 0: nothing says how large it may be; expected a scale, or a start above 0");
+    throw refused(list[column].path + " = 0: its size is unknown; expected a scale, or a start above 0");
   }
 
   void bound(unknown_item* unknown) const {

@@ -81,8 +81,8 @@ tendonfmu_status tendonfmu_estimator_add_recording(tendonfmu_estimator* estimato
                                                    size_t* index);
 
 /* Lets each sample of a recording count as a part of one, by joint: cost, gradient, information and fit then have
- * w e²/S in place of e²/S. Residuals that last for several samples tell as little as fewer of them (tendonfmu fit sets
- * their effective number over their number); the bias filter, innovations and variances stay as they are.
+ * w e²/S in place of e²/S. Correlated residuals count as fewer samples (tendonfmu fit sets their effective number over
+ * their number); the bias filter, innovations and variances stay as they are.
  *   weight  [n] above 0, at most 1; 1 until set */
 tendonfmu_status tendonfmu_estimator_set_weights(tendonfmu_estimator* estimator, size_t recording,
                                                  const double* weight);

@@ -211,7 +211,7 @@ class cvode_integrator : public integrator {
   [[noreturn]] void fail(int flag, double time) {
     fresh_ = true;
     const char* cause = "CVODE gave up";
-    const char* remedy = "check masses, stiffnesses and the motion for values beyond reason";
+    const char* remedy = "check masses, stiffnesses and the motion for values that are far too large or too small";
     if (flag == CV_TOO_MUCH_WORK) {
       cause = "CVODE took too many steps";
       remedy = "try a larger relative_tolerance or the fixed-step integrator; a rig too stiff or chattering does this";
@@ -223,7 +223,7 @@ class cvode_integrator : public integrator {
           flag == CV_ERR_FAILURE ? "CVODE's error test failed too often" : "CVODE's Newton iteration did not converge";
       remedy = "try a larger relative_tolerance or the fixed-step integrator, or a rig that is less stiff";
     } else if (flag == CV_RHSFUNC_FAIL || flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR) {
-      cause = "the motion left all bounds";
+      cause = "the motion diverges";
     }
     throw solver_error(sentence(cause, " at t = ", time, " s (CVODE flag ", flag, "): ", remedy));
   }

@@ -199,7 +199,7 @@ void fixed_step_integrator::advance(const commands& inputs, double until, moment
   }
   if (!std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); })) {
     forget();
-    throw solver_error(sentence("the motion left all bounds before t = ", until, " s: try a smaller step, or cvode"));
+    throw solver_error(sentence("the motion diverges before t = ", until, " s: try a smaller step, or cvode"));
   }
   now->state = state_;
   now->time = until;

@@ -26,7 +26,7 @@ struct moment {
   contact_modes modes;
 };
 
-/* Whether nothing lies between two times that a step could be told from: an integrator then only sets the clock. */
+/* Whether two times are so close that no step fits between them: an integrator then only sets the clock. */
 inline bool same_moment(double time, double until) {
   return until - time <= 1e-15 + 4.0 * std::numeric_limits<double>::epsilon() * std::fabs(until);
 }

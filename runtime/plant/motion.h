@@ -1,4 +1,4 @@
-/* What the motors are told: desired joint angles and pretension over time. */
+/* What the motors are commanded: desired joint angles and pretension over time. */
 #pragma once
 
 #include "elementary.h"
@@ -37,7 +37,7 @@ inline double arm_slope_at(const moment_arm& arm, double angle) {
 /* Elongation (m) at which a tendon pulls with `force` (N), and back. */
 double elongation_of(const tendon& tendon, double force);
 
-/* Desired joint angles [n]; before time 0 the finger comes to the first posture from aside (rig key `settle`). */
+/* Desired joint angles [n]; before time 0 the finger moves to the first posture from another one (rig key `settle`). */
 void desired_angles(const rig& rig, double time, double* angle);
 
 /* Motor positions [m] for the rig's own motion, with `extra` N of pretension beside its own. */

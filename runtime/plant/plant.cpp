@@ -183,7 +183,7 @@ void plant::advance(double until) {
   need_initialised();
   need(std::isfinite(until) && until < 1e9, "time: expected a finite number of seconds below 1e9");
   if (until < now_.time) {
-    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not to go back");
+    throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not before the time of the simulation");
   }
   if (until == now_.time) {
     return;

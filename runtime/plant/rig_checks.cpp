@@ -155,10 +155,9 @@ void check_stiffness(const json_node& physics, const rig& rig) {
     if (rate <= fastest_rate) {
       continue;
     }
-    const std::string said =
-        sentence("a body that its springs (", stiffness,
-                 " N·m/rad with tendons, presliding, cover, coupling and stops) swing at less than ", fastest_rate,
-                 " rad/s, not ", rate, ": heavier, or less stiff");
+    const std::string said = sentence("a body whose natural frequency on its springs (", stiffness,
+                                      " N·m/rad with tendons, presliding, cover, coupling and stops) is below ",
+                                      fastest_rate, " rad/s, not ", rate, ": heavier, or less stiff");
     physics.member("links").element(j).refuse(said);
   }
 }

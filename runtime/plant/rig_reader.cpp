@@ -30,7 +30,7 @@ void check_finger(const json_node& finger) {
 
   const json_node extensions = finger.member("extensions");
   if (!extensions.absent() && extensions.size() > 0) {
-    extensions.refuse("none: what the simulated finger has beyond the description stands under `physics`");
+    extensions.refuse("none here: what the simulated finger has beyond the description is under `physics`");
   }
   const json_node tendons = finger.member("tendons");
   for (std::size_t i = 0; i < tendons.size(); ++i) {

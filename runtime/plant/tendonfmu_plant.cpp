@@ -56,7 +56,7 @@ tendonfmu_plant_status guarded(const tendonfmu_plant* plant, Call call) noexcept
   } catch (const std::exception& failed) {  // solver_error, and what nobody has thought of
     note(plant, failed.what());
   } catch (...) {
-    note(plant, "failed for a reason it did not tell");
+    note(plant, "failed for an unknown reason");
   }
   return TENDONFMU_PLANT_SOLVER;
 }

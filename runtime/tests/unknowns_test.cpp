@@ -253,7 +253,7 @@ TEST(Unknowns, RefusalsNameTheNumber) {
       "kind");
   group = d.fixed();
   group[d.at(number(pulley, "viscous"))] = 0;
-  EXPECT_EQ(d.why_not(group).find("tendons[1].pulley_friction[1].viscous = 0: nothing says how large it may be"), 0u);
+  EXPECT_EQ(d.why_not(group).find("tendons[1].pulley_friction[1].viscous = 0: "), 0u);
   Numbers scale = d.no_scale();
   scale[d.at(number(pulley, "viscous"))] = 0.2;
   EXPECT_EQ(d.why_not(group, scale.data()), "");

@@ -54,7 +54,7 @@ def diagnose(
     recordings.
 
     With --reference a cause is what has changed since. The reference may have
-    another motion, pretension or length, but the same motion tells most.
+    another motion, pretension or length, but the same motion shows most.
     Several recordings of now, in order of time, show how the change grows.
 
     DIR gets the page diagnosis.html, diagnosis.json, figures, and the model

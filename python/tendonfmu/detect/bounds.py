@@ -24,7 +24,7 @@ from tendonfmu.detect.free_motion import FreePart, FreeRun, Signal
 # c_H and c_J. A push makes the model jump and ends stiction, so large shares hide it: docs/reference/commands/tune.md
 SHARES = (0.4, 0.4)
 TAILS = (4.0, 16.0)  # times the wished rate: the rates of the tails that shape a bound
-COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes tell little about a shape
+COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes say little about a shape
 _LEAST = 0.02  # of a signal's rms: least value of the part of a bound that is not friction
 WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # weights of H and J that a push has to exceed, see `Search.in_the_way`
 _EVERY = 10  # one cell in so many for the mean logarithm

@@ -24,7 +24,7 @@ SETTLING = 2.0  # s after the start, while the bias forgets its initial variance
 NEVER = 1e9  # N·m, a threshold that is never exceeded
 BEYOND_NOISE = 6.0  # times the noise of a reference sensor: a larger mean over `SMOOTHED` is contact
 SMOOTHED = 0.05  # s
-STILL = 0.01  # least share of the time with motion; less tells nothing about friction
+STILL = 0.01  # least share of the time with motion; less says nothing about friction
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What free motion tells about noise: that of the bias filter, and the error of the estimated external torque."""
+"""The noise in free motion: that of the bias filter, and the error of the estimated external torque."""
 
 from __future__ import annotations
 

@@ -41,8 +41,8 @@ def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
     if inside.any():
         first, own = int(block[inside][0]), block[inside]
         for j in range(sums.shape[1]):
-            found = np.bincount(own - first, weights=values[inside, j])
-            sums[first : first + len(found), j] += found
+            totals = np.bincount(own - first, weights=values[inside, j])
+            sums[first : first + len(totals), j] += totals
 
 
 def _learning_nothing(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -109,7 +109,7 @@ class _Work:
     ) -> None:
         self._data, self._recordings, self._blocks = data, recordings, blocks
         self.values, self._progress = values, progress
-        self._samples = sum(part.stop - part.start for each in recordings for part in each.parts)
+        self._samples = sum(part.stop - part.start for recording in recordings for part in recording.parts)
         self._done = 0
 
     def plan(self, nominal: Sequence[Direction], variants: Sequence[tuple[Variant, int]]) -> None:
@@ -121,14 +121,14 @@ class _Work:
         self._passes = plan_passes(self._data, exact)
         for at, direction in reversed(list(enumerate(nominal))):
             self._passes[0].columns.insert(0, (at, direction))
-        self._passes = [each for each in self._passes if each.columns]
+        self._passes = [pass_ for pass_ in self._passes if pass_.columns]
         self._bundles = _bundles([(variant, at) for variant, at in variants if variant.secant_rows])
         self._total = self._samples * (len(self._passes) + len(self._bundles) + 1)
 
     def run(self) -> Numbers:
         """Fill the values; return G of the description."""
-        for each in self._passes:
-            run_pass(each.data(), each.columns, self._recordings, self._blocks, self.values, self._watch)
+        for pass_ in self._passes:
+            run_pass(pass_.data(), pass_.columns, self._recordings, self._blocks, self.values, self._watch)
         self.values /= np.maximum(self._blocks.sizes(), 1)[:, None, None].astype(np.float32)
         prediction = self._prediction(self._data)
         for bundle in self._bundles:
@@ -147,9 +147,9 @@ class _Work:
         return prediction
 
     def _prediction(self, data: Mapping[str, Any]) -> Numbers:
-        found = block_prediction(data, self._recordings, self._blocks)
+        prediction = block_prediction(data, self._recordings, self._blocks)
         self._watch(self._samples)
-        return found
+        return prediction
 
     def _watch(self, samples: int) -> None:
         self._done += samples
@@ -176,9 +176,9 @@ def _proposed(
 ) -> Iterator[tuple[Candidate, Place, list[Variant]]]:
     for candidate in candidates:
         for place in candidate.places(data, kinematics):
-            variants = [each for each in candidate.variants(data, place, span) if _is_sane(each)]
+            variants = [variant for variant in candidate.variants(data, place, span) if _is_sane(variant)]
             if worth is not None:
-                variants = [each for each in variants if worth(candidate, place, each.shape)]
+                variants = [variant for variant in variants if worth(candidate, place, variant.shape)]
             if variants:
                 yield candidate, place, variants
 

@@ -47,7 +47,7 @@ class Verified:
 
 def verify(
     given: Finger,
-    found: Search,
+    result: Search,
     training: Sequence[FitRecording],
     tests: Sequence[FitRecording],
     least_gain: float,
@@ -55,10 +55,10 @@ def verify(
     seed: int,
 ) -> Verified:
     """Measure the gain of each cause on unseen data and drop the weak ones."""
-    bench = _Bench(given, found, training, tests, settings, seed)
-    if found.only_sliding:
+    bench = _Bench(given, result, training, tests, settings, seed)
+    if result.only_sliding:
         least_gain *= STRICTER
-    causes, dropped = merged(found.causes), []
+    causes, dropped = merged(result.causes), []
     while True:
         fit = bench.fit(causes)
         without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
@@ -71,7 +71,7 @@ def verify(
                 gain.low > 0.0
                 and gain.value >= least_gain * names[k]
                 and bench.runs_better(fit, without[k])
-                and is_shown(causes[k], fit.data, found.estimation.least)
+                and is_shown(causes[k], fit.data, result.estimation.least)
             )
         ]
         if not weak and causes and not bench.is_sound(causes):
@@ -102,11 +102,11 @@ def verify(
 
 def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
     """Return, for each cause, the number of names up to and including it, the largest gain first."""
-    found, named = [1] * len(causes), list[str]()
+    counts, named = [1] * len(causes), list[str]()
     for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
-        found[k] = names_with(causes[k].effect, named)
+        counts[k] = names_with(causes[k].effect, named)
         named.append(causes[k].effect)
-    return found
+    return counts
 
 
 def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
@@ -130,19 +130,19 @@ def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
 
 def _rivals(cause: NamedCause, named: Collection[str]) -> tuple[Hypothesis, ...]:
     """Return the best hypothesis of every other effect."""
-    found: dict[str, Hypothesis] = {}
-    for each in cause.alike:
-        if each.effect not in named:
-            found.setdefault(each.effect, each)
-    return tuple(found.values())
+    rivals: dict[str, Hypothesis] = {}
+    for other in cause.alike:
+        if other.effect not in named:
+            rivals.setdefault(other.effect, other)
+    return tuple(rivals.values())
 
 
 def _parameters(
     nominal: FittedModel, model: FittedModel, causes: Sequence[NamedCause], order: Sequence[int]
 ) -> tuple[tuple[Parameters, ...], ...]:
     """Return the numbers of each place of each cause, in this order."""
-    found = iter(cause_parameters(nominal.data, [each for cause in causes for each in cause.accepted], model))
-    by_cause = [tuple(next(found) for _ in cause.accepted) for cause in causes]
+    parameters = iter(cause_parameters(nominal.data, [term for cause in causes for term in cause.accepted], model))
+    by_cause = [tuple(next(parameters) for _ in cause.accepted) for cause in causes]
     return tuple(by_cause[k] for k in order)
 
 
@@ -152,32 +152,32 @@ class _Bench:
     def __init__(
         self,
         given: Finger,
-        found: Search,
+        result: Search,
         training: Sequence[FitRecording],
         tests: Sequence[FitRecording],
         settings: FitSettings,
         seed: int,
     ) -> None:
-        self._given, self._found, self._settings, self._seed = given, found, settings, seed
+        self._given, self._found, self._settings, self._seed = given, result, settings, seed
         self._training, self._tests = training, tests
         self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
-        self._signals = found.estimation.signals
-        self.nominal, self._fit_to, self._everything = found.nominal, list(found.fitted_to), list(found.everything)
+        self._signals = result.estimation.signals
+        self.nominal, self._fit_to, self._everything = result.nominal, list(result.fitted_to), list(result.everything)
         if tests:  # the search has fitted to the same samples
-            for count, model in enumerate(found.models):
-                known = [each for cause in found.causes[:count] for each in cause.accepted]
-                self._fits[frozenset(map(id, known)), found.only_sliding] = model
+            for count, model in enumerate(result.models):
+                known = [term for cause in result.causes[:count] for term in cause.accepted]
+                self._fits[frozenset(map(id, known)), result.only_sliding] = model
         else:
             self._hold_out()
-        self.fits_sliding = found.only_sliding
+        self.fits_sliding = result.only_sliding
 
     def _hold_out(self) -> None:
         """Exclude the judged samples from the fits."""
         finger = replace(self._given, data=self._signals.description(self._given.data))
         own = estimation_recordings(finger, self._training, self._signals)
         self._fit_to, self._everything = (
-            [replace(clean, train=clean.train & each.train) for clean, each in zip(seen, own, strict=True)]
+            [replace(clean, train=clean.train & recording.train) for clean, recording in zip(seen, own, strict=True)]
             for seen in (self._fit_to, self._everything)
         )
         self.nominal = fitted(self.nominal.data, self._everything, self._settings, given=self.nominal.given)
@@ -188,11 +188,11 @@ class _Bench:
 
     def result(self, causes: Sequence[NamedCause]) -> FittedModel:
         """Return the fit that becomes the extended model."""
-        found = self._fit(causes, self.fits_sliding)
+        fitted = self._fit(causes, self.fits_sliding)
         if not self.fits_sliding:
-            return found
-        data = settled(found.data, self._trained)
-        return replace(found, data=data, values={path: get_number(data, path) for path in found.values})
+            return fitted
+        data = settled(fitted.data, self._trained)
+        return replace(fitted, data=data, values={path: get_number(data, path) for path in fitted.values})
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""
@@ -209,12 +209,15 @@ class _Bench:
         return self.holds(self.result(causes))
 
     def _fit(self, causes: Sequence[NamedCause], sliding: bool) -> FittedModel:
-        accepted = [each for cause in causes for each in cause.accepted]
+        accepted = [term for cause in causes for term in cause.accepted]
         key = frozenset(map(id, accepted)), sliding
         if key not in self._fits:
             fit_to = self._fit_to if sliding else self._everything
             if accepted and self._found.causes:
-                fit_to = [replace(clean, train=each.train) for clean, each in zip(self._predicted, fit_to, strict=True)]
+                fit_to = [
+                    replace(clean, train=recording.train)
+                    for clean, recording in zip(self._predicted, fit_to, strict=True)
+                ]
             self._fits[key] = fit_extended(self.nominal, accepted, fit_to, self._settings)
         return self._fits[key]
 
@@ -227,7 +230,7 @@ class _Bench:
 
     def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
         after = self._error(model)
-        return [gain_interval(self._error(each), after, self._seed) for each in without]
+        return [gain_interval(self._error(model), after, self._seed) for model in without]
 
     def runs_better(self, model: FittedModel, without: FittedModel) -> bool:
         """Return whether the first model leaves less of r."""
@@ -238,9 +241,11 @@ class _Bench:
         if self._tests and not self._found.only_sliding:
             return True  # `runs_better` has judged the same samples
         judged = self._tests or self._training
-        flags = [each.train if self._tests else each.held_out for each in judged]
-        found, nominal = (squared_residual(self.online(each), judged, flags) for each in (model, self.nominal))
-        return found <= nominal
+        flags = [recording.train if self._tests else recording.held_out for recording in judged]
+        with_causes, nominal = (
+            squared_residual(self.online(fitted), judged, flags) for fitted in (model, self.nominal)
+        )
+        return with_causes <= nominal
 
     def _error(self, model: FittedModel) -> Numbers:
         """Return Σ e² by stretch on unseen data [K]."""
@@ -257,7 +262,9 @@ class _Bench:
     @cached_property
     def _unseen(self) -> OnlineError:
         """Return the errors of models that run online; of the training recordings, all free motion counts."""
-        judged = self._tests or [replace(each, train=each.train | each.held_out) for each in self._training]
+        judged = self._tests or [
+            replace(recording, train=recording.train | recording.held_out) for recording in self._training
+        ]
         if self._found.only_sliding:
             judged = without_stuck(self._given, judged, self._signals)
         return OnlineError(self.online(self.nominal), judged)

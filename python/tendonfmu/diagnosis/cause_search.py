@@ -58,7 +58,7 @@ class View:
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """Return what is missing if these hypotheses are present, each with all its shapes at that place."""
-        known = [each for each in self.selection.hypotheses if each.key in keys]
+        known = [hypothesis for hypothesis in self.selection.hypotheses if hypothesis.key in keys]
         return Selection(self.grams, self.selection.hypotheses, self.least, known) if known else self.selection
 
     @cached_property
@@ -75,7 +75,7 @@ class View:
         """Return the probability of such a result by chance, corrected for all hypotheses that were tried."""
         used = np.flatnonzero(hypothesis.mix.any(axis=1))
         columns = self.columns.values[:, :, used].astype(np.float64) @ hypothesis.mix[used]
-        return self.confirmation.p_value(columns, sum(len(each.shapes) for each in self.columns.proposals))
+        return self.confirmation.p_value(columns, sum(len(proposal.shapes) for proposal in self.columns.proposals))
 
 
 def look(
@@ -108,7 +108,7 @@ def look(
 def nominal_scale(data: Mapping[str, Any]) -> Numbers:
     """Return how large each number that a fit of the description estimates is expected to be [u]."""
     estimator = Estimator(native.image_from_json(json.dumps(without_uncertainty(data))))
-    return np.array([each.scale for each in estimator.unknowns if not each.path.startswith("bias.")])
+    return np.array([unknown.scale for unknown in estimator.unknowns if not unknown.path.startswith("bias.")])
 
 
 def series_of(
@@ -139,8 +139,8 @@ def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Sp
 
 def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> SampleBlocks:
     """Return the grid's blocks in the form that `candidate_columns` takes."""
-    found = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
+    numbers_of = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
     for segment in grid.segments:
         numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
-        found[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
-    return SampleBlocks(tuple(found), grid.blocks)
+        numbers_of[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
+    return SampleBlocks(tuple(numbers_of), grid.blocks)

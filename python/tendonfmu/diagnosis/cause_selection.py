@@ -63,11 +63,11 @@ class Selection:
         # explain.
         self.grams = grams
         self._beside = _Beside(beside)
-        self.shares = [grams.surviving(each.mix) for each in hypotheses]
+        self.shares = [grams.surviving(hypothesis.mix) for hypothesis in hypotheses]
         self.hypotheses = list(hypotheses)
         self.base = grams.by_stretch(*self._beside.judged(grams)) if beside else grams.by_stretch(None, None)
-        effects = {each.effect for each in beside}
-        found = []
+        effects = {hypothesis.effect for hypothesis in beside}
+        judged = []
         for hypothesis, share in zip(hypotheses, self.shares, strict=True):
             if share < ABSORBED or hypothesis.effect in effects:
                 continue
@@ -76,8 +76,8 @@ class Selection:
             if least.resolved(hypothesis, magnitudes):
                 error, by_fold = grams.error(*columns)
                 if error <= (1.0 - hypothesis.least_gain) ** 2 * self.base.sum():
-                    found.append((error, hypothesis, magnitudes, by_fold))
-        self._found = sorted(found, key=lambda each: each[0])
+                    judged.append((error, hypothesis, magnitudes, by_fold))
+        self._found = sorted(judged, key=lambda result: result[0])
         self._known: dict[int, Judged] = {}
 
     def ranked(self) -> list[Judged]:
@@ -104,15 +104,15 @@ class Selection:
     def best(self, least_gain: float, tried: Collection[str] = ()) -> Pick | None:
         """Return the effect that lowers the error most, at the coarsest place that is as good."""
         # None if no effect is material and certain.
-        ranked = [each for each in self.ranked() if each.hypothesis.effect not in tried]
+        ranked = [judged for judged in self.ranked() if judged.hypothesis.effect not in tried]
         if not ranked:
             return None
         judged = self.refined(ranked[0].hypothesis.effect)
         gain, error = self.gain(judged)
         if gain < least_gain or gain <= CERTAIN * error:
             return None
-        others = [each for each in ranked if each.hypothesis.effect != judged.hypothesis.effect]
-        alike = [each.hypothesis for each in others if is_alike(each.by_stretch, judged.by_stretch)]
+        others = [other for other in ranked if other.hypothesis.effect != judged.hypothesis.effect]
+        alike = [other.hypothesis for other in others if is_alike(other.by_stretch, judged.by_stretch)]
         return Pick(judged, gain, error, tuple(alike))
 
     def refined(self, effect: str) -> Judged:
@@ -134,9 +134,9 @@ class Selection:
         own = judged.hypothesis
         most = judged.error + NEAR * (float(self.base.sum()) - judged.error)
         seen: dict[Key, int] = {}
-        for k, (error, each, _, _) in enumerate(self._found):
-            if (each.effect, each.level) == (own.effect, own.level) and each.key != own.key and error <= most:
-                seen.setdefault(each.key, k)
+        for k, (error, other, _, _) in enumerate(self._found):
+            if (other.effect, other.level) == (own.effect, own.level) and other.key != own.key and error <= most:
+                seen.setdefault(other.key, k)
         return [self._judged(k) for k in seen.values()]
 
 
@@ -156,9 +156,9 @@ class _Beside:
     """Columns of hypotheses that are always present."""
 
     def __init__(self, hypotheses: Sequence[Hypothesis]) -> None:
-        self._mixes = [each.mix for each in hypotheses]
-        self.low = np.concatenate([np.zeros(0), *(each.low for each in hypotheses)])
-        self._high = np.concatenate([np.zeros(0), *(each.high for each in hypotheses)])
+        self._mixes = [hypothesis.mix for hypothesis in hypotheses]
+        self.low = np.concatenate([np.zeros(0), *(hypothesis.low for hypothesis in hypotheses)])
+        self._high = np.concatenate([np.zeros(0), *(hypothesis.high for hypothesis in hypotheses)])
 
     def judged(self, grams: Grams) -> tuple[Numbers, Numbers]:
         """Return the mix of all columns [c, d], and their magnitudes without each fold [f, d]."""

@@ -69,13 +69,13 @@ class _ClusterTest:
 
     def _flat(self, values: Columns) -> Columns:
         """Return values filtered and without the bias [R·n, d]."""
-        found = np.empty((len(self._rows), *values.shape[1:]), dtype=values.dtype)
+        filtered = np.empty((len(self._rows), *values.shape[1:]), dtype=values.dtype)
         for begin in range(0, values.shape[2], _CHUNK):
             chunk = slice(begin, begin + _CHUNK)
-            found[:, :, chunk] = self._filters.apply(values[:, :, chunk])[self._rows]
+            filtered[:, :, chunk] = self._filters.apply(values[:, :, chunk])[self._rows]
         for j, span in enumerate(self._spans):
-            found[:, j] = without(found[:, j], span)
-        return np.asarray(found.reshape(found.shape[0] * found.shape[1], values.shape[2]))
+            filtered[:, j] = without(filtered[:, j], span)
+        return np.asarray(filtered.reshape(filtered.shape[0] * filtered.shape[1], values.shape[2]))
 
     def _left(self, values: Columns) -> Numbers:
         """Return values without what refitting the nominal numbers can explain [R·n, d]."""
@@ -84,21 +84,21 @@ class _ClusterTest:
     @cached_property
     def _given_back(self) -> list[tuple[Indices, int, Numbers, Numbers]]:
         """Directions that the splines weaken, for each stretch and joint."""
-        found = []
+        directions_of = []
         for rows in self._rows_of_stretches:
             for j, span in enumerate(self._spans):
                 directions, share, _ = np.linalg.svd(span[rows], full_matrices=False)
                 kept = share**2 > 1e-6
                 leverage = np.minimum(share[kept] ** 2, _MOST_LEVERAGE)
-                found.append((rows, j, directions[:, kept], 1.0 / np.sqrt(1.0 - leverage) - 1.0))
-        return found
+                directions_of.append((rows, j, directions[:, kept], 1.0 / np.sqrt(1.0 - leverage) - 1.0))
+        return directions_of
 
     def _unshrunk(self, left: Numbers) -> Numbers:
         """Return a residual with what the splines removed by stretch restored [R·n]."""
-        found = left.reshape(-1, len(self._spans)).copy()
+        restored = left.reshape(-1, len(self._spans)).copy()
         for rows, j, directions, strength in self._given_back:
-            found[rows, j] += directions @ (strength * (directions.T @ found[rows, j]))
-        return np.asarray(found.reshape(-1))
+            restored[rows, j] += directions @ (strength * (directions.T @ restored[rows, j]))
+        return np.asarray(restored.reshape(-1))
 
     def p_value(self, columns: Columns) -> float:
         values = self._left(self._flat(columns))
@@ -123,8 +123,8 @@ class _ClusterTest:
 
 def _product(one: Columns, other: Columns) -> Numbers:
     """Return the product in double precision [d, e], piece by piece: copies of many columns would not fit in memory."""
-    found = np.zeros((one.shape[1], other.shape[1]))
+    product = np.zeros((one.shape[1], other.shape[1]))
     for begin in range(0, len(one), _PIECE):
         part = slice(begin, begin + _PIECE)
-        found += one[part].astype(np.float64).T @ other[part].astype(np.float64)
-    return found
+        product += one[part].astype(np.float64).T @ other[part].astype(np.float64)
+    return product

@@ -42,15 +42,15 @@ _SPARE = 1.3  # times the least time that supports a rate: recordings are cut in
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
     """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned."""
-    labelled = [each.recording for each in recordings if each.recording.contact is not None]
-    labelled = [each for each in labelled if each.contact is not None and each.contact.any()]
+    labelled = [recording.recording for recording in recordings if recording.recording.contact is not None]
+    labelled = [recording for recording in labelled if recording.contact is not None and recording.contact.any()]
     if not labelled:
         return None
     kinematics = recordings[0].kinematics
-    free = _free_motion(_described(nominal), [each.recording for each in recordings], kinematics)
+    free = _free_motion(_described(nominal), [recording.recording for recording in recordings], kinematics)
     if not free:
         return None
-    hours = sum(float(each.time[-1] - each.time[0]) - SETTLING for each in free) / 3600
+    hours = sum(float(recording.time[-1] - recording.time[0]) - SETTLING for recording in free) / 3600
     rate = max(RATE, _SPARE * least_hours(1.0, CONFIDENCE) / hours)
     if rate > 3600:
         return None
@@ -76,11 +76,16 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
 
 
 def _free_motion(finger: Finger, recordings: Sequence[Recording], kinematics: int) -> list[Recording]:
-    whole = [each for each in recordings if each.contact is None or not each.contact.any()]
-    found = [each for each in whole if _is_free(finger, each, kinematics)]
-    if found:
-        return found
-    pieces = [piece for each in recordings if each.contact is not None for piece in _pieces(each, each.contact)]
+    whole = [recording for recording in recordings if recording.contact is None or not recording.contact.any()]
+    free = [recording for recording in whole if _is_free(finger, recording, kinematics)]
+    if free:
+        return free
+    pieces = [
+        piece
+        for recording in recordings
+        if recording.contact is not None
+        for piece in _pieces(recording, recording.contact)
+    ]
     return [piece for piece in pieces if _is_free(finger, piece, kinematics)]
 
 
@@ -99,13 +104,13 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
     touched = time[contact]
     after = np.searchsorted(touched, time - _MARGIN) < np.searchsorted(touched, time + _MARGIN, side="right")
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~after).astype(np.int8), [0]])))
-    found = []
+    pieces = []
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         if time[end - 1] - time[begin] >= _SHORTEST:
             groups = {name: np.ascontiguousarray(values[begin:end]) for name, values in recording.groups.items()}
             piece = Recording(Path(f"{recording.path}, from {time[begin]:.4g} s"), time[begin:end].copy(), groups)
-            found.append(replace(piece, contact=np.zeros(end - begin, dtype=bool)))
-    return found
+            pieces.append(replace(piece, contact=np.zeros(end - begin, dtype=bool)))
+    return pieces
 
 
 # --- tuned and scored -------------------------------------------------------------------------------------------------
@@ -128,14 +133,14 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
     subject = Subject(Path("finger"), _described(data), packed=False)
-    return pooled([run_track(subject, each, kinematics, None).score() for each in recordings])
+    return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
 
 
 def _thresholds(data: Data) -> tuple[float, ...]:
     """Return the thresholds of the method that decides first [n], N·m."""
     contact = data["contact"]
-    found = (contact.get("innovation") or contact)["threshold"]
-    return tuple(math.inf if each is None else float(each) for each in found)
+    thresholds = (contact.get("innovation") or contact)["threshold"]
+    return tuple(math.inf if threshold is None else float(threshold) for threshold in thresholds)
 
 
 def _median(score: DetectionScore) -> float | None:

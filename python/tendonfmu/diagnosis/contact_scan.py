@@ -183,11 +183,11 @@ def _stretches(series: Series, inside: Flags) -> list[NDArray[np.int64]]:
         return []
     apart = (np.diff(marked) * series.step > MERGED) | (np.diff(series.segment[marked]) != 0)
     pad = round(PAD / series.step)
-    found = []
+    stretches = []
     for rows in np.split(marked, np.flatnonzero(apart) + 1):
         wide = np.arange(max(0, rows[0] - pad), min(len(series.time), rows[-1] + pad + 1))
-        found.append(wide[series.segment[wide] == series.segment[rows[0]]])
-    return found
+        stretches.append(wide[series.segment[wide] == series.segment[rows[0]]])
+    return stretches
 
 
 def _event(series: Series, left: Numbers, inside: Flags, rows: NDArray[np.int64], recordings: Sequence[str]) -> Event:

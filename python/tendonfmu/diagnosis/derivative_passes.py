@@ -83,7 +83,7 @@ def plan_passes(base: Mapping[str, Any], variants: Sequence[tuple[Variant, int]]
     """Distribute variants over as few passes as possible; each comes with the index of its first column."""
     passes = [Pass(base)]
     for variant, first in variants:
-        chosen = next((each for each in passes if each.takes(variant)), None)
+        chosen = next((pass_ for pass_ in passes if pass_.takes(variant)), None)
         if chosen is None:
             chosen = Pass(base)
             passes.append(chosen)
@@ -128,13 +128,13 @@ def run_pass(
             if not len(inside):
                 continue
             first, last = int(inside[0]), int(inside[-1]) + 1
-            found = np.zeros((last - first, joints, len(finer)), dtype=np.float32)
+            part_sums = np.zeros((last - first, joints, len(finer)), dtype=np.float32)
             shifted = np.where(own >= 0, own - first, own)
-            target = BlockSums(found, mix)
+            target = BlockSums(part_sums, mix)
             for begin, values, jumps in _stretches(estimator, recording, part, watch):
                 target.add(shifted[begin : begin + len(values)], values, jumps)
             for run in np.split(np.arange(len(places)), np.flatnonzero(np.diff(places) != 1) + 1):
-                sums[first:last, :, places[run[0]] : places[run[-1]] + 1] += found[:, :, run[0] : run[-1] + 1]
+                sums[first:last, :, places[run[0]] : places[run[-1]] + 1] += part_sums[:, :, run[0] : run[-1] + 1]
 
 
 def _finer(data: Mapping[str, Any], direction: Direction) -> dict[str, float]:
@@ -172,13 +172,13 @@ def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator,
 
 def _statics_beside(data: Mapping[str, Any], wanted: set[str]) -> set[str]:
     """Return the statics of laws with a Stribeck effect whose coulomb is wanted."""
-    found = set()
+    paths = set()
     for path in wanted:
         if is_law_number(path) and path.endswith(".coulomb"):
             static = f"{path.rsplit('.', 1)[0]}.static"
             if data_number(data, static) != data_number(data, path):
-                found.add(static)
-    return found
+                paths.add(static)
+    return paths
 
 
 def _starts_at_zero(data: Mapping[str, Any], path: str) -> bool:

@@ -95,8 +95,8 @@ def diagnose(
         with phases.start(SIGNALS):
             chosen = choose(case.finger, case.whole, FitSettings(threads=jobs, path=case.finger.path))
         with own_fault("diagnosis"):  # all input has been checked and fitted once
-            found = search(case.finger, case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
-            result = _Result(case, found, least_gain, seed, jobs, phases)
+            searched = search(case.finger, case.whole, chosen, least_gain=least_gain, seed=seed, phases=phases)
+            result = _Result(case, searched, least_gain, seed, jobs, phases)
             return replace(result.diagnosis(), seconds=perf_counter() - begun)
 
 
@@ -106,19 +106,21 @@ def diagnose(
 class _Result:
     """Everything that is reported of a search."""
 
-    def __init__(self, case: GivenCase, found: Search, least_gain: float, seed: int, jobs: int, phases: Phases) -> None:
-        self._case, self._found, self._seed, self._phases = case, found, seed, phases
+    def __init__(
+        self, case: GivenCase, searched: Search, least_gain: float, seed: int, jobs: int, phases: Phases
+    ) -> None:
+        self._case, self._found, self._seed, self._phases = case, searched, seed, phases
         self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
-        self._series = found.last.series
+        self._series = searched.last.series
 
     def diagnosis(self) -> Diagnosis:
         """Return the diagnosis; its duration is still 0."""
-        found, case = self._found, self._case
+        searched, case = self._found, self._case
         with self._phases.start("gain on unseen data"):
             verified = self._verified()
         with self._phases.start("what is left"):
             left = self._left(verified.extended)
-            before = found.first.residual
+            before = searched.first.residual
             remainder = self._remainder(left)
             unexplained = self._unexplained(remainder, left, verified.extended)
         experiments, invisible = self._experiments(verified)
@@ -129,12 +131,12 @@ class _Result:
         return Diagnosis(
             finger=case.finger.name,
             verdict=_verdict(bool(verified.causes), unexplained.unknown),
-            recordings=tuple(str(each.path) for each in case.training),
-            tests=tuple(str(each.path) for each in case.tests),
+            recordings=tuple(str(recording.path) for recording in case.training),
+            tests=tuple(str(recording.path) for recording in case.tests),
             held_out=gain.held_out,
             seconds=0.0,
             seed=self._seed,
-            signals=found.estimation.words,
+            signals=searched.estimation.words,
             least_gain=self._least_gain,
             nominal=gain.nominal,
             extended=gain.extended,
@@ -146,7 +148,7 @@ class _Result:
             causes=tuple(self._cause(k, verified, left) for k in range(len(verified.causes))),
             too_small=tuple(
                 _too_small(each)
-                for each in [*verified.dropped, *found.small]
+                for each in [*verified.dropped, *searched.small]
                 if each.effect not in {cause.effect for cause in verified.causes}
             ),
             invisible=invisible,
@@ -161,42 +163,42 @@ class _Result:
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
             warnings=(*case.warnings, *self._warnings(verified, left)),
-            tested=len({each.key for each in found.last.selection.hypotheses}),
-            event_gain=event_gain(verified.extended_data, case.whole, found.events),
-            smoothing=found.estimation.signals,
+            tested=len({hypothesis.key for hypothesis in searched.last.selection.hypotheses}),
+            event_gain=event_gain(verified.extended_data, case.whole, searched.events),
+            smoothing=searched.estimation.signals,
             fits_sliding=verified.fits_sliding,
         )
 
     def _warnings(self, verified: Verified, left: Numbers) -> list[str]:
         folds = self._found.first.folds
-        found = list(self._found.extended.warnings)
+        warnings = list(self._found.extended.warnings)
         if self._found.only_sliding:
-            found.append(self._stuck(verified, left))
+            warnings.append(self._stuck(verified, left))
         if not folds.enough:
-            found.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
+            warnings.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
         elif folds.folds < 8:
-            found.append(
+            warnings.append(
                 f"only {counted(folds.stretches, 'stretch', 'stretches')} of 2 s: "
                 f"{folds.folds} parts are held out in place of 8, so a cause "
                 "has to be larger to be certain; record a minute"
             )
-        return found
+        return warnings
 
     def _stuck(self, verified: Verified, left: Numbers) -> str:
         """Say what was done about stuck samples, and what the causes gain in the others."""
-        found, used = self._found, self._series.used
+        searched, used = self._found, self._series.used
         sliding, everything = (
-            sum(int(each.train.sum()) for each in seen) for seen in (found.fitted_to, found.everything)
+            sum(int(each.train.sum()) for each in seen) for seen in (searched.fitted_to, searched.everything)
         )
         fitted = (
             "numbers are fitted, and causes and their gains judged," if verified.fits_sliding else "causes are judged"
         )
         before, after = (
-            1e3 * float(np.sqrt(np.mean(each[used] ** 2))) for each in (self._left(found.nominal.data), left)
+            1e3 * float(np.sqrt(np.mean(each[used] ** 2))) for each in (self._left(searched.nominal.data), left)
         )
         return (
-            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples; friction there is "
-            f"whatever balances the load, and misleads a fit: {fitted} where everything slides. There the error falls "
+            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples, in which "
+            f"friction balances the load and misleads a fit: {fitted} where everything slides. There the error falls "
             f"from {before:.3g} to {after:.3g} mN·m rms (means of 10 ms, without the slow bias); the gain of all "
             "causes together counts all samples"
         )
@@ -204,13 +206,13 @@ class _Result:
     # --- gain ---
 
     def _verified(self) -> Verified:
-        found, case = self._found, self._case
+        searched, case = self._found, self._case
         tests = case.tests
-        unseen = [self._events_in(each) for each in tests]
-        tests = [without_events(each, events) for each, events in zip(tests, unseen, strict=True)]
-        self._events = (*found.events, *(event for events in unseen for event in events))
-        training = [without_events(each, found.events) for each in case.training]
-        return verify(case.finger, found, training, tests, self._least_gain, self._settings, self._seed)
+        unseen = [self._events_in(recording) for recording in tests]
+        tests = [without_events(recording, events) for recording, events in zip(tests, unseen, strict=True)]
+        self._events = (*searched.events, *(event for events in unseen for event in events))
+        training = [without_events(recording, searched.events) for recording in case.training]
+        return verify(case.finger, searched, training, tests, self._least_gain, self._settings, self._seed)
 
     def _events_in(self, recording: FitRecording) -> Sequence[Event]:
         data = self._found.estimation.online(self._found.extended.data)
@@ -230,8 +232,8 @@ class _Result:
         before = self._left(verified.without[k].data)
         candidate = named.accepted[0].candidate
         places = tuple(
-            FoundPlace(each.place.joint, each.place.tendon, own)
-            for each, own in zip(named.accepted, parameters, strict=True)
+            FoundPlace(term.place.joint, term.place.tendon, own)
+            for term, own in zip(named.accepted, parameters, strict=True)
         )
         return Cause(
             where=Where(named.effect, named.joint, named.tendon),
@@ -243,7 +245,7 @@ class _Result:
             parameters=everything,
             size=size_of(candidate.name, places, thresholds(verified.extended_data)),
             places=places,
-            evidence=evidence([each.place for each in named.accepted], candidate, self._series, before, after),
+            evidence=evidence([term.place for term in named.accepted], candidate, self._series, before, after),
         )
 
     # --- what is left, and what to do next ---
@@ -257,11 +259,11 @@ class _Result:
         return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
     def _unexplained(self, remainder: Remainder, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
-        found = self._found
+        searched = self._found
         looked_at = np.sum(left[self._series.used] ** 2, axis=0)
-        if not found.only_sliding:
+        if not searched.only_sliding:
             return unexplained_of(remainder, looked_at, looked_at, self._least_gain)
-        series = series_of(extended, found.everything, found.estimation.grid)
+        series = series_of(extended, searched.everything, searched.estimation.grid)
         everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
         return unexplained_of(remainder, looked_at, everything, self._least_gain)
 
@@ -281,15 +283,15 @@ class _Result:
         rivals = [
             Question(cause.accepted[0], rival)
             for cause in verified.causes
-            for rival in [_ordinary(each) for each in cause.alike[:MOST_RIVALS]]
+            for rival in [_ordinary(other) for other in cause.alike[:MOST_RIVALS]]
             if all(self._is_in_nominal(each) for each in (cause.accepted[0], rival))
         ]
         known = [*verified.causes, *verified.dropped, *self._found.small]
         unseen = unseen_effects(self._found.last.selection, verified.causes, known, self._least_gain)
         nearest: dict[str, Hypothesis] = {}
-        for each in unseen:
-            if self._is_in_nominal(_ordinary(each.hypothesis)):
-                nearest.setdefault(each.hypothesis.effect, each.hypothesis)
+        for hidden in unseen:
+            if self._is_in_nominal(_ordinary(hidden.hypothesis)):
+                nearest.setdefault(hidden.hypothesis.effect, hidden.hypothesis)
         asked = list(nearest)
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
         noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
@@ -308,14 +310,14 @@ class _Result:
         }
         return planned, tuple(
             Invisible(
-                where_of(each.hypothesis),
-                _candidate(each.hypothesis).title,
-                each.share,
-                *said.get(each.hypothesis.effect, ("", {})),
-                ordinary_gain=each.gain,
-                needed_gain=each.needed,
+                where_of(hidden.hypothesis),
+                _candidate(hidden.hypothesis).title,
+                hidden.share,
+                *said.get(hidden.hypothesis.effect, ("", {})),
+                ordinary_gain=hidden.gain,
+                needed_gain=hidden.needed,
             )
-            for each in unseen
+            for hidden in unseen
         )
 
     @cached_property
@@ -336,7 +338,7 @@ def where_of(hypothesis: Hypothesis) -> Where:
 
 
 def _wheres(hypotheses: Sequence[Hypothesis]) -> tuple[Where, ...]:
-    return tuple(where_of(each) for each in hypotheses)
+    return tuple(where_of(hypothesis) for hypothesis in hypotheses)
 
 
 def _candidate(hypothesis: Hypothesis) -> Candidate:
@@ -361,7 +363,7 @@ def _too_small(named: NamedCause) -> Cause:
         confusable_with=_wheres(named.alike),
         parameters={},
         size="",
-        places=tuple(FoundPlace(each.place.joint, each.place.tendon, {}) for each in named.accepted),
+        places=tuple(FoundPlace(term.place.joint, term.place.tendon, {}) for term in named.accepted),
     )
 
 

@@ -50,4 +50,4 @@ def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> 
     ratio = math.log(mean * (count + samples) / (rest + within)) / 2.0  # log of the rms without over with events
     error = within / (rest + within) * spread / rest / 2.0
     ends = (ratio, ratio + _TWO_SIDED * error, ratio - _TWO_SIDED * error)
-    return Interval(*(1.0 - math.exp(each) for each in ends))
+    return Interval(*(1.0 - math.exp(end) for end in ends))

@@ -33,12 +33,12 @@ def evidence(
 
 def _nearest(places: Sequence[Place], joint: int) -> Place:
     """Return the place at that joint if there is one, else the first place."""
-    return next((each for each in places if each.joint == joint + 1), places[0])
+    return next((place for place in places if place.joint == joint + 1), places[0])
 
 
-def shown(found: Evidence) -> bool:
+def shown(evidence: Evidence) -> bool:
     """Return whether the cause removes most of the bins' mean residual."""
-    return float(np.sum(found.before**2)) >= SHOWN * float(np.sum(found.after**2))
+    return float(np.sum(evidence.before**2)) >= SHOWN * float(np.sum(evidence.after**2))
 
 
 def _binned(
@@ -60,12 +60,12 @@ def _binned(
 def standard_errors(values: Numbers, parts: list[NDArray[np.int64]], series: Series) -> Numbers:
     """Return the standard errors of the bins' means."""
     second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
-    found = []
+    errors = []
     for rows in parts:
         _, member = np.unique(second[rows], return_inverse=True)
         sums = np.bincount(member, weights=values[rows] - values[rows].mean())
-        found.append(np.sqrt(np.sum(sums**2)) / len(rows))
-    return np.array(found)
+        errors.append(np.sqrt(np.sum(sums**2)) / len(rows))
+    return np.array(errors)
 
 
 def coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:

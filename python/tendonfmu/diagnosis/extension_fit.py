@@ -167,14 +167,14 @@ def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) ->
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
     """Return, for each cause, the paths of the numbers that it adds or replaces."""
-    found = []
+    added = []
     for cause in causes:
         extended = cause.added_to(data)
         before = dict(_leaves(data))
         # a number that is only written differently does not belong to the cause
-        found.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
+        added.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
         data = extended
-    return tuple(found)
+    return tuple(added)
 
 
 def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
@@ -260,12 +260,12 @@ def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:
 
 def _at_bound(learned: Learned) -> tuple[str, ...]:
     """Return the paths of the numbers whose unknown has reached a bound."""
-    found = []
+    paths = []
     for unknown, z in zip(learned.estimator.unknowns, learned.z, strict=True):
         reach = BOUND * max(unknown.scale, abs(z))
         if z - unknown.lower <= reach or unknown.upper - z <= reach:
-            found.append(unknown.path)
-    return tuple(found)
+            paths.append(unknown.path)
+    return tuple(paths)
 
 
 def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:

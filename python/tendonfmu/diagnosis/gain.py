@@ -60,21 +60,21 @@ def measure_gain(
     """Measure the gain of the extended over the nominal model."""
     test = _Test.of(training, tests)
     _check_settings(nominal, extended)
-    runs = {"nominal": [run_both(nominal, each) for each in test.recordings]}
+    runs = {"nominal": [run_both(nominal, recording) for recording in test.recordings]}
     same = extended == nominal
-    runs["extended"] = runs["nominal"] if same else [run_both(extended, each) for each in test.recordings]
-    left = {name: [run.residual for run in found] for name, found in runs.items()}
+    runs["extended"] = runs["nominal"] if same else [run_both(extended, recording) for recording in test.recordings]
+    left = {name: [run.residual for run in runs_of] for name, runs_of in runs.items()}
     before, after = test.squares(left["nominal"]), test.squares(left["extended"])
     sequence = [before, *(test.squares_of(data) for data in between), *([] if same else [after])]
     return Gain(
         nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
         extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
-        bias_only_rms=test.tested([residuals(extended, each, None).residual for each in test.recordings]),
+        bias_only_rms=test.tested([residuals(extended, recording, None).residual for recording in test.recordings]),
         value=gain_interval(before, after, seed),
         steps=tuple(float(np.sqrt(squares.sum() / max(test.count, 1))) for squares in sequence),
         blocks=len(before),
         held_out=test.held_out,
-        agreement=max(run.agreement for found in runs.values() for run in found),
+        agreement=max(run.agreement for runs_of in runs.values() for run in runs_of),
     )
 
 
@@ -101,8 +101,8 @@ def residual_of(data: Data, recording: FitRecording) -> Numbers:
 
 def squared_residual(data: Data, recordings: Sequence[FitRecording], flags: Sequence[Flags] | None = None) -> float:
     """Return Σ r² over all joints, (N·m)², at the flagged samples [N] of each recording; those trained on if None."""
-    chosen = [each.train for each in recordings] if flags is None else flags
-    left = (residual_of(data, each)[own] for each, own in zip(recordings, chosen, strict=True))
+    chosen = [recording.train for recording in recordings] if flags is None else flags
+    left = (residual_of(data, recording)[own] for recording, own in zip(recordings, chosen, strict=True))
     return float(sum(np.nansum(each**2) for each in left))
 
 
@@ -201,12 +201,12 @@ class _Test:
     def of(cls, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> _Test:
         held_out = not tests
         recordings = training if held_out else tests
-        masks = [_judged(each, each.held_out if held_out else each.tracked) for each in recordings]
+        masks = [_judged(recording, recording.held_out if held_out else recording.tracked) for recording in recordings]
         if not any(mask.any() for mask in masks):
             raise InputError(
                 f"{recordings[0].path}: no sample to measure the gain on; expected free motion of some seconds"
             )
-        blocks = [blocks_of(each.time, mask) for each, mask in zip(recordings, masks, strict=True)]
+        blocks = [blocks_of(recording.time, mask) for recording, mask in zip(recordings, masks, strict=True)]
         return cls(training, recordings, masks, blocks, held_out)
 
     def squares(self, left: Sequence[Numbers]) -> Numbers:
@@ -217,7 +217,7 @@ class _Test:
 
     def squares_of(self, data: Data) -> Numbers:
         """Return the same for a description, run by the core."""
-        return self.squares([residual_of(data, each) for each in self.recordings])
+        return self.squares([residual_of(data, recording) for recording in self.recordings])
 
     @property
     def count(self) -> int:
@@ -229,8 +229,8 @@ class _Test:
 
     def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
         """Return the rms on the samples trained on."""
-        found = left if self.held_out else [residual_of(data, each) for each in self.training]
-        return _pooled(found, [_judged(each, each.train) for each in self.training])
+        residuals = left if self.held_out else [residual_of(data, recording) for recording in self.training]
+        return _pooled(residuals, [_judged(recording, recording.train) for recording in self.training])
 
 
 def _judged(recording: FitRecording, chosen: Flags) -> Flags:

@@ -42,10 +42,10 @@ class GivenCase:
     @property
     def whole(self) -> list[FitRecording]:
         """The training recordings without held-out stretches."""
-        nothing = [np.zeros_like(each.held_out) for each in self.training]
+        nothing = [np.zeros_like(recording.held_out) for recording in self.training]
         return [
-            replace(each, train=each.train | each.held_out, held_out=none)
-            for each, none in zip(self.training, nothing, strict=True)
+            replace(recording, train=recording.train | recording.held_out, held_out=none)
+            for recording, none in zip(self.training, nothing, strict=True)
         ]
 
 
@@ -70,25 +70,27 @@ def given_case(
     held = Held() if test_sources else apart
     read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
     warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
-    training = [prepare(given, each, kinematics, held) for each in read]
-    unseen = [prepare(given, each, kinematics, Held()) for each in others]
+    training = [prepare(given, recording, kinematics, held) for recording in read]
+    unseen = [prepare(given, other, kinematics, Held()) for other in others]
     require_noise(given, training)
     require_unseen(training, unseen)
-    check_unseen([each.recording for each in training], [each.recording for each in unseen])
+    check_unseen([recording.recording for recording in training], [recording.recording for recording in unseen])
     if not checked:
-        warnings += [f"{each.path.name}: {text}" for each in (*training, *unseen) for text in each.warnings]
+        warnings += [
+            f"{recording.path.name}: {text}" for recording in (*training, *unseen) for text in recording.warnings
+        ]
     return GivenCase(given, training, unseen, tuple(warnings))
 
 
 def require_motion(recordings: Sequence[FitRecording]) -> None:
     """Raise InputError if no part can be held out: no cause could be named, so "adequate" would mean nothing."""
     least = FEWEST_STRETCHES * STRETCH
-    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
-    if found < least - 0.01:  # the last sample has no duration
+    seconds = sum(float(np.median(np.diff(recording.time))) * int(recording.train.sum()) for recording in recordings)
+    if seconds < least - 0.01:  # the last sample has no duration
         name = str(recordings[0].path) if len(recordings) == 1 else f"{len(recordings)} recordings"
         raise InputError(
-            f"{name}: {found:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are judged "
-            "on parts that are held out in turn"
+            f"{name}: {seconds:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are "
+            "judged on parts that are held out in turn"
         )
 
 
@@ -105,6 +107,6 @@ def change_case(
     own = given_case(finger, now, tests, kinematics, least_gain, checked, HALF)
     before = given_case(own.finger, reference, [], kinematics, least_gain, checked, role="reference")
     then = before.whole
-    warnings = [*own.warnings, *(each for each in before.warnings if each not in own.warnings)]
+    warnings = [*own.warnings, *(warning for warning in before.warnings if warning not in own.warnings)]
     warnings += check_sides(own.finger, then, [*own.training, *own.tests])
     return ChangeCase(own.finger, then, own.training, own.tests, tuple(warnings))

@@ -71,13 +71,13 @@ class Hypothesis:
 def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Hypothesis]:
     """Return all hypotheses, the coarse ones first."""
     count = columns.values.shape[2]
-    found = [
+    listed = [
         _single(proposal, shape, count, arms, reach) for proposal in columns.proposals for shape in proposal.shapes
     ]
     for effect in SHARED:
         own = [proposal for proposal in columns.proposals if proposal.candidate.name == effect]
-        found += _groups(effect, own, count)
-    return sorted(found, key=lambda each: each.level)
+        listed += _groups(effect, own, count)
+    return sorted(listed, key=lambda hypothesis: hypothesis.level)
 
 
 def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers, reach: Numbers) -> Hypothesis:

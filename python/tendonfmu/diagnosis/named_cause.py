@@ -54,5 +54,5 @@ def accepted_of(hypothesis: Hypothesis, magnitudes: Numbers) -> tuple[Accepted, 
 
 def is_shown(cause: NamedCause, data: Mapping[str, Any], least: LeastSizes) -> bool:
     """Return whether the sensors can show the size that a cause has in a fitted description."""
-    rows = [extended_row(data, cause.effect, each.place) for each in cause.accepted]
-    return all(least.shows(cause.effect, each.place, row) for each, row in zip(cause.accepted, rows, strict=True))
+    rows = [extended_row(data, cause.effect, term.place) for term in cause.accepted]
+    return all(least.shows(cause.effect, term.place, row) for term, row in zip(cause.accepted, rows, strict=True))

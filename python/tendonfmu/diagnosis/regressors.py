@@ -57,12 +57,12 @@ def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
     """Return the values [N, m] of `delay` s later, within each part."""
     if not delay:
         return values
-    found: Numbers = values.copy()
+    shifted: Numbers = values.copy()
     for part in recording.parts:
         time = recording.time[part]
         for i in range(values.shape[1]):
-            found[part, i] = np.interp(time + delay, time, values[part, i])
-    return found
+            shifted[part, i] = np.interp(time + delay, time, values[part, i])
+    return shifted
 
 
 def _unexplained(
@@ -70,7 +70,7 @@ def _unexplained(
 ) -> Numbers:
     """Return the unexplained torque at every sample [N, n], N·m; 0 at samples that are not trained on."""
     model = exact_model(data, recording)
-    found = np.zeros_like(recording.target)
+    unexplained = np.zeros_like(recording.target)
     for segment in grid.segments:
         if segment.recording != number:
             continue
@@ -79,5 +79,5 @@ def _unexplained(
         slow = series.target[blocks] - residual[blocks]
         time = recording.time[part]
         for j in range(left.shape[1]):
-            found[part, j] = left[:, j] - np.interp(time, series.time[blocks], slow[:, j])
-    return np.where(recording.train[:, None], found, 0.0)
+            unexplained[part, j] = left[:, j] - np.interp(time, series.time[blocks], slow[:, j])
+    return np.where(recording.train[:, None], unexplained, 0.0)

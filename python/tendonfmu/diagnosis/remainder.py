@@ -69,10 +69,10 @@ def measure_remainder(
         named = _named(learner, tried[1:])
         findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
     lines = _lines(series, residual, prediction, findings)
-    p_value = min([1.0, *(joints * each for each in p_values), *lines])
+    p_value = min([1.0, *(joints * p_value for p_value in p_values), *lines])
     gain = learner.gains(prediction[folds.rows])
     share = tuple(_share(learner.target[:, j], prediction[folds.rows, j]) for j in range(joints))
-    certain = [each for each in findings if share[each.joint - 1] >= LEAST_SHARE]
+    certain = [finding for finding in findings if share[finding.joint - 1] >= LEAST_SHARE]
     text = described(series, residual, prediction, certain, share) if certain else ""
     square = np.sum(learner.target**2, axis=0)
     return Remainder(share, gain, square, p_value, bool(certain), text, prediction, tuple(certain))
@@ -92,19 +92,19 @@ def _p_value(gain: Numbers) -> float:
 
 def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
     """Return for each joint the named set of columns that predicts best."""
-    known = [each for each in tried if each.group != "interaction"]
-    left = [np.sum((learner.target - learner.predicted(each.columns)) ** 2, axis=0) for each in known]
+    known = [choice for choice in tried if choice.group != "interaction"]
+    left = [np.sum((learner.target - learner.predicted(choice.columns)) ** 2, axis=0) for choice in known]
     return [known[k] for k in np.argmin(left, axis=0)]
 
 
 def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: list[Finding]) -> list[float]:
     """Add steady oscillations to `findings` and `prediction` [B, n]; return their p-values."""
-    filters, found = whitener(series, residual - prediction), []
+    filters, p_values = whitener(series, residual - prediction), []
     joints = residual.shape[1]
     for joint in range(joints):
         own = Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
         lines, wave = find_lines(series, residual[:, joint] - prediction[:, joint], own, level=LEVEL / joints)
         prediction[:, joint] += wave
-        findings += [Finding(joint + 1, "line", "", each) for each in lines]
-        found += [min(1.0, joints * each.p_value) for each in lines]
-    return found
+        findings += [Finding(joint + 1, "line", "", line) for line in lines]
+        p_values += [min(1.0, joints * line.p_value) for line in lines]
+    return p_values

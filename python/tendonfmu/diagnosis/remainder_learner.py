@@ -27,14 +27,14 @@ def choices(seen: Features) -> list[Choice]:
     """Return all columns, those of each group, and those of each subject of each group."""
     pairs = list(dict.fromkeys(zip(seen.group.tolist(), seen.subject.tolist(), strict=True)))
     names = list(dict.fromkeys(group for group, _ in pairs))
-    found = [Choice("", "", np.arange(len(seen.group)))]
-    found += [Choice(name, "", np.flatnonzero(seen.group == name)) for name in names]
-    found += [
+    listed = [Choice("", "", np.arange(len(seen.group)))]
+    listed += [Choice(name, "", np.flatnonzero(seen.group == name)) for name in names]
+    listed += [
         Choice(group, subject, np.flatnonzero((seen.group == group) & (seen.subject == subject)))
         for group, subject in pairs
         if subject
     ]
-    return found
+    return listed
 
 
 class Learner:
@@ -57,16 +57,16 @@ class Learner:
     def predicted(self, columns: Indices) -> Numbers:
         """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""
         gram, score = np.sum(self._gram, axis=0)[np.ix_(columns, columns)], np.sum(self._score, axis=0)[columns]
-        found = np.zeros((len(PENALTIES), *self.target.shape))
+        predictions = np.zeros((len(PENALTIES), *self.target.shape))
         for rows, own, part in zip(self._rows, self._gram, self._score, strict=True):
             inner, right = gram - own[np.ix_(columns, columns)], score - part[columns]
             seen = self._table[rows][:, columns]
             for k, penalty in enumerate(PENALTIES):
                 ridge = penalty * float((~rows).sum()) * np.eye(len(columns))
                 weights = solve(inner + ridge, right, assume_a="pos", check_finite=False)
-                found[k, rows] = seen @ weights.astype(np.float32)
-        best = np.argmin(np.sum((found - self.target) ** 2, axis=1), axis=0)
-        return np.stack([found[best[j], :, j] for j in range(self.target.shape[1])], axis=1)
+                predictions[k, rows] = seen @ weights.astype(np.float32)
+        best = np.argmin(np.sum((predictions - self.target) ** 2, axis=1), axis=0)
+        return np.stack([predictions[best[j], :, j] for j in range(self.target.shape[1])], axis=1)
 
     def gains(self, prediction: Numbers) -> Numbers:
         """Return by how much a prediction [R, n] lowers the squares, (N·m)² [stretches, n]."""

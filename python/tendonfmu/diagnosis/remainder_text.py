@@ -41,13 +41,13 @@ def _part(share: float) -> str:
 def _what(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield what each finding follows; all oscillations are listed together, at the first one."""
     lines = [finding.line for finding in findings if finding.line is not None]
-    told = False
+    mentioned = False
     for finding in findings:
         if finding.line is None:
             subject = f", {finding.subject}" if finding.subject else ""
             yield f"{GROUPS[finding.group]}{subject}"
-        elif not told:
-            told = True
+        elif not mentioned:
+            mentioned = True
             frequencies, sizes = (
                 _listed([f"{value:.{digits}g}" for value in values])
                 for values, digits in (

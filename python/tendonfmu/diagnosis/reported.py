@@ -30,13 +30,13 @@ LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the reco
 LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves
 
 
-def reported_causes(found: Diagnosis) -> list[Cause]:
+def reported_causes(diagnosis: Diagnosis) -> list[Cause]:
     """Return the causes that a report lists, in order of gain."""
-    return [*found.causes, *_load(found), *_contact(found), *_unknown(found)]
+    return [*diagnosis.causes, *_load(diagnosis), *_contact(diagnosis), *_unknown(diagnosis)]
 
 
-def _load(found: Diagnosis) -> Iterator[Cause]:
-    load = found.load
+def _load(diagnosis: Diagnosis) -> Iterator[Cause]:
+    load = diagnosis.load
     if load is None or not load.gain.low > 0.0:
         return
     size = load.size
@@ -53,9 +53,9 @@ def _load(found: Diagnosis) -> Iterator[Cause]:
     )
 
 
-def _contact(found: Diagnosis) -> Iterator[Cause]:
-    events = [event for event in found.events if event.peak >= LEAST_PEAK * max(found.extended.train_rms)]
-    gain = found.event_gain
+def _contact(diagnosis: Diagnosis) -> Iterator[Cause]:
+    events = [event for event in diagnosis.events if event.peak >= LEAST_PEAK * max(diagnosis.extended.train_rms)]
+    gain = diagnosis.event_gain
     if not events or gain is None or not gain.low >= LEAST_GAIN:
         return
     joints = {joint for event in events for joint in event.joints}
@@ -74,8 +74,8 @@ def _contact(found: Diagnosis) -> Iterator[Cause]:
     )
 
 
-def _unknown(found: Diagnosis) -> Iterator[Cause]:
-    rest = found.unexplained
+def _unknown(diagnosis: Diagnosis) -> Iterator[Cause]:
+    rest = diagnosis.unexplained
     if not rest.unknown or not rest.gain.low > 0.0:
         return
     yield Cause(

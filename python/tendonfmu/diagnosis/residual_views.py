@@ -113,13 +113,13 @@ def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> N
     plan = make_folds(series)
     seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
     variance = float(np.mean(seen**2)) if len(seen) else 0.0
-    found = []
+    correlations = []
     for lag in lags:
         same = plan.run[lag:] == plan.run[:-lag]
         count = int(same.sum())
         mean = float(np.sum((seen[lag:] * seen[:-lag])[same])) / count if count else 0.0
-        found.append(mean / variance if variance > 0.0 else 0.0)
-    return np.array(found)
+        correlations.append(mean / variance if variance > 0.0 else 0.0)
+    return np.array(correlations)
 
 
 def whiteness(series: Series, before: Numbers, after: Numbers) -> tuple[tuple[float, float], ...]:

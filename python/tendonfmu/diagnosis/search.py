@@ -78,18 +78,18 @@ def search(
     """Search for the causes that a description lacks."""
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
-    measured = [without_events(each, events) for each in recordings]
+    measured = [without_events(recording, events) for recording in recordings]
     own, clean = _without_blocks(chosen, out)
     with phases.start("causes", MOST_CAUSES) as step:
-        found = _searched(given, own, clean, measured, out, least_gain, step)
-    rounds, only_sliding = found.rounds, found.clean is not clean
+        searched = _searched(given, own, clean, measured, out, least_gain, step)
+    rounds, only_sliding = searched.rounds, searched.clean is not clean
     models = [own.nominal, *rounds.models[1:]]
     if events:
         # drop events that the causes explain
         left, _ = events_of(models[-1].data, chosen.recordings, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
-        estimation=found.chosen,
+        estimation=searched.chosen,
         nominal=models[0],
         extended=models[-1],
         first=rounds.first,
@@ -99,7 +99,7 @@ def search(
         small=(*rounds.refused, *rounds.small()),
         events=events,
         out=out,
-        fitted_to=found.clean,
+        fitted_to=searched.clean,
         everything=clean,
         only_sliding=only_sliding,
     )
@@ -151,7 +151,7 @@ def _searched(
 def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:
     """Return an estimation without some blocks [B], and its recordings with the nominal model's forces."""
     nominal = chosen.nominal
-    own = [without_blocks(each, k, chosen.grid, out) for k, each in enumerate(chosen.recordings)]
+    own = [without_blocks(recording, k, chosen.grid, out) for k, recording in enumerate(chosen.recordings)]
     clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
     nominal = fitted(nominal.data, clean, chosen.settings, given=nominal.given)
     return replace(chosen, nominal=nominal, recordings=own), clean
@@ -234,8 +234,8 @@ class _Rounds:
             step(len(self.causes))
             # Refused effects explain something, so no other effect is credited with that. A correction of the torque
             # itself is excluded: it lowers any error by shrinking the torque.
-            known = {each.key for each in self.refused if each.effect not in SCALING}
-            tried = {each.effect for each in self.refused}
+            known = {refused.key for refused in self.refused if refused.effect not in SCALING}
+            tried = {refused.effect for refused in self.refused}
             selection = self.view.beside(known)
             picked = selection.best(self._least_gain, tried)
             if picked is None:
@@ -247,16 +247,16 @@ class _Rounds:
     def _best_fitted(self, selection: Selection, picked: Pick) -> _Trial:
         """Fit the effects that the columns cannot distinguish and take the best: columns of a wrong model mislead."""
         own = self._named(picked.judged, selection)
-        rivals = [self._named(selection.refined(each.effect), selection) for each in _to_fit(picked)]
-        trials = [self._tried(each) for each in (own, *(each for each in rivals if each.p_value < SIGNIFICANCE))]
-        best = min(trials, key=lambda each: float(each.error.sum()))
-        same = [each for each in trials if each.model is not None and is_alike(each.error, best.error)]
+        rivals = [self._named(selection.refined(judged.effect), selection) for judged in _to_fit(picked)]
+        trials = [self._tried(cause) for cause in (own, *(rival for rival in rivals if rival.p_value < SIGNIFICANCE))]
+        best = min(trials, key=lambda trial: float(trial.error.sum()))
+        same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, best.error)]
         # an effect that is already present explains the data without a new name
-        widespread = WIDESPREAD & {each.effect for each in self.causes}
-        best = next((each for each in same if each.cause.effect in widespread), best)
-        fitted_effects = {each.cause.effect for each in trials}
-        alike = [each.cause.hypothesis for each in same if each is not best and each.cause.hypothesis is not None]
-        alike += [each for each in picked.alike if each.effect not in fitted_effects]
+        widespread = WIDESPREAD & {cause.effect for cause in self.causes}
+        best = next((trial for trial in same if trial.cause.effect in widespread), best)
+        fitted_effects = {trial.cause.effect for trial in trials}
+        alike = [trial.cause.hypothesis for trial in same if trial is not best and trial.cause.hypothesis is not None]
+        alike += [other for other in picked.alike if other.effect not in fitted_effects]
         best = self._at_best_place(best, selection)
         return replace(best, cause=replace(best.cause, alike=tuple(alike)))
 
@@ -265,14 +265,14 @@ class _Rounds:
         judged = selection.refined(trial.cause.effect)
         if trial.cause.hypothesis is not judged.hypothesis:
             return trial
-        others = [self._named(each, selection) for each in selection.near(judged)[: MOST_FITTED - 1]]
-        trials = [trial, *(self._tried(each) for each in others if each.p_value < SIGNIFICANCE)]
-        return min(trials, key=lambda each: float(each.error.sum()))
+        others = [self._named(near, selection) for near in selection.near(judged)[: MOST_FITTED - 1]]
+        trials = [trial, *(self._tried(other) for other in others if other.p_value < SIGNIFICANCE)]
+        return min(trials, key=lambda trial: float(trial.error.sum()))
 
     def _tries_presliding(self) -> bool:
         """Try presliding with a short distance if none was taken; return whether it was taken."""
         chosen = self._chosen
-        if any(each.effect == "presliding" for each in [*self.causes, *self.refused]):
+        if any(cause.effect == "presliding" for cause in [*self.causes, *self.refused]):
             return False
         span = span_of(self.models[-1].data, chosen.recordings)
         tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
@@ -287,7 +287,7 @@ class _Rounds:
 
     def _tried(self, cause: NamedCause) -> _Trial:
         """Fit the description with a further cause."""
-        everything = [each for known in [*self.causes, cause] for each in known.accepted]
+        everything = [term for known in [*self.causes, cause] for term in known.accepted]
         accepted = possible(self.models[0].data, everything)
         if len(accepted) < len(everything):
             return _Trial(cause, None, np.array([np.inf]))
@@ -320,9 +320,9 @@ class _Rounds:
 
     def _runs_better(self, model: FittedModel) -> bool:
         """Return whether the model runs better online than the last one."""
-        before, after = (self._chosen.online(each.data) for each in (self.models[-1], model))
-        left, found = (self._online.by_stretch(each).sum() for each in (before, after))
-        return bool(found < left and self._online.square(after) < self._online.square(before))
+        before, after = (self._chosen.online(fitted.data) for fitted in (self.models[-1], model))
+        left, after_error = (self._online.by_stretch(online).sum() for online in (before, after))
+        return bool(after_error < left and self._online.square(after) < self._online.square(before))
 
     def _resolved(self, cause: NamedCause, model: FittedModel) -> bool:
         """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
@@ -336,8 +336,8 @@ class _Rounds:
 
     def small(self) -> list[NamedCause]:
         """Return the best place of every effect that is certain but not material."""
-        found = []
-        known = {each.effect for each in self.refused}
+        small = []
+        known = {refused.effect for refused in self.refused}
         for judged in self.view.selection.ranked():
             gain, error = self.view.selection.gain(judged)
             if (
@@ -345,15 +345,15 @@ class _Rounds:
                 and gain > CERTAIN * error
                 and (p_value := self.view.p_value(judged.hypothesis)) < SIGNIFICANCE
             ):
-                found.append(_small(judged, gain, error, p_value))
-        return found
+                small.append(_small(judged, gain, error, p_value))
+        return small
 
 
 def _to_fit(picked: Pick) -> list[Hypothesis]:
     """Return the effects that cannot be distinguished from a pick and may replace it."""
     # A correction of the torque itself may replace only another such correction, because it lowers any error.
     scaling = picked.hypothesis.effect in SCALING
-    return [each for each in picked.alike if scaling or each.effect not in SCALING][: MOST_FITTED - 1]
+    return [other for other in picked.alike if scaling or other.effect not in SCALING][: MOST_FITTED - 1]
 
 
 def _together(places: tuple[Accepted, ...]) -> NamedCause:

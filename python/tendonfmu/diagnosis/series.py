@@ -94,14 +94,14 @@ def exact_model(
     if entry_load is not None:
         still["entry_load"] = entry_load
     alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
-    image, found = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
+    image, residual = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
         outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
-        found[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
+        residual[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
         if not jumps:
-            found[part] -= outputs["bias_torque"]
-    return found
+            residual[part] -= outputs["bias_torque"]
+    return residual
 
 
 def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> Numbers:
@@ -120,26 +120,29 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
     threshold = _joint_threshold(data)
 
     def gathered(values: Sequence[Array]) -> Array:
-        found = [segment.mean(each[segment.part]) for segment, each in zip(grid.segments, values, strict=True)]
-        return np.concatenate(found)
+        means = [segment.mean(value[segment.part]) for segment, value in zip(grid.segments, values, strict=True)]
+        return np.concatenate(means)
 
-    angle = gathered([each.model.joint_angle for each in whole])
-    velocity = gathered([each.model.joint_speed for each in whole])
+    angle = gathered([recording.model.joint_angle for recording in whole])
+    velocity = gathered([recording.model.joint_speed for recording in whole])
     arms = moment_arms(data)
     return Series(
-        time=gathered([each.time for each in whole]),
+        time=gathered([recording.time for recording in whole]),
         recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
         segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
-        target=gathered([each.target for each in whole]) - torque,
-        used=np.concatenate([segment.mean(each.train[segment.part]) == 1.0 for segment, each in pieces]),
+        target=gathered([recording.target for recording in whole]) - torque,
+        used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
         step=grid.step,
         angle=angle,
         velocity=velocity,
         acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
-        force=gathered([each.recording.groups["tendon_force"] for each in whole]),
+        force=gathered([recording.recording.groups["tendon_force"] for recording in whole]),
         tendon_velocity=_tendon_velocity(arms, velocity),
         travel=np.concatenate(
-            [_travel(each.model.joint_angle, each.model.joint_speed, threshold, segment) for segment, each in pieces]
+            [
+                _travel(recording.model.joint_angle, recording.model.joint_speed, threshold, segment)
+                for segment, recording in pieces
+            ]
         ),
     )
 
@@ -161,7 +164,7 @@ def _tendon_velocity(arms: Numbers, velocity: Numbers) -> Numbers:
 def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) -> Numbers:
     """Return the travel since each joint last reversed, rad [count, n]; speeds below the threshold do not count."""
     angle, speed = angle[segment.part], speed[segment.part]
-    found = np.empty_like(angle)
+    travel = np.empty_like(angle)
     for j in range(angle.shape[1]):
         moving = np.abs(speed[:, j]) > threshold
         last = np.maximum.accumulate(np.where(moving, np.arange(len(angle)), 0))
@@ -169,5 +172,5 @@ def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) 
         turned = np.flatnonzero(np.diff(side, prepend=side[0]))
         start = np.zeros(len(angle), dtype=np.int64)
         start[turned] = turned
-        found[:, j] = np.abs(angle[:, j] - angle[np.maximum.accumulate(start), j])
-    return segment.mean(found)
+        travel[:, j] = np.abs(angle[:, j] - angle[np.maximum.accumulate(start), j])
+    return segment.mean(travel)

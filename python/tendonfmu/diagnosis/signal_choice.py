@@ -61,7 +61,7 @@ class Estimation:
 
 def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
     """Choose signals and starting point for recordings as they were measured."""
-    smoothing = smoothing_of([each.recording for each in recordings], given.data)
+    smoothing = smoothing_of([recording.recording for recording in recordings], given.data)
     raw = Signals()
     part = part_of(given, recordings)
     if smoothing is None:
@@ -69,7 +69,7 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     else:
         smooth = starting_point(given, part, smoothing, settings)
         rough = starting_point(given, part, raw, settings, smooth)
-        lags = any(each.kinematics != 3 for each in recordings)
+        lags = any(recording.kinematics != 3 for recording in recordings)
         is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
         signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
     finger = replace(given, data=signals.description(given.data))
@@ -83,39 +83,39 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
 
 def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
     """Return the first seconds of each recording, ENOUGH in total."""
-    share = ENOUGH / max(sum(each.duration for each in recordings), 1e-300)
+    share = ENOUGH / max(sum(recording.duration for recording in recordings), 1e-300)
     if share >= 1.0:
         return list(recordings)
-    found = []
-    for each in recordings:
-        end = int(np.searchsorted(each.time, each.time[0] + share * (each.time[-1] - each.time[0])))
-        if end < FEWEST_SAMPLES or not each.train[:end].any():
+    parts = []
+    for recording in recordings:
+        end = int(np.searchsorted(recording.time, recording.time[0] + share * (recording.time[-1] - recording.time[0])))
+        if end < FEWEST_SAMPLES or not recording.train[:end].any():
             continue
-        whole = each.recording
+        whole = recording.recording
         part = replace(
             whole,
             time=whole.time[:end],
             groups={name: values[:end] for name, values in whole.groups.items()},
             contact=None if whole.contact is None else whole.contact[:end],
         )
-        own = prepare(given, part, each.kinematics, Held())
-        found.append(replace(own, train=own.train & each.train[:end]))
-    return found or list(recordings)
+        own = prepare(given, part, recording.kinematics, Held())
+        parts.append(replace(own, train=own.train & recording.train[:end]))
+    return parts or list(recordings)
 
 
 def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
     """Add an online position filter if the estimated models then leave a smaller error on raw samples."""
-    long_enough = all(len(each.time) >= FEWEST_SAMPLES for each in recordings)
+    long_enough = all(len(recording.time) >= FEWEST_SAMPLES for recording in recordings)
     if chosen.signals.cutoff is None or "position_filter" in chosen.given or not long_enough:
         return chosen
-    if any(each.kinematics == 3 for each in recordings):
+    if any(recording.kinematics == 3 for recording in recordings):
         return chosen
-    noise = np.max([joint_position_noise(chosen.given, each) for each in recordings], axis=0)
+    noise = np.max([joint_position_noise(chosen.given, recording) for recording in recordings], axis=0)
     if noise.max() > NOISIEST:
         return chosen
     filtered = replace(chosen, given={**chosen.given, "position_filter": {"noise": [float(value) for value in noise]}})
     error = OnlineError(chosen.online(chosen.nominal.data), recordings)
-    before, after = (error.by_stretch(each.online(each.model.data)) for each in (chosen, filtered))
+    before, after = (error.by_stretch(result.online(result.model.data)) for result in (chosen, filtered))
     gain, spread = rms_gain(before, after)
     return filtered if gain > CERTAIN * spread else chosen
 
@@ -145,31 +145,31 @@ def starting_point(
         least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
         # with a known delay, try the two best distances: the derivative of one need not lead to the better
-        tried = [starts[0], *[each for each in starts[1:] if each.presliding != starts[0].presliding][:1]]
+        tried = [starts[0], *[start for start in starts[1:] if start.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
     span = span_of(nominal.data, own)
-    found = []
+    compared = []
     for start in tried:
         model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
-        found.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
-    return min(found, key=lambda each: each.error)
+        compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
+    return min(compared, key=lambda result: result.error)
 
 
 def estimation_recordings(finger: Finger, recordings: Sequence[FitRecording], signals: Signals) -> list[FitRecording]:
     """Return recordings whose signals are smoothed as chosen."""
     if signals.cutoff is None:
         return list(recordings)
-    found = []
-    for each in recordings:
-        own = prepare(finger, signals.recording(each.recording), each.kinematics, Held())
-        at = np.minimum(np.searchsorted(each.time, own.time), len(each.time) - 1)
-        found.append(replace(own, train=own.train & each.train[at], held_out=each.held_out[at]))
-    return found
+    listed = []
+    for recording in recordings:
+        own = prepare(finger, signals.recording(recording.recording), recording.kinematics, Held())
+        at = np.minimum(np.searchsorted(recording.time, own.time), len(recording.time) - 1)
+        listed.append(replace(own, train=own.train & recording.train[at], held_out=recording.held_out[at]))
+    return listed
 
 
 def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:

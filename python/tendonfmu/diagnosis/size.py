@@ -22,25 +22,25 @@ _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude
 
 def size_of(effect: str, places: Sequence[FoundPlace], thresholds: Thresholds) -> str:
     """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number."""
-    told = [each for each in places if each.parameters]
-    if not told:
+    sized = [place for place in places if place.parameters]
+    if not sized:
         return ""
-    sizes = list(dict.fromkeys(size_at(effect, each.parameters, thresholds) for each in told))
-    if len(told) == 1:
+    sizes = list(dict.fromkeys(size_at(effect, place.parameters, thresholds) for place in sized))
+    if len(sized) == 1:
         return sizes[0]
     if len(sizes) == 1:
-        return f"{sizes[0]}, at each of {len(told)} places"
-    units = {_first(each)[1] for each in told}
+        return f"{sizes[0]}, at each of {len(sized)} places"
+    units = {_first(place)[1] for place in sized}
     if len(units) > 1:  # for example everywhere and at a joint
-        return f"{sizes[0]}; other at {counted(len(told) - 1, 'place')}"
-    largest = max(told, key=lambda each: abs(_first(each)[0]))
-    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(told)} places"
+        return f"{sizes[0]}; other at {counted(len(sized) - 1, 'place')}"
+    largest = max(sized, key=lambda place: abs(_first(place)[0]))
+    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(sized)} places"
 
 
 def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
     """Return the size of an effect at one place in plain words."""
-    if effect == "presliding" and (told := _travel(parameters, thresholds)):
-        return told
+    if effect == "presliding" and (sized := _travel(parameters, thresholds)):
+        return sized
     numbers: Numbers = {}
     for path, number in parameters.items():
         numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
@@ -56,7 +56,7 @@ def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
     if [unit for _, unit in parameters.values()] != ["s"]:
         return ""
     ((time, _),) = parameters.values()
-    tendon, joint = (quantity(time * each, unit) for each, unit in zip(thresholds, ("m", "rad"), strict=True))
+    tendon, joint = (quantity(time * threshold, unit) for threshold, unit in zip(thresholds, ("m", "rad"), strict=True))
     return f"over {tendon} at tendons, {joint} at joints"
 
 
@@ -67,16 +67,16 @@ def _first(place: FoundPlace) -> tuple[float, str]:
 def quantity(value: float, unit: str, *, sign: bool = False) -> str:
     """Format a value with three digits and a suitable unit prefix."""
     if unit in ("", "1"):
-        text, told = f"{100 * value:.3g}", "%"
+        text, sized = f"{100 * value:.3g}", "%"
     else:
         least = next(step for step in _STEPS if abs(value) >= step[0])
         _, factor, prefix = least if unit in _PREFIXED and value != 0 else _STEPS[0]
-        text, told = f"{factor * value:.3g}", prefix + unit.replace(".", "·").replace("2", "²").replace("3", "³")
+        text, sized = f"{factor * value:.3g}", prefix + unit.replace(".", "·").replace("2", "²").replace("3", "³")
     mantissa, _, exponent = text.partition("e")
     if exponent:
         text = f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
     plus = "+" if sign and value > 0 else ""
-    return f"{plus}{text.replace('-', '−')}{NBSP}{told}"
+    return f"{plus}{text.replace('-', '−')}{NBSP}{sized}"
 
 
 def _listed(parameters: Parameters) -> str:

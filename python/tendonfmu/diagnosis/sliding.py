@@ -35,23 +35,23 @@ BETTER = 0.65  # of the error of samples that slide, which a fit to them alone m
 
 def is_stuck(data: Mapping[str, Any], recording: FitRecording) -> Flags:
     """Return the samples in which a friction effect that slides at other times is stuck, |v| <= v_min [N]."""
-    found = np.zeros(len(recording.time), dtype=bool)
+    flags = np.zeros(len(recording.time), dtype=bool)
     for effect in effects(data):
         stuck = np.abs(sliding_velocity(data, effect, recording.model.joint_speed)) <= velocity_threshold(data, effect)
         if not stuck.all():
-            found |= stuck
-    return found
+            flags |= stuck
+    return flags
 
 
 def without_stuck(given: Finger, recordings: Sequence[FitRecording], signals: Signals) -> list[FitRecording]:
     """Return recordings as they were measured, without the samples in which the chosen signals show anything stuck."""
     finger = replace(given, data=signals.description(given.data))
-    found = []
-    for each, own in zip(recordings, estimation_recordings(finger, recordings, signals), strict=True):
-        at = np.minimum(np.searchsorted(own.time, each.time), len(own.time) - 1)
+    sliding = []
+    for recording, own in zip(recordings, estimation_recordings(finger, recordings, signals), strict=True):
+        at = np.minimum(np.searchsorted(own.time, recording.time), len(own.time) - 1)
         slides = ~is_stuck(finger.data, own)[at]
-        found.append(replace(each, train=each.train & slides, held_out=each.held_out & slides))
-    return found
+        sliding.append(replace(recording, train=recording.train & slides, held_out=recording.held_out & slides))
+    return sliding
 
 
 @dataclass(frozen=True)
@@ -99,13 +99,16 @@ def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]
 
 
 def _enough(recordings: Sequence[FitRecording]) -> bool:
-    found = sum(float(np.median(np.diff(each.time))) * int(each.train.sum()) for each in recordings)
-    return found >= FEWEST_STRETCHES * STRETCH
+    seconds = sum(float(np.median(np.diff(recording.time))) * int(recording.train.sum()) for recording in recordings)
+    return seconds >= FEWEST_STRETCHES * STRETCH
 
 
 def _without(recordings: Sequence[FitRecording], others: Sequence[FitRecording]) -> list[FitRecording]:
     """Return the recordings without the samples that others of the same times train on."""
-    return [replace(each, train=each.train & ~other.train) for each, other in zip(recordings, others, strict=True)]
+    return [
+        replace(recording, train=recording.train & ~other.train)
+        for recording, other in zip(recordings, others, strict=True)
+    ]
 
 
 def _squares(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> float:

@@ -39,26 +39,32 @@ class Span:
 def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span:
     """Measure the span of recordings that were prepared for a valid description."""
     arms = moment_arms(data)
-    every = max(1, sum(len(each.time) for each in recordings) // _LOOKED_AT)
-    rows = [np.flatnonzero(each.train)[::every] for each in recordings]
+    every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
+    rows = [np.flatnonzero(recording.train)[::every] for recording in recordings]
     angle, speed, force, torque, acceleration = (
-        np.concatenate(found)
-        for found in zip(*(_signals(each, row) for each, row in zip(recordings, rows, strict=True)), strict=True)
+        np.concatenate(signals)
+        for signals in zip(
+            *(_signals(recording, row) for recording, row in zip(recordings, rows, strict=True)), strict=True
+        )
     )
     sliding = np.cumsum((speed[:, None, :] * arms)[:, :, ::-1], axis=2)[:, :, ::-1]
-    steps = np.concatenate([np.diff(each.time[part]) for each in recordings for part in each.parts])
-    angles = [each.model.joint_angle[part] for each in recordings for part in each.parts]
+    steps = np.concatenate([np.diff(recording.time[part]) for recording in recordings for part in recording.parts])
+    angles = [recording.model.joint_angle[part] for recording in recordings for part in recording.parts]
     return Span(
         angle=_range(angle),
         speed=np.quantile(np.abs(speed), _FAST, axis=0),
         tendon_speed=np.quantile(np.abs(sliding), _FAST, axis=0),
         position=_range(angle @ arms.T),
         travel=_travels(angles),
-        tendon_travel=_travels([each @ arms.T for each in angles]),
+        tendon_travel=_travels([angle @ arms.T for angle in angles]),
         force=_range(force),
         acceleration=np.quantile(np.abs(acceleration), _FAST, axis=0),
         torque=np.std(torque, axis=0),
-        duration=max(float(each.time[part][-1] - each.time[part][0]) for each in recordings for part in each.parts),
+        duration=max(
+            float(recording.time[part][-1] - recording.time[part][0])
+            for recording in recordings
+            for part in recording.parts
+        ),
         step=float(np.median(steps)),
     )
 
@@ -82,14 +88,14 @@ def _range(values: Numbers) -> Numbers:
 def _travels(paths: Sequence[Numbers]) -> Numbers:
     """Return the median distance between reversals [k] of paths [N, k]; the range of the path if it has no reversal."""
     count = paths[0].shape[1]
-    found = np.zeros(count)
+    travels = np.zeros(count)
     for k in range(count):
         values = [path[:, k] for path in paths]
         whole = float(np.ptp(np.concatenate(values)))
-        turns = [np.abs(np.diff(_turning_points(each, _DEAD * whole))) for each in values]
+        turns = [np.abs(np.diff(_turning_points(value, _DEAD * whole))) for value in values]
         distances = np.concatenate(turns)
-        found[k] = float(np.median(distances)) if len(distances) else whole
-    return found
+        travels[k] = float(np.median(distances)) if len(distances) else whole
+    return travels
 
 
 def _turning_points(path: Numbers, dead: float) -> Numbers:

@@ -32,7 +32,7 @@ FINE = 0.001  # s
 LARGE = 0.008  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
-_BY_NAME = {each.name: each for each in CANDIDATES}
+_BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
 PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
 
 
@@ -52,7 +52,7 @@ class Start:
 
     @property
     def accepted(self) -> list[Accepted]:
-        return [each for cause in self.causes for each in cause]
+        return [accepted for cause in self.causes for accepted in cause]
 
 
 def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, least_delay: float) -> list[Start]:
@@ -66,22 +66,22 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
         if known is None:
             delays = _delays(span.step)
     moved = np.stack([_torque(recordings, grid, delay) - _torque(recordings, grid, 0.0) for delay in delays], axis=2)
-    found: list[Start] = []
+    starts: list[Start] = []
     for presliding in distances:
         errors = _errors(extended_description(data, presliding), recordings, grid, moved)
         still = int(np.argmin(np.abs(delays)))
-        found.append(Start(presliding, 0.0, float(errors[still])))
+        starts.append(Start(presliding, 0.0, float(errors[still])))
         best = int(np.argmin(errors))
         # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
         is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
         if is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]:
-            found.append(Start(presliding, float(delays[best]), float(errors[best])))
+            starts.append(Start(presliding, float(delays[best]), float(errors[best])))
     if known is not None and abs(known) >= least_delay:
         for presliding in distances:
             start = Start(presliding, known, 0.0)
             begin = extended_description(data, start.accepted)
-            found.append(replace(start, error=float(_errors(begin, recordings, grid, moved[:, :, :1] * 0.0)[0])))
-    return sorted(found, key=lambda each: each.error)
+            starts.append(replace(start, error=float(_errors(begin, recordings, grid, moved[:, :, :1] * 0.0)[0])))
+    return sorted(starts, key=lambda start: start.error)
 
 
 def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Accepted, ...]]:
@@ -90,7 +90,7 @@ def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> l
     if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
         return []
     by_place = [
-        [Accepted(PRESLIDING, place, each.shape, (1.0,)) for each in PRESLIDING.variants(data, place, span)]
+        [Accepted(PRESLIDING, place, variant.shape, (1.0,)) for variant in PRESLIDING.variants(data, place, span)]
         for place in places
     ]
     return [tuple(own) for own in zip(*(each for each in by_place if each), strict=False) if own]

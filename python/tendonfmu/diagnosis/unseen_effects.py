@@ -34,15 +34,15 @@ def unseen_effects(
     selection: Selection, causes: Sequence[NamedCause], known: Sequence[NamedCause], least_gain: float
 ) -> list[Unseen]:
     """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
-    places = {(cause.effect, each.place.joint, each.place.tendon) for cause in known for each in cause.accepted}
+    places = {(cause.effect, term.place.joint, term.place.tendon) for cause in known for term in cause.accepted}
     names = [cause.effect for cause in causes]
     best: dict[Key, Unseen] = {}
-    for each, share in zip(selection.hypotheses, selection.shares, strict=True):
-        if each.level != HERE or each.key in places:
+    for hypothesis, share in zip(selection.hypotheses, selection.shares, strict=True):
+        if hypothesis.level != HERE or hypothesis.key in places:
             continue
-        gain = selection.grams.ordinary_gain(each.mix, np.array(each.members[0].shape.expected))
-        own = Unseen(each, share, gain, least_gain * names_with(each.effect, names))
-        if each.key not in best or own.nearness > best[each.key].nearness:
-            best[each.key] = own
-    hidden = [each for each in best.values() if each.nearness < 1.0]
-    return sorted(hidden, key=lambda each: -each.nearness)
+        gain = selection.grams.ordinary_gain(hypothesis.mix, np.array(hypothesis.members[0].shape.expected))
+        own = Unseen(hypothesis, share, gain, least_gain * names_with(hypothesis.effect, names))
+        if hypothesis.key not in best or own.nearness > best[hypothesis.key].nearness:
+            best[hypothesis.key] = own
+    hidden = [effect for effect in best.values() if effect.nearness < 1.0]
+    return sorted(hidden, key=lambda effect: -effect.nearness)

@@ -1,4 +1,4 @@
-"""What a motion tells about a finger's friction parameters: the Fisher information of the innovations.
+"""How well a motion identifies a finger's friction parameters: the Fisher information of the innovations.
 
 The innovations are those of the model's own bias filter. Assumed: the joint torques τ carry independent white noise of
 the description's `bias.noise_std` (plus a part per force), and the bias is a random walk of `bias.drift_variance`, so

@@ -113,7 +113,7 @@ class Verdict:
     error_alone: float
     cause: str  # "" if identifiable, else a key of `CAUSES`
     reason: str  # the cause in words
-    partners: list[str]  # paths of the numbers that it can only be told in combination with
+    partners: list[str]  # paths of the numbers that it can be seen only in combination with
 
     @property
     def identifiable(self) -> bool:

@@ -1,4 +1,4 @@
-"""Which training motion shows the friction of a finger, and what it tells about each number (`tendonfmu excite`).
+"""Which training motion shows the friction of a finger, and how well it identifies each number (`tendonfmu excite`).
 
 `excitation` plans strokes of all joints and the internal tensions, and `training_motion` judges the result.
 """

@@ -89,7 +89,7 @@ class ExciteResult:
     effects: list[EffectCoverage]
     noise: Noise  # the assumed noise
     slack: list[float]  # time during which each tendon would have to push [m] (s)
-    judgement: Judgement  # what the motion tells about each number
+    judgement: Judgement  # how well the motion identifies each number
 
 
 def read_subject(path: Path) -> Subject:

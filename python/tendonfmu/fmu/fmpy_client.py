@@ -62,7 +62,7 @@ def run_fmu(
 @contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: no such file; expected an FMU")
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-"))
     try:
         _unpack(path, folder)
@@ -314,7 +314,7 @@ class _Run:
             )
         for path in self._parameters:
             if path not in self._all:
-                raise InputError(f"{self.path}: no parameter {path!r} in this FMU")
+                raise InputError(f"{self.path}: no parameter {path!r}; expected one of this FMU")
         real = {self._all[path].valueReference: value for path, value in self._parameters.items()}
         self._slave.initialise(start, {self._all["kinematics_source"].valueReference: source}, real)
 

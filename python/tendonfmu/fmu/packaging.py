@@ -180,7 +180,7 @@ def variable_generator() -> ModuleType:
 
 
 def licenses(*names: str) -> dict[str, bytes]:
-    """Return the licence texts of an FMU, where FMI 2.0.4 wants them."""
+    """Return the licence texts of an FMU, where FMI 2.0.4 requires them."""
     return {f"documentation/licenses/{name}": package_file(f"licenses/{name}").read_bytes() for name in names}
 
 

@@ -103,7 +103,7 @@ def _build_plant(
 
 def _check_suffix(output: Path) -> None:
     if output.suffix.lower() != ".fmu":
-        raise InputError(f"{output}: expected a name that ends in .fmu, as importing tools want it")
+        raise InputError(f"{output}: expected a name that ends in .fmu, which importing tools need")
 
 
 def _related(

@@ -88,7 +88,7 @@ def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
     tendons = choose_tendons(model, joints, angles, settings.tendons)
     for name in settings.bidirectional:
         if model.tendon_named(name) not in tendons:
-            raise InputError(f"{path}: --bidirectional {name}: not among the tendons of the finger")
+            raise InputError(f"{path}: --bidirectional {name}: no such tendon; expected one of the finger's")
     arms = moment_arms(model, joints, tendons, angles, settings.tolerance)
     _check_moved(model, joints, arms)
     links = None if settings.tip is None else _links(model, joints, settings.tip)
@@ -126,7 +126,7 @@ def _chain(model: CompiledModel, names: Sequence[str]) -> list[Joint]:
         if joint.kind not in ("hinge", "slide"):
             raise InputError(f"{model.path}: joint {joint.name}: a {joint.kind} joint; expected a hinge or a slide")
         if names.count(joint.name) > 1:
-            raise InputError(f"{model.path}: joint {joint.name}: given twice")
+            raise InputError(f"{model.path}: joint {joint.name}: given twice; expected once")
     for before, after in pairwise(joints):
         if _carries(model, before, after):
             continue
@@ -155,7 +155,7 @@ def joint_ranges(
     names = [joint.name for joint in joints]
     for name in given:
         if name not in names:
-            raise InputError(f"--range {name}: not among the joints {', '.join(names)}")
+            raise InputError(f"--range {name}: no such joint; expected one of {', '.join(names)}")
     ranges, notes = [], []
     for joint in joints:
         if joint.name not in given and joint.limits is None:
@@ -291,7 +291,7 @@ def _sources(
 def _links(model: CompiledModel, joints: Sequence[Joint], tip: str) -> LinkGeometry:
     for joint in joints:
         if joint.kind != "hinge":
-            raise InputError(f"{model.path}: --tip: joint {joint.name} is a {joint.kind}; links need hinges")
+            raise InputError(f"{model.path}: --tip: joint {joint.name} is a {joint.kind}; expected a hinge")
     return link_geometry(model, joints, tip)
 
 
@@ -314,4 +314,4 @@ def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
     try:
         native.image_from_json(json.dumps(data))
     except NativeError as refused:
-        raise InputError(f"{model.path}: these joints and tendons make no finger: {refused}") from None
+        raise InputError(f"{model.path}: these joints and tendons do not make a valid finger: {refused}") from None

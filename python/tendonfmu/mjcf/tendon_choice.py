@@ -45,7 +45,7 @@ def choose_tendons(
     chosen = [model.tendon_named(name) for name in names]
     for tendon in chosen:
         if list(names).count(tendon.name) > 1:
-            raise InputError(f"{model.path}: tendon {tendon.name}: given twice")
+            raise InputError(f"{model.path}: tendon {tendon.name}: given twice; expected once")
         if not moves[tendon.index]:
             raise InputError(
                 f"{model.path}: tendon {tendon.name}: moves none of the joints "

@@ -44,7 +44,7 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
         shares = project @ allowed
     else:
         raise InputError(
-            "tendons: no pretension is in balance; expected moment arms with a solution of "
+            "tendons: no balanced pretension; expected moment arms with a solution of "
             "Rᵀ f = 0 in which every tendon pulls"
         )
     mean = float(np.mean(shares))

@@ -183,7 +183,7 @@ def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
     share = slack.mean(axis=0)
     return [
         f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {percent(part)} of the samples: its modelled force "
-        "falls below 0 and counts as 0; the training should be modified: more pretension"
+        "falls below 0 and counts as 0; expected a recording with more pretension"
         for i, part in enumerate(share)
         if part > 0
     ]
@@ -282,8 +282,8 @@ def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapp
     threshold = number_of(finger.data, "velocity_threshold.joint")
     fastest = np.max([np.abs(part.model.joint_speed[part.train]).max(axis=0) for part in recordings], axis=0)
     return [
-        f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its own friction cannot "
-        "be told, its numbers stay near where they were"
+        f"joint {j} ({finger.joint_names[j - 1]}) never moves faster than {threshold:g} rad/s: its friction cannot "
+        "be estimated and stays near its start"
         for j in np.flatnonzero(fastest <= threshold) + 1
     ]
 

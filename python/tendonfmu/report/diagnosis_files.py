@@ -79,7 +79,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
 
 
 def _make_for(diagnosis: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
-    """Make the files in a folder. A refusal tells the folder that the user has named."""
+    """Make the files in a folder. A refusal names the folder that the user gave."""
     try:
         return _make(diagnosis, folder)
     except OutputError as refused:

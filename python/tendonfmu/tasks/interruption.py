@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-# What each does in a program that nobody has told otherwise. SIGHUP: the terminal has closed; Windows has none.
+# The default action of each. SIGHUP: the terminal has closed; Windows has none.
 _USUAL: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
     _USUAL[signal.SIGHUP] = signal.SIG_DFL

@@ -7,7 +7,7 @@
 /* F × (1 + amplitude·(1 − exp(−(t − t_0)/time_constant))): run-in, warming up. */
 
 enum { AMPLITUDE, TIME_CONSTANT };
-/* what has come of it, 1 − e^−age, and how fast it comes with age, −age·e^−age, for the time constant it was told */
+/* the share reached, 1 − e^−age, and its slope by the logarithm of the time constant, −age·e^−age */
 enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, BY_AGE, MEMORY_COUNT };
 
 static void come_so_far(double elapsed, double time_constant, double* come, double* by_age) {

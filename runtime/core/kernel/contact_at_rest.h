@@ -5,7 +5,7 @@
 #include "friction_bound.h"
 #include "kinematics.h"
 
-/* what a motor has done of late is counted from here */
+/* the recent motion of a motor is counted from here */
 HOT_INLINE void mark_recent(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   for (size_t i = 0; i < f->tendon_lanes; ++i) {

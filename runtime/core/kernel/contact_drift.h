@@ -6,7 +6,7 @@
 
 #define DRIFT_OF_LATE 0.1 /* of T_q: the time of the mean o */
 
-/* what o, p and s go of the way to e: 1 − exp(−Δt/min(T, time since the start)), into scratch */
+/* the weights of e in the means o, p and s: 1 − exp(−Δt/min(T, time since the start)), into scratch */
 HOT_INLINE void find_drift_shares(tendonfmu_finger* f, double time, double step) {
   const finger_settings* settings = &f->derived.settings;
   const double quick = settings->drift_quick_time;
@@ -24,7 +24,7 @@ HOT_INLINE quad left_by_friction(const tendonfmu_finger* f, size_t j) {
   return quad_add(quad_load(f->remembered.residual + j), quad_load(f->remembered.learned + j));
 }
 
-/* a mean that goes a share of the way to a value */
+/* one step of an exponential mean */
 HOT_INLINE quad approach(double* mean, quad value, quad share) {
   const quad before = quad_load(mean), after = quad_add(before, quad_mul(share, quad_sub(value, before)));
   quad_store(mean, after);

@@ -30,7 +30,7 @@ HOT_INLINE quad exp_of_minus(quad x) {
   return quad_scale(e, shifted);
 }
 
-/* 1 − exp(−x) for x >= 0: the share that a mean goes of the way to a value */
+/* 1 − exp(−x) for x >= 0: the weight of a new value in an exponential mean */
 HOT_INLINE quad approach_share(quad x) {
   return quad_sub(quad_set(1.0), exp_of_minus(x));
 }

@@ -74,7 +74,7 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
   return view;
 }
 
-/* lanes whose law is that of the sign of v; what slides at all times knows no hysteresis */
+/* lanes whose law is that of the sign of v; places with presliding have no hysteresis */
 HOT_INLINE quad_mask takes_side(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad speed,
                                 double threshold) {
   if (!f->extensions.friction) {
@@ -129,7 +129,7 @@ HOT_INLINE void keep_magnitude(const tendonfmu_finger* f, double* stuck, double*
 }
 
 /* whether F of four slots is 0 without a look at the laws: nothing moves, now or before, or slides; where
- * friction_bound.h wants |F| of what sticks, only where it can hold no joint */
+ * friction_bound.h needs |F| of what sticks, only where it can hold no joint */
 HOT_INLINE int nothing_acts(const tendonfmu_finger* f, size_t slot, quad_mask moving) {
   int acts = quad_mask_bits(quad_either(moving, moved_before(f, slot)));
   if (f->derived.settings.bounds_friction) {
@@ -245,7 +245,7 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds
   quad_store(s->slack + i, quad_keep(slack, quad_set(1.0)));
 }
 
-/* the same of all tendons; without a bidirectional one among four, which is the rule, less is to be told apart */
+/* the same of all tendons; without a bidirectional one among four, the usual case, there are fewer cases */
 HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));

@@ -1,5 +1,5 @@
 /* Joint angles with known noise: a Kalman filter over angle, velocity and acceleration of each joint, driven by white
- * jerk, and a gate that holds the angle while the velocity is not told from 0
+ * jerk, and a gate that holds the angle while the velocity cannot be distinguished from 0
  * (docs/reference/semantics.md#position-filter). */
 #pragma once
 

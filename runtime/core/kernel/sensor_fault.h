@@ -145,7 +145,7 @@ HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t 
   return quad_both(judged, quad_greater(missed, bound));
 }
 
-/* since when x0 is where it is, and whether f0 and w say that it cannot be */
+/* since when x0 is where it is, and whether f0 and w contradict it */
 HOT_INLINE quad_mask position_stands(tendonfmu_finger* f, const watched* w, size_t i, double time) {
   const finger_settings* settings = &f->derived.settings;
   double *before = f->remembered.sensor, *now = f->scratch.sensor;
@@ -242,7 +242,7 @@ COLD_STATIC void shift_angles(tendonfmu_finger* f, double sign) {
   }
 }
 
-/* other rows tell the angles from this sample on: those of the sample before, and what w is taken from, change too */
+/* other rows give the angles from this sample on: those of the sample before, and what w is taken from, change too */
 COLD_STATIC void change_rows(tendonfmu_finger* f) {
   double* now = f->scratch.sensor;
   const int by_tendons = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS;
@@ -257,7 +257,7 @@ COLD_STATIC void change_rows(tendonfmu_finger* f) {
   }
 }
 
-/* what every sample leaves of itself, and of the faults up to now */
+/* what is remembered of every sample, and of the faults up to now */
 HOT_INLINE void copy_sensors(tendonfmu_finger* f, size_t i, const watched* w) {
   double *before = f->remembered.sensor, *now = f->scratch.sensor;
   for (int row = SENSOR_FAULT; row <= SENSOR_UNSOUND_AT; ++row) {

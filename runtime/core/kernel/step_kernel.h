@@ -145,7 +145,7 @@ HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
   }
 }
 
-/* what it leaves of the measured torque, and how it has jumped */
+/* the residual, and how it has jumped */
 HOT_INLINE void leave_residual(tendonfmu_finger* f, double step) {
   const finger_state* s = &f->remembered;
   if (f->derived.settings.bounds_friction) {

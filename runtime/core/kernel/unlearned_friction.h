@@ -27,7 +27,7 @@ static inline int can_move(const tendonfmu_finger* f, size_t slot) {
   return moves;
 }
 
-/* the first sample: what sticks, or slides in presliding, stands as nobody knows */
+/* the first sample: what sticks, or slides in presliding, is in an unknown state */
 COLD_STATIC void begin_start_left(tendonfmu_finger* f) {
   double* left = f->scratch.start_left;
   for (size_t slot = 0; slot < f->slots; slot += 4) {
@@ -38,7 +38,7 @@ COLD_STATIC void begin_start_left(tendonfmu_finger* f) {
   }
 }
 
-/* By how much a slot's effect may stand otherwise than the model took it: |F| of what slides, which begins at ζ = 0;
+/* By how much a slot's effect may differ from what the model assumes: |F| of what slides, which begins at ζ = 0;
  * else twice that of the sample, in which it moves, since b of a first exit took it as standing that way already. */
 HOT_INLINE quad whole_friction(const tendonfmu_finger* f, const double* friction, const double* whole, size_t slot,
                                size_t at) {

@@ -56,7 +56,7 @@ def background_columns(
 def _of_joint(seen: Features, joint: int, arms: Numbers) -> NDArray[np.int64]:
     """Return the functions of this joint, or of a tendon that turns it."""
     tendons = [f"tendon {i + 1}" for i in np.flatnonzero(arms[:, joint])]
-    names = {f"joint {joint + 1}", *tendons, *(f"{each} at joint {joint + 1}" for each in tendons)}
+    names = {f"joint {joint + 1}", *tendons, *(f"{tendon} at joint {joint + 1}" for tendon in tendons)}
     names.add("")  # several states together
     chosen = np.isin(seen.group, GROUPS) & np.isin(seen.subject, sorted(names))
     return np.asarray(np.flatnonzero(chosen), dtype=np.int64)

@@ -55,8 +55,8 @@ def _rows(recording: FitRecording) -> Numbers:
 def _different_conditions(then: Sequence[FitRecording], now: Sequence[FitRecording]) -> Iterator[str]:
     """Yield warnings about new samples outside the range of the reference: no reference data exist for them."""
     for name, unit, of in (("tendon force", "N", _force), ("joint angle", "rad", _angle)):
-        known = np.concatenate([of(each) for each in then])
-        new = np.concatenate([of(each) for each in now])
+        known = np.concatenate([of(recording) for recording in then])
+        new = np.concatenate([of(recording) for recording in now])
         low, high = np.quantile(known, [0.005, 0.995], axis=0)
         outside = ((new < low) | (new > high)).mean(axis=0)
         worst = int(np.argmax(outside))

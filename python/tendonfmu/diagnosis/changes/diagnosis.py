@@ -69,7 +69,7 @@ class ChangeCase:
     @property
     def whole(self) -> list[FitRecording]:
         """The new recordings without held-out stretches."""
-        return [replace(each, train=each.train | each.held_out) for each in self.now]
+        return [replace(recording, train=recording.train | recording.held_out) for recording in self.now]
 
 
 def find_changes(case: ChangeCase, *, least_gain: float, seed: int, jobs: int, phases: Phases) -> Diagnosis:
@@ -121,9 +121,9 @@ class _Changes:
 
     def _without_events(self) -> Flags:
         """Return the blocks that lie in contact or a stall [B]."""
-        names = {str(each.path) for each in self._all[len(self._then) :]}
+        names = {str(recording.path) for recording in self._all[len(self._then) :]}
         events, out = events_of(self._chosen.model.data, self._all, self._grid, self._seed)
-        self._events = tuple(each for each in events if each.recording in names)
+        self._events = tuple(event for event in events if event.recording in names)
         return out
 
     def _made(self, out: Flags) -> ChangeSearch:
@@ -136,8 +136,8 @@ class _Changes:
         """Return the sizes of effects at places in the new recordings, all of them free."""
         search = self._search = self._made(self._without_events())
         search.free(keys)
-        found = [search.certain(k) for k in range(len(search.changes))]
-        return [(each.hypothesis.key, sized(search, found, k).size) for k, each in enumerate(found)]
+        changes = [search.certain(k) for k in range(len(search.changes))]
+        return [(change.hypothesis.key, sized(search, changes, k).size) for k, change in enumerate(changes)]
 
     # --- verified on unseen data ---
 
@@ -154,7 +154,7 @@ class _Changes:
             grams = search.grams(unseen=unseen)
             after, stretch = grams.unseen_residual(), grams.counted_stretch
             without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.changes))]
-            gains = [interval_of(each, after, stretch) for each in without]
+            gains = [interval_of(left, after, stretch) for left in without]
             beside = [search.certain(k) for k in range(len(search.changes))]
             order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
             named = [search.changes[k].hypothesis.effect for k in order]
@@ -176,7 +176,7 @@ class _Changes:
                 return dropped, [gains[k] for k in order]
             worst = min(weak, key=lambda k: gains[k].value)
             dropped.append(replace(search.changes[worst], gain=gains[worst].value, error=_error(gains[worst])))
-            search.keep([each for k, each in enumerate(search.changes) if k != worst])
+            search.keep([change for k, change in enumerate(search.changes) if k != worst])
 
     # --- the models ---
 
@@ -197,7 +197,8 @@ class _Changes:
         data: Data = self._search.now_data(changes)
         if (data.get("bias") or {}).get("initial_torque") is not None:
             own = [
-                replace(each, train=each.train & other.train) for each, other in zip(self._now, self._held, strict=True)
+                replace(recording, train=recording.train & other.train)
+                for recording, other in zip(self._now, self._held, strict=True)
             ]
             settings = replace(self._settings, choice=Choice(only=("bias.initial_torque*",)))
             data = fit_numbers(data, own, settings).data
@@ -210,8 +211,8 @@ class _Changes:
         learned = self._learned()
         models = [self._online(learned[:k]) for k in range(len(learned) + 1)]
         nominal, extended = models[0], models[-1]
-        clean = [without_events(each, self._events) for each in case.now]
-        tests = [without_events(each, self._events) for each in case.tests]
+        clean = [without_events(recording, self._events) for recording in case.now]
+        tests = [without_events(recording, self._events) for recording in case.tests]
         gain = measure_gain(nominal, extended, clean, tests, between=models[1:-1], seed=self._seed)
         harmful = [k for k, (one, other) in enumerate(pairwise(gain.steps)) if other > one]
         if harmful:  # it helps together with what is wrong in both, but not alone
@@ -221,12 +222,12 @@ class _Changes:
             return self._result(dropped, [*gains[:k], *gains[k + 1 :]])
         before, after = self._views()
         unexplained, load = self._unexplained(), self._load()
-        causes = tuple(self._cause(k, search.changes, each) for k, each in enumerate(gains))
+        causes = tuple(self._cause(k, search.changes, gain) for k, gain in enumerate(gains))
         return Diagnosis(
             finger=case.finger.name,
             verdict=_verdict(bool(causes) or load is not None, unexplained.unknown),
-            recordings=tuple(str(each.path) for each in case.now),
-            tests=tuple(str(each.path) for each in case.tests),
+            recordings=tuple(str(recording.path) for recording in case.now),
+            tests=tuple(str(recording.path) for recording in case.tests),
             held_out=gain.held_out,
             seconds=0.0,
             seed=self._seed,
@@ -240,7 +241,7 @@ class _Changes:
             gain=gain.value,
             steps=gain.steps,
             causes=causes,
-            too_small=tuple(_too_small(each) for each in [*dropped, *search.refused]),
+            too_small=tuple(_too_small(change) for change in [*dropped, *search.refused]),
             invisible=self._invisible(),
             events=self._events,
             unexplained=unexplained,
@@ -256,7 +257,7 @@ class _Changes:
             smoothing=self._chosen.signals,
             kind="change",
             load=load,
-            references=tuple(str(each.path) for each in case.then),
+            references=tuple(str(recording.path) for recording in case.then),
             repeated=search.repeated,
         )
 
@@ -275,12 +276,12 @@ class _Changes:
     def _warnings(self) -> list[str]:
         folds, judged = self._search.folds, self._search.judged
         now = int(judged.sum())
-        found = []
+        warnings = []
         if now < 4 or folds.folds - now < 4:
-            found.append(
+            warnings.append(
                 "less than 16 s of motion then or now: a change has to be large to be certain; record a minute of each"
             )
-        return found
+        return warnings
 
     def _unexplained(self) -> Unexplained:
         """Return whether the new recordings, with all changes, are explained worse than the reference is by itself."""
@@ -313,13 +314,13 @@ class _Changes:
     def _load(self) -> SteadyLoad | None:
         """Return what remains of a load both with and without the means of the changes."""
         search = self._search
-        found: list[SteadyLoad] = []
+        loads: list[SteadyLoad] = []
         for means in (False, True) if search.changes else (False,):
             load = steady_load(search.series, search.torque_left(means), search.sides.now, self._seed)
             if load is None or load.gain.low <= 0.0:
                 return None
-            found.append(load)
-        return min(found, key=lambda each: abs(each.size.change.value))
+            loads.append(load)
+        return min(loads, key=lambda load: abs(load.size.change.value))
 
     def _floor(self) -> Numbers:
         """Return the rms of the new recordings, N·m [n]."""
@@ -331,39 +332,43 @@ class _Changes:
         search = self._search
         change = learned[number]
         own = change.hypothesis
-        title, explanation, coordinate = _told(own)
-        found = sized(search, learned, number)
-        by = sizes_by_recording(search, number, found.size, self._now)
+        title, explanation, coordinate = _described(own)
+        sizes = sized(search, learned, number)
+        by = sizes_by_recording(search, number, sizes.size, self._now)
         return Cause(
             where=Where(own.effect, own.joint, own.tendon),
             title=title,
             explanation=explanation,
             p_value=change.p_value,
             gain=gain,
-            confusable_with=tuple(Where(each.effect, each.joint, each.tendon) for each in _named_once(change.alike)),
-            parameters={path: value for place in found.places for path, value in place.parameters.items()},
-            size=found.words,
-            places=found.places,
+            confusable_with=tuple(
+                Where(other.effect, other.joint, other.tendon) for other in _named_once(change.alike)
+            ),
+            parameters={path: value for place in sizes.places for path, value in place.parameters.items()},
+            size=sizes.words,
+            places=sizes.places,
             evidence=change_evidence(search, number, coordinate),
-            changed=replace(found.size, by=by),
+            changed=replace(sizes.size, by=by),
         )
 
     def _invisible(self) -> tuple[Invisible, ...]:
         """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
         selection = self._search.selection
         best: dict[tuple[str, int | None, int | None], tuple[Hypothesis, float]] = {}
-        for each, share in zip(selection.hypotheses, selection.shares, strict=True):
-            if each.level == HERE and (each.key not in best or share > best[each.key][1]):
-                best[each.key] = (each, share)
+        for hypothesis, share in zip(selection.hypotheses, selection.shares, strict=True):
+            if hypothesis.level == HERE and (hypothesis.key not in best or share > best[hypothesis.key][1]):
+                best[hypothesis.key] = (hypothesis, share)
         return tuple(
-            Invisible(Where(each.effect, each.joint, each.tendon), _told(each)[0], share, REPEAT)
-            for each, share in sorted(best.values(), key=lambda pair: -pair[1])
+            Invisible(
+                Where(hypothesis.effect, hypothesis.joint, hypothesis.tendon), _described(hypothesis)[0], share, REPEAT
+            )
+            for hypothesis, share in sorted(best.values(), key=lambda pair: -pair[1])
             if share < ABSORBED
         )
 
     def _next(self, causes: Sequence[Cause]) -> str:
         search = self._search
-        pulls = any(not each.get("bidirectional") for each in self._case.finger.data["tendons"])
+        pulls = any(not tendon.get("bidirectional") for tendon in self._case.finger.data["tendons"])
         if any(cause.confusable_with for cause in causes) and pulls:
             return (
                 f"{REPEAT}, once as it was and once at half and at twice the pretension: what grows with the force is "
@@ -377,9 +382,9 @@ class _Changes:
 REPEAT = "Make the motions of the reference again, exactly, at the same load and pretension"
 
 
-def _told(hypothesis: Hypothesis) -> tuple[str, str, str]:
+def _described(hypothesis: Hypothesis) -> tuple[str, str, str]:
     """Return title, explanation, and the coordinate of the evidence."""
-    candidate = next((each for each in CANDIDATES if each.name == hypothesis.effect), None)
+    candidate = next((candidate for candidate in CANDIDATES if candidate.name == hypothesis.effect), None)
     if candidate is None:
         return hypothesis.effect.replace("_", " "), "", "velocity"
     explanation = candidate.explanation
@@ -390,12 +395,12 @@ def _told(hypothesis: Hypothesis) -> tuple[str, str, str]:
 
 
 def _named_once(alike: Sequence[Hypothesis]) -> list[Hypothesis]:
-    return list({each.effect: each for each in reversed(alike)}.values())[::-1]
+    return list({other.effect: other for other in reversed(alike)}.values())[::-1]
 
 
 def _too_small(change: Change) -> Cause:
     own = change.hypothesis
-    title, explanation, _ = _told(own)
+    title, explanation, _ = _described(own)
     half = 1.96 * change.error
     return Cause(
         where=Where(own.effect, own.joint, own.tendon),

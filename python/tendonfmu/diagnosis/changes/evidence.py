@@ -23,7 +23,7 @@ def change_evidence(search: ChangeSearch, number: int, coordinate: str) -> tuple
     left = search.left()  # with all changes, without the background
     added = search.column(number) @ change.magnitudes
     added = added - added[search.series.used].mean(axis=0)
-    now = search.told & search.sides.now
+    now = search.informative & search.sides.now
     joint = int(np.argmax(np.sum(added[now] ** 2, axis=0)))
     place = _place(search, number, joint)
     own = _binned(search, coordinate_of(place, coordinate, search.series, joint), left, added, joint)
@@ -37,8 +37,8 @@ def _binned(
     search: ChangeSearch, over: tuple[str, str, Numbers], left: Numbers, added: Numbers, joint: int
 ) -> tuple[Evidence, ...]:
     label, unit, values = over
-    now = search.told & search.sides.now
-    then = search.told & ~search.sides.now
+    now = search.informative & search.sides.now
+    then = search.informative & ~search.sides.now
     kept = now & np.isfinite(values)
     bins = min(BINS, int(kept.sum()) // FEWEST)
     if bins < 2:
@@ -48,9 +48,9 @@ def _binned(
     edges[0], edges[-1] = -np.inf, np.inf
     member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
     parts = [np.flatnonzero(kept & (member == k)) for k in range(bins)]
-    parts = [each for each in parts if len(each)]
+    parts = [part for part in parts if len(part)]
     inside = then & (values >= low) & (values <= high)
-    theirs = [np.flatnonzero(inside & (member == member[each[0]])) for each in parts]
+    theirs = [np.flatnonzero(inside & (member == member[part[0]])) for part in parts]
     before, after = (left + added)[:, joint], left[:, joint]
     means = [_means(each, parts, search) for each in (before, after)]
     return (

@@ -128,8 +128,8 @@ def diagnose_history(
         If a file or an option is at fault, or if there is nothing to compare with the reference.
     """
     given = read_finger(finger)
-    files = [str(each) for each in recordings]
-    before = [str(each) for each in reference] or files[:1]
+    files = [str(recording) for recording in recordings]
+    before = [str(recording) for recording in reference] or files[:1]
     later = files if reference else files[1:]
     if not later:
         raise InputError("history: one recording; expected two at least, or a reference")
@@ -156,14 +156,16 @@ def named_in(
     finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str
 ) -> dict[str, Any]:
     """Return a row: what has changed in one recording."""
-    found = diagnose(finger, [recording], reference=reference, kinematics=kinematics, least_gain=least_gain, seed=seed)
-    causes = {key_text(each.where): each.gain.value for each in found.causes}
+    diagnosis = diagnose(
+        finger, [recording], reference=reference, kinematics=kinematics, least_gain=least_gain, seed=seed
+    )
+    causes = {key_text(cause.where): cause.gain.value for cause in diagnosis.causes}
     return {
         "recording": recording,
-        "verdict": found.verdict,
-        "keys": json.dumps([[each.where.effect, each.where.joint, each.where.tendon] for each in found.causes]),
+        "verdict": diagnosis.verdict,
+        "keys": json.dumps([[cause.where.effect, cause.where.joint, cause.where.tendon] for cause in diagnosis.causes]),
         "gains": json.dumps(causes),
-        "titles": json.dumps({key_text(each.where): each.title for each in found.causes}),
+        "titles": json.dumps({key_text(cause.where): cause.title for cause in diagnosis.causes}),
     }
 
 
@@ -174,10 +176,10 @@ def sizes_in(
     from tendonfmu.diagnosis.changes.diagnosis import sizes_now
 
     case = change_case(finger, [recording], reference, [], kinematics, least_gain, True)
-    found = sizes_now(case, [tuple(key) for key in json.loads(keys)], seed=seed, jobs=1)
+    sizes = sizes_now(case, [tuple(key) for key in json.loads(keys)], seed=seed, jobs=1)
     return {
         "recording": recording,
-        "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in found}),
+        "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in sizes}),
     }
 
 
@@ -190,7 +192,7 @@ def _written(size: ChangedSize) -> dict[str, Any]:
     return {
         "number": size.number,
         "unit": size.unit,
-        **{name: [each.value, each.low, each.high] for name, each in ends.items()},
+        **{name: [end.value, end.low, end.high] for name, end in ends.items()},
     }
 
 
@@ -234,14 +236,14 @@ def _history(
         recordings=tuple(recordings[k] for k in kept),
         times=times,
         dated=dated,
-        lines=tuple(sorted((each for each in lines if each.sizes), key=_importance, reverse=True)),
+        lines=tuple(sorted((line for line in lines if line.sizes), key=_importance, reverse=True)),
         verdicts=tuple(str(causes[k]["verdict"]) for k in kept),
         failed=tuple(dict(failed).items()),
     )
 
 
 def _importance(line: Line) -> tuple[int, float]:
-    return sum(each.named for each in line.sizes), max(each.gain for each in line.sizes)
+    return sum(size.named for size in line.sizes), max(size.gain for size in line.sizes)
 
 
 def _line(
@@ -265,20 +267,20 @@ def _line(
 
 def _since(sizes: Sequence[Size]) -> str | None:
     since = None
-    for each in reversed(sizes):
-        change = each.size.change
+    for size in reversed(sizes):
+        change = size.size.change
         if change.low <= 0.0 <= change.high:
             break
-        since = each.recording
+        since = size.recording
     return since
 
 
 def times_of(recordings: Sequence[str]) -> tuple[tuple[float, ...], bool]:
     """Return weeks since the first recording, if all names have dates in the given order; else 1, 2, ..."""
-    dates = [_date(Path(each).stem) for each in recordings]
-    known = [each for each in dates if each is not None]
+    dates = [_date(Path(recording).stem) for recording in recordings]
+    known = [date for date in dates if date is not None]
     if len(known) == len(dates) > 0 and all(a <= b for a, b in pairwise(known)):
-        return tuple((each - known[0]) / WEEK for each in known), True
+        return tuple((date - known[0]) / WEEK for date in known), True
     return tuple(float(k) for k in range(1, len(dates) + 1)), False
 
 
@@ -287,7 +289,7 @@ def _date(name: str) -> float | None:
     matched = _DATE.search(name)
     if matched is None:
         return None
-    year, month, day, hour, minute, second = (int(each or 0) for each in matched.groups())
+    year, month, day, hour, minute, second = (int(group or 0) for group in matched.groups())
     try:
         return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc).timestamp()
     except ValueError:
@@ -298,10 +300,10 @@ def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
     """Return names of rows: number, stem, and a mark of all that the row depends on."""
     # If any of this differs, the row is computed again.
     finger, references = str(options[0]), list(options[1])
-    shared = [*options, *(_stamp(each) for each in (finger, *references))]
+    shared = [*options, *(_stamp(file) for file in (finger, *references))]
     return [
-        f"{k:04d}_{Path(each).stem}_{_mark([*shared, each, _stamp(each)])}"
-        for k, each in enumerate(recordings, start=1)
+        f"{k:04d}_{Path(recording).stem}_{_mark([*shared, recording, _stamp(recording)])}"
+        for k, recording in enumerate(recordings, start=1)
     ]
 
 
@@ -312,10 +314,10 @@ def _mark(what: Any) -> str:
 
 def _stamp(file: str) -> list[int]:
     try:
-        found = os.stat(file)
+        status = os.stat(file)
     except OSError as failed:
         raise InputError(f"{file}: {failed.strerror}") from None
-    return [found.st_size, found.st_mtime_ns]
+    return [status.st_size, status.st_mtime_ns]
 
 
 def share_of(line: Line) -> Interval | None:

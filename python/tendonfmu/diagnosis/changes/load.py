@@ -18,15 +18,15 @@ LEVEL = 0.01  # largest share of stretches whose mean is on the other side
 
 def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
     """Return the load at the joint where it is largest; None if no level moved beyond the reference's scatter."""
-    found = []
+    loads = []
     for joint in range(left.shape[1]):
         then, now = (_Side.of(series, left[:, joint], series.used & side) for side in (~is_now, is_now))
         if min(len(then.means), len(now.means)) < 2:
             continue
         load = _at(joint, then, now, seed)
         if load is not None:
-            found.append(load)
-    best = max(found, key=lambda each: abs(each.size.change.value), default=None)
+            loads.append(load)
+    best = max(loads, key=lambda load: abs(load.size.change.value), default=None)
     return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
 
 

@@ -43,8 +43,8 @@ def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
 def numbers_of(data: Data) -> list[Number]:
     """Return the numbers in the order of `derivative_passes.nominal_directions`."""
     estimator, _ = estimator_of(data)
-    unknowns = [each for each in estimator.unknowns if not each.path.startswith("bias.")]
-    return [_number(data, k, each) for k, each in enumerate(unknowns)]
+    unknowns = [unknown for unknown in estimator.unknowns if not unknown.path.startswith("bias.")]
+    return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
 
 
 def _number(data: Data, index: int, unknown: Unknown) -> Number:
@@ -76,60 +76,60 @@ def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list
     by_place: dict[tuple[str, Place], list[Number]] = {}
     for number in numbers:
         by_place.setdefault((number.effect, number.place), []).append(number)
-    found = []
-    for (effect, place), own in by_place.items():
+    hypotheses = []
+    for (effect, place), members in by_place.items():
         level = EVERYWHERE if place == Place() else HERE
-        if any(each.side for each in own):
-            found += list(_two_sided(effect, place, own, count, first, level))
+        if any(member.side for member in members):
+            hypotheses += list(_two_sided(effect, place, members, count, first, level))
         else:
-            found.append(_free(effect, place, own, count, first, level))
+            hypotheses.append(_free(effect, place, members, count, first, level))
     for effect in SHARED:
-        places = {place: own for (name, place), own in by_place.items() if name == effect}
-        found += list(_groups(effect, places, count, first))
-    return sorted(found, key=lambda each: each.level)
+        places = {place: members for (name, place), members in by_place.items() if name == effect}
+        hypotheses += list(_groups(effect, places, count, first))
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.level)
 
 
-def _free(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
+def _free(effect: str, place: Place, numbers: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
     """Return a hypothesis in which each number is free: of working points, or of a term with several numbers."""
-    mix = np.zeros((count, len(own)))
-    for k, each in enumerate(own):
-        mix[first + each.index, k] = 1.0
-    low, high = _bounds(own)
+    mix = np.zeros((count, len(numbers)))
+    for k, number in enumerate(numbers):
+        mix[first + number.index, k] = 1.0
+    low, high = _bounds(numbers)
     return Hypothesis(effect, place.joint, place.tendon, level, (), mix, low, high)
 
 
-def _bounds(own: Sequence[Number]) -> tuple[Numbers, Numbers]:
+def _bounds(numbers: Sequence[Number]) -> tuple[Numbers, Numbers]:
     """Return the bounds of what may be added [d]."""
-    value = np.array([each.value for each in own])
-    low, high = np.array([each.low for each in own]), np.array([each.high for each in own])
+    value = np.array([number.value for number in numbers])
+    low, high = np.array([number.low for number in numbers]), np.array([number.high for number in numbers])
     return low - value, high - value
 
 
 def _two_sided(
-    effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int
+    effect: str, place: Place, numbers: Sequence[Number], count: int, first: int, level: int
 ) -> Iterator[Hypothesis]:
-    yield _scaled(effect, place, own, count, first, level)
+    yield _scaled(effect, place, numbers, count, first, level)
     if effect not in ("stribeck",):
-        sides = [[each for each in own if each.side == side] for side in (1, -1)]
+        sides = [[number for number in numbers if number.side == side] for side in (1, -1)]
         mix = np.zeros((count, 1))
         for side, members in zip((1.0, -1.0), sides, strict=True):
-            for each in members:
-                mix[first + each.index, 0] = side
-        most = min(each.value - each.low for each in own)
+            for member in members:
+                mix[first + member.index, 0] = side
+        most = min(number.value - number.low for number in numbers)
         yield Hypothesis(
             "asymmetric_friction", place.joint, place.tendon, level, (), mix, np.array([-most]), np.array([most])
         )
 
 
-def _scaled(effect: str, place: Place, own: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
+def _scaled(effect: str, place: Place, numbers: Sequence[Number], count: int, first: int, level: int) -> Hypothesis:
     """Return a hypothesis in which all numbers change by the same share."""
     mix = np.zeros((count, 1))
-    size = np.array([abs(each.value) for each in own])
+    size = np.array([abs(number.value) for number in numbers])
     size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
-    for each, share in zip(own, size, strict=True):
-        mix[first + each.index, 0] = share
-    low = max(float((each.low - each.value) / share) for each, share in zip(own, size, strict=True))
-    high = min(float((each.high - each.value) / share) for each, share in zip(own, size, strict=True))
+    for number, share in zip(numbers, size, strict=True):
+        mix[first + number.index, 0] = share
+    low = max(float((number.low - number.value) / share) for number, share in zip(numbers, size, strict=True))
+    high = min(float((number.high - number.value) / share) for number, share in zip(numbers, size, strict=True))
     return Hypothesis(effect, place.joint, place.tendon, level, (), mix, np.array([low]), np.array([high]))
 
 
@@ -147,8 +147,8 @@ def _groups(effect: str, places: Mapping[Place, Sequence[Number]], count: int, f
         whole = (joint, tendon) == (None, None)
         if len(members) < 2 or (not whole and len(members) == len(places)):
             continue
-        own = [each for place in members for each in places[place]]
-        yield _scaled(effect, Place(joint, tendon), own, count, first, EVERYWHERE if whole else SOMEWHERE)
+        numbers = [number for place in members for number in places[place]]
+        yield _scaled(effect, Place(joint, tendon), numbers, count, first, EVERYWHERE if whole else SOMEWHERE)
 
 
 # --- a description with changed numbers ------------------------------------------------------------------------------
@@ -158,9 +158,9 @@ def changed(data: Data, added: Numbers) -> dict[str, Any]:
     """Return the description with `added` [u] added to its unknowns, within their bounds."""
     estimator, paths = estimator_of(data)
     z = estimator.start.copy()
-    rows = [k for k, each in enumerate(estimator.unknowns) if not each.path.startswith("bias.")]
+    rows = [k for k, unknown in enumerate(estimator.unknowns) if not unknown.path.startswith("bias.")]
     z[rows] += added
-    low, high = (np.array([getattr(each, end) for each in estimator.unknowns]) for end in ("lower", "upper"))
+    low, high = (np.array([getattr(unknown, end) for unknown in estimator.unknowns]) for end in ("lower", "upper"))
     z = np.clip(z, low, high)
     before, after = estimator.values(estimator.start), estimator.values(z)
     result = own_copy(data)

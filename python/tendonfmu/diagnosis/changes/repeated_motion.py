@@ -38,33 +38,33 @@ class Repeat:
 
 def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Sequence[int]) -> list[Repeat]:
     """Return the new recordings that follow the motion of a reference recording under the same load."""
-    found = []
+    repeats = []
     for number in now:
         fits = [repeat for other in then if (repeat := _repeat(series, force, other, number)) is not None]
         if fits:
-            found.append(max(fits, key=lambda each: each.end - each.begin))
-    return found
+            repeats.append(max(fits, key=lambda fit: fit.end - fit.begin))
+    return repeats
 
 
 def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> Array:
     """Return values [B, ...] of the new recordings less those of the reference at the same place of the motion."""
-    found = values.copy()
-    for each in repeats:
-        rows, first, share = _places(series, each)
+    less = values.copy()
+    for repeat in repeats:
+        rows, first, share = _places(series, repeat)
         share = share.reshape(-1, *(1,) * (values.ndim - 1)).astype(values.dtype)
-        found[rows] -= values[first] * (1 - share) + values[first + 1] * share
-    return np.asarray(found)
+        less[rows] -= values[first] * (1 - share) + values[first + 1] * share
+    return np.asarray(less)
 
 
 def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
     """Return the blocks that add nothing to the differences [B]."""
-    found = np.isin(series.recording, [each.then for each in repeats])
-    for each in repeats:
-        rows, first, _ = _places(series, each)
-        own = series.recording == each.now
+    flags = np.isin(series.recording, [repeat.then for repeat in repeats])
+    for repeat in repeats:
+        rows, first, _ = _places(series, repeat)
+        own = series.recording == repeat.now
         own[rows[series.used[first] & series.used[first + 1]]] = False
-        found |= own
-    return found
+        flags |= own
+    return flags
 
 
 def _places(series: Series, repeat: Repeat) -> tuple[Rows, Rows, Numbers]:
@@ -84,7 +84,7 @@ def _places(series: Series, repeat: Repeat) -> tuple[Rows, Rows, Numbers]:
 
 def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | None:
     rows = [series.recording == number for number in (then, now)]
-    time, angle = ([values[each] for each in rows] for values in (series.time, series.angle))
+    time, angle = ([values[row] for row in rows] for values in (series.time, series.angle))
     step = series.step
     if min(len(each) for each in time) * step < LEAST or any(np.diff(each).max() > 1.5 * step for each in time):
         return None

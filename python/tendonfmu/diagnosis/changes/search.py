@@ -101,12 +101,12 @@ class ChangeSearch:
         self.numbers = numbers_of(data)
         both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
         self._values = both * self.sides.now[:, None, None]
-        self._told = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
-        learned = replace(self._told, used=self._told.used & ~self.sides.test)
+        self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
+        learned = replace(self._informative, used=self._informative.used & ~self.sides.test)
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
         self.hypotheses = self._hypotheses()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
-        self.tried = len({each.key for each in self.hypotheses})
+        self.tried = len({hypothesis.key for hypothesis in self.hypotheses})
         self.refused: list[Change] = []
         self._selection: Selection | None = None
         self._whole = self.error
@@ -115,22 +115,22 @@ class ChangeSearch:
         count, own = self._columns.values.shape[2], len(self.numbers)
         reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
         missing = [
-            replace(each, mix=np.concatenate([each.mix, np.zeros((own, each.mix.shape[1]))]))
-            for each in hypotheses(self._columns, moment_arms(self.data), reach)
+            replace(hypothesis, mix=np.concatenate([hypothesis.mix, np.zeros((own, hypothesis.mix.shape[1]))]))
+            for hypothesis in hypotheses(self._columns, moment_arms(self.data), reach)
         ]
         present = number_hypotheses(self.numbers, count + own, count)
-        return sorted([*missing, *present], key=lambda each: each.level)
+        return sorted([*missing, *present], key=lambda judged: judged.level)
 
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
         left, series = self.torque_left(), self.series
         then = left[series.used & ~self.sides.now].mean(axis=0)
-        found = np.zeros_like(left)
+        shift = np.zeros_like(left)
         for number in np.unique(series.recording):
             rows = series.recording == number
             own = left[rows & series.used]
-            found[rows] = own.mean(axis=0) - then if len(own) else 0.0
-        return found
+            shift[rows] = own.mean(axis=0) - then if len(own) else 0.0
+        return shift
 
     # --- rounds ---
 
@@ -138,26 +138,26 @@ class ChangeSearch:
         """Take one change after the other until none is material and certain."""
         while len(self.changes) < MOST_CHANGES and len(self.refused) < MOST_REFUSED:
             step(len(self.changes))
-            named = [each.hypothesis.effect for each in self.changes]
-            judged = self._best({each.hypothesis.effect for each in self.refused})
+            named = [change.hypothesis.effect for change in self.changes]
+            judged = self._best({change.hypothesis.effect for change in self.refused})
             if judged is None or self.selection.gain(judged)[0] < least_gain:
                 break
-            found, certain = self._judged(judged)
-            enough = self.matters(found.gain, self.error, judged.hypothesis.effect, named, least_gain)
+            change, certain = self._judged(judged)
+            enough = self.matters(change.gain, self.error, judged.hypothesis.effect, named, least_gain)
             if certain and enough:
-                self._take(found)
+                self._take(change)
             else:
-                self.refused.append(found)
+                self.refused.append(change)
 
     def _best(self, tried: Collection[str]) -> Judged | None:
         """Return the hypothesis that lowers the error most, at the coarsest place that is as good."""
-        ranked = [each for each in self.selection.ranked() if each.hypothesis.effect not in tried]
+        ranked = [judged for judged in self.selection.ranked() if judged.hypothesis.effect not in tried]
         if not ranked:
             return None
         judged = self.selection.refined(ranked[0].hypothesis.effect)
         if judged.hypothesis.members:  # a number that the description has takes precedence over a term that it lacks
-            present = (each for each in ranked if not each.hypothesis.members)
-            same = next((each for each in present if is_alike(each.by_stretch, judged.by_stretch)), None)
+            present = (judged for judged in ranked if not judged.hypothesis.members)
+            same = next((other for other in present if is_alike(other.by_stretch, judged.by_stretch)), None)
             judged = judged if same is None else self.selection.refined(same.hypothesis.effect)
         return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
 
@@ -173,8 +173,8 @@ class ChangeSearch:
         recording = self.series.recording[chosen.folds.rows]
         masks = [(recording == number)[:, None, None] for number in self.new_recordings]
         parts, places, at = [], [], 0
-        for each in options:
-            column = chosen.table[:, :, u:] @ each.hypothesis.mix.astype(np.float32)
+        for option in options:
+            column = chosen.table[:, :, u:] @ option.hypothesis.mix.astype(np.float32)
             own = np.concatenate([column * mask for mask in masks], axis=2)
             parts.append(own)
             places.append(slice(at, at + own.shape[2]))
@@ -182,9 +182,9 @@ class ChangeSearch:
         every = chosen.with_own(np.concatenate(parts, axis=2))
         grams = Grams(every, self._target_now(), self._scales(self.changes), counted)
         errors = []
-        for each, place in zip(options, places, strict=True):
+        for option, place in zip(options, places, strict=True):
             mix = np.eye(at)[:, place]
-            low, high = (np.tile(end, len(masks)) for end in (each.hypothesis.low, each.hypothesis.high))
+            low, high = (np.tile(end, len(masks)) for end in (option.hypothesis.low, option.hypothesis.high))
             errors.append(grams.error(mix, low, high)[0])
         return options[int(np.argmin(errors))]
 
@@ -194,10 +194,10 @@ class ChangeSearch:
         _, by_fold = grams.error(own.mix, own.low, own.high)
         gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
         p_value, covariance = self.certainty_of(grams, own.mix, judged.magnitudes, by_fold)
-        others = [each for each in self.selection.ranked() if each.hypothesis.effect != own.effect]
-        alike = tuple(each.hypothesis for each in others if is_alike(each.by_stretch, judged.by_stretch))
-        found = Change(own, judged.magnitudes, covariance, gain, error, p_value, alike)
-        return found, gain > CERTAIN * error and p_value < SIGNIFICANCE
+        others = [judged for judged in self.selection.ranked() if judged.hypothesis.effect != own.effect]
+        alike = tuple(other.hypothesis for other in others if is_alike(other.by_stretch, judged.by_stretch))
+        change = Change(own, judged.magnitudes, covariance, gain, error, p_value, alike)
+        return change, gain > CERTAIN * error and p_value < SIGNIFICANCE
 
     @property
     def error(self) -> float:
@@ -222,9 +222,9 @@ class ChangeSearch:
         """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
-            own = [each for each in self.hypotheses if each.key == key]
+            own = [hypothesis for hypothesis in self.hypotheses if hypothesis.key == key]
             if own:
-                best = min(own, key=lambda each: grams.error(each.mix, each.low, each.high)[0])
+                best = min(own, key=lambda hypothesis: grams.error(hypothesis.mix, hypothesis.low, hypothesis.high)[0])
                 nothing = np.zeros(best.mix.shape[1])
                 self.changes.append(Change(best, nothing, np.diag(nothing), 0.0, np.inf, 1.0))
                 self._settle()
@@ -241,11 +241,11 @@ class ChangeSearch:
 
     def moved_on(self, grams: Grams) -> list[Change]:
         """Return the changes with updated magnitudes, from a solution in which their columns are shared."""
-        sizes = [len(each.magnitudes) for each in self.changes]
+        sizes = [len(change.magnitudes) for change in self.changes]
         steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
         return [
-            replace(each, magnitudes=np.clip(each.magnitudes + own, each.hypothesis.low, each.hypothesis.high))
-            for each, own in zip(self.changes, steps, strict=True)
+            replace(change, magnitudes=np.clip(change.magnitudes + own, change.hypothesis.low, change.hypothesis.high))
+            for change, own in zip(self.changes, steps, strict=True)
         ]
 
     def keep(self, changes: Sequence[Change]) -> None:
@@ -264,8 +264,8 @@ class ChangeSearch:
         return self._selection
 
     def _look(self) -> Selection:
-        known = {each.hypothesis.effect for each in self.changes}
-        left = [each for each in self.hypotheses if each.effect not in known]
+        known = {change.hypothesis.effect for change in self.changes}
+        left = [hypothesis for hypothesis in self.hypotheses if hypothesis.effect not in known]
         products, judged = self._products(None)
         chosen = products.chosen(self._together(self.changes), None)
         return Selection(Grams(chosen, self._target_now(), self._scales(self.changes), judged), left, self._least)
@@ -279,13 +279,13 @@ class ChangeSearch:
     def left(self) -> Numbers:
         """Return what is left with all changes and without what both share, N·m [B, n]; 0 where nothing is used."""
         grams = self.selection.grams
-        found = np.zeros_like(self.series.target)
-        found[grams.folds.rows] = grams.residual()
-        return found
+        left = np.zeros_like(self.series.target)
+        left[grams.folds.rows] = grams.residual()
+        return left
 
     def grams(self, without: int | None = None, unseen: Flags | None = None) -> Grams:
         """Return the products with the changes' own columns among the shared ones."""
-        kept = [each for k, each in enumerate(self.changes) if k != without]
+        kept = [change for k, change in enumerate(self.changes) if k != without]
         used = np.zeros(0, dtype=np.intp)
         target = self._target_now()
         if without is not None:
@@ -299,8 +299,11 @@ class ChangeSearch:
         """Return the products with one change in one new recording as the only candidate."""
         change = self.changes[number]
         column = (self._values @ self._mixed(change))[:, :, None]
-        of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
-        kept = [each for k, each in enumerate(self.changes) if k != number]
+        of = {
+            new_recording: column * (self.series.recording == new_recording)[:, None, None]
+            for new_recording in self.new_recordings
+        }
+        kept = [change for k, change in enumerate(self.changes) if k != number]
         shared = [self._values @ self._together(kept), *(of[each] for each in of if each != only)]
         nominal = np.concatenate([self._shared, *shared], axis=2)
         products = Products(self.folds, nominal, of[only], self._splines)
@@ -313,29 +316,29 @@ class ChangeSearch:
     def _together(self, changes: Sequence[Change]) -> Numbers:
         """Return all columns of the changes [c, k]."""
         empty = np.zeros((self._values.shape[2], 0))
-        return np.concatenate([empty, *(each.hypothesis.mix for each in changes)], axis=1)
+        return np.concatenate([empty, *(change.hypothesis.mix for change in changes)], axis=1)
 
     def _scales(self, changes: Sequence[Change]) -> Numbers:
         """Return the scales of the shared columns; columns of changes are free."""
-        free = sum(each.hypothesis.mix.shape[1] for each in changes)
+        free = sum(change.hypothesis.mix.shape[1] for change in changes)
         return np.concatenate([self._scale, np.full(free, np.nan)])
 
     def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
         """Return the products, computed once for every way of judging."""
         key = b"" if unseen is None else unseen.tobytes()
         if key not in self._known:
-            folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._told, unseen)
+            folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._informative, unseen)
             self._known[key] = (Products(folds, self._shared, self._values, self._splines), judged)
         return self._known[key]
 
     def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
         """Return the terms that changes add to the description of now."""
-        return [part for each in changes for part in accepted_of(each.hypothesis, each.magnitudes)]
+        return [part for change in changes for part in accepted_of(change.hypothesis, change.magnitudes)]
 
     def added(self, changes: Sequence[Change]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
         first = self._columns.values.shape[2]
-        parts = [np.zeros(len(self.numbers)), *(self._mixed(each)[first:] for each in changes)]
+        parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
 
     @staticmethod
@@ -349,18 +352,18 @@ class ChangeSearch:
 
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
-        found = np.zeros_like(self.series.target)
-        segments = tuple(each for each in self._grid.segments if each.recording in self._new)
-        rows = np.concatenate([np.arange(each.blocks.start, each.blocks.stop) for each in segments])
+        moved = np.zeros_like(self.series.target)
+        segments = tuple(segment for segment in self._grid.segments if segment.recording in self._new)
+        rows = np.concatenate([np.arange(segment.blocks.start, segment.blocks.stop) for segment in segments])
         part = replace(self._grid, segments=segments)
         after, before = (block_prediction(each, self._recordings, part) for each in (self.now_data(), self.data))
-        found[rows] = after - before
-        return found
+        moved[rows] = after - before
+        return moved
 
     @property
-    def told(self) -> Flags:
+    def informative(self) -> Flags:
         """Blocks that something is learned from [B]."""
-        return self._told.used
+        return self._informative.used
 
     @property
     def repeated(self) -> int:
@@ -380,9 +383,9 @@ class ChangeSearch:
     @property
     def stretches_now(self) -> Flags:
         """Whether each stretch belongs to the new recordings [stretches]."""
-        found = np.zeros(self.folds.stretches, dtype=bool)
-        found[self.folds.stretch[self.judged[self.folds.fold]]] = True
-        return found
+        flags = np.zeros(self.folds.stretches, dtype=bool)
+        flags[self.folds.stretch[self.judged[self.folds.fold]]] = True
+        return flags
 
     def column(self, number: int) -> Numbers:
         """Return the columns of a change, also in the reference [B, n, d]."""
@@ -397,7 +400,7 @@ class ChangeSearch:
         inverse = np.linalg.pinv(energy, hermitian=True)
         score = energy @ magnitudes
         spreads = [each.T @ each for each in (scores, _in_twos(scores))]
-        squares = [float(score @ np.linalg.pinv(each, hermitian=True) @ score) for each in spreads]
+        squares = [float(score @ np.linalg.pinv(spread, hermitian=True) @ score) for spread in spreads]
         least = int(np.argmin(squares))
         stretches, size = scores.shape
         dof = stretches - 1 - size
@@ -420,7 +423,7 @@ def folds_of_sides(series: Series, is_now: Flags) -> tuple[Folds, Flags]:
 def folds_of_unseen(series: Series, unseen: Flags) -> tuple[Folds, Flags]:
     """Return unseen blocks as one part and all others as the other, and that only the first is judged [2]."""
     both = [make_folds(replace(series, used=series.used & side)) for side in (unseen, ~unseen)]
-    one, other = (replace(each, fold=np.zeros_like(each.fold), folds=1) for each in both)
+    one, other = (replace(folds, fold=np.zeros_like(folds.fold), folds=1) for folds in both)
     return _joined(one, other), np.array([True, False])
 
 

@@ -36,10 +36,10 @@ class Sized:
 def sized(search: ChangeSearch, changes: Sequence[Change], number: int) -> Sized:
     """Return the size of one of the changes, estimated together with all others."""
     now = search.now_data(changes)
-    units = {each.path: each.unit for each in native.Instance.from_description(now).parameters()}
+    units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(now).parameters()}
     if changes[number].hypothesis.members:
         return _new_term(search, changes, number, now, units)
-    then = search.now_data([each for k, each in enumerate(changes) if k != number])
+    then = search.now_data([change for k, change in enumerate(changes) if k != number])
     return _other_number(search, changes[number], then, now, units)
 
 
@@ -72,7 +72,7 @@ def _new_term(
         )
         for each, of in zip(own, paths, strict=False)
     ]
-    main = _main([path for each in places for path in each.parameters], now, change)
+    main = _main([path for place in places for path in place.parameters], now, change)
     unit = units.get(main[0], "1") if main else "1"
     value = math.hypot(*(data_number(now, path) for path in main)) if len(main) > 1 else data_number(now, main[0])
     nothing = Interval(0.0, 0.0, 0.0)
@@ -107,7 +107,7 @@ def _other_number(search: ChangeSearch, change: Change, then: Data, now: Data, u
         own = by_place.setdefault((number.place.joint, number.place.tendon), {})
         own[number.path] = (data_number(now, number.path), units[number.path])
     places = tuple(FoundPlace(*place, numbers) for place, numbers in by_place.items())
-    paths = [path for each in places for path in each.parameters]
+    paths = [path for place in places for path in place.parameters]
     main = max(paths, key=lambda path: abs(data_number(now, path) - data_number(then, path)))
     before, after = data_number(then, main), data_number(now, main)
     name, unit = main.rsplit(".", 1)[-1], units[main]
@@ -115,8 +115,8 @@ def _other_number(search: ChangeSearch, change: Change, then: Data, now: Data, u
         before, after = _difference(then, main), _difference(now, main)
         name = f"{name}, positive less negative"
     error = abs(after - before) * _relative_error(change)
-    told = abs(before) >= LEAST_OF_NOW * abs(after) and change.hypothesis.effect != "asymmetric_friction"
-    share = (after - before) / before if told and before else math.nan
+    has_share = abs(before) >= LEAST_OF_NOW * abs(after) and change.hypothesis.effect != "asymmetric_friction"
+    share = (after - before) / before if has_share and before else math.nan
     size = ChangedSize(name, unit, _interval(before, 0.0), _interval(after, error), _interval(after - before, error))
     more = f"{100 * share:+.0f}{NBSP}%: ".replace("-", "−") if math.isfinite(share) else ""
     where = f", at the largest of {len(places)} places" if len(places) > 1 else ""

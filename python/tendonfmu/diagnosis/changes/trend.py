@@ -25,7 +25,7 @@ def sizes_by_recording(
 
 def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, float]]:
     """Return (value, standard error) for each new recording: which share of the change is in it, 1 for all of it."""
-    found = []
+    shares = []
     low, high = _bounds(search.changes[number])
     for recording in search.new_recordings:
         grams = search.grams_of_recording(number, recording)
@@ -33,8 +33,8 @@ def shares_by_recording(search: ChangeSearch, number: int) -> list[tuple[float, 
         _, by_fold = grams.error(mix, low, high)
         share = grams.magnitudes(mix, low, high)
         _, covariance = search.certainty_of(grams, mix, share, by_fold)
-        found.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
-    return found
+        shares.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
+    return shares
 
 
 def _bounds(change: Change) -> tuple[Numbers, Numbers]:
@@ -53,16 +53,16 @@ def _in_unit(share: tuple[float, float], change: Change, size: ChangedSize) -> I
 
 def slope(times: Numbers, sizes: Sequence[Interval]) -> Interval:
     """Return the change per unit of time, by weighted least squares."""
-    value = np.array([each.value for each in sizes])
-    error = np.maximum(np.array([(each.high - each.low) / 3.92 for each in sizes]), 1e-300)
+    value = np.array([size.value for size in sizes])
+    error = np.maximum(np.array([(size.high - size.low) / 3.92 for size in sizes]), 1e-300)
     weight = 1.0 / error**2
     centre = float(weight @ times / weight.sum())
     power = float(weight @ (times - centre) ** 2)
     if power <= 0.0:
         return Interval(0.0, -np.inf, np.inf)
-    found = float(weight @ ((times - centre) * value) / power)
+    rise = float(weight @ ((times - centre) * value) / power)
     level = float(weight @ value / weight.sum())
-    left = value - level - found * (times - centre)
+    left = value - level - rise * (times - centre)
     scatter = float(weight @ left**2) / max(len(times) - 2, 1)
     half = 1.96 * float(np.sqrt(max(scatter, 1.0) / power))
-    return Interval(found, found - half, found + half)
+    return Interval(rise, rise - half, rise + half)

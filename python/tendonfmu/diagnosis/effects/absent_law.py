@@ -30,11 +30,11 @@ def absent_law(data: Data, path: str, shape: Mapping[str, float]) -> Variant:
 def law_shares(data: Data, path: str) -> dict[str, float]:
     """Return the direction in which all magnitudes of the law at a path grow by the same share."""
     law = get_number(data, path)
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for side in ("",) if law.get("positive") is None else ("positive", "negative"):
         at = f"{path}.{side}" if side else path
         coulomb, drop, viscous = magnitudes_of(law[side] if side else law)
-        found[f"{at}.coulomb"] = coulomb
-        found |= {f"{at}.static": drop} if drop else {}
-        found |= {f"{at}.viscous": viscous} if viscous else {}
-    return found
+        shares[f"{at}.coulomb"] = coulomb
+        shares |= {f"{at}.static": drop} if drop else {}
+        shares |= {f"{at}.viscous": viscous} if viscous else {}
+    return shares

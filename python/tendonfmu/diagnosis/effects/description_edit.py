@@ -33,7 +33,7 @@ def apply_edits(
 ) -> dict[str, Any]:
     """Return a copy with the edits made, rows added to `extensions` and Stribeck velocities set."""
     result = own_copy(data)
-    for edit in sorted(edits, key=lambda each: _ORDER.index(each.kind)):
+    for edit in sorted(edits, key=lambda edit: _ORDER.index(edit.kind)):
         _MAKE[edit.kind](result, edit)
     for path, velocity in settings.items():
         for side in sides_at(result, path):
@@ -90,10 +90,10 @@ def laws_of(entry: Any) -> list[dict[str, Any]]:
 
 def sides_at(data: Data, path: str) -> list[dict[str, Any]]:
     """Return all sides of all laws of the effect at a path."""
-    found = []
+    sides = []
     for law in laws_of(get_number(data, path)):
-        found += [law] if law.get("positive") is None else [law["positive"], law["negative"]]
-    return found
+        sides += [law] if law.get("positive") is None else [law["positive"], law["negative"]]
+    return sides
 
 
 def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -115,15 +115,15 @@ def finer_paths(data: Data, path: str) -> list[str]:
     entry = get_number(data, place.effect)
     laws = entry.get("laws")
     numbers = [place.point] if place.point else [None] if laws is None else range(1, len(laws) + 1)
-    found = []
+    paths = []
     for k in numbers:
         at = place.effect if k is None else f"{place.effect}.laws[{k}]"
         law = entry if k is None else laws[k - 1]
         sides = [place.side]
         if law.get("positive") is not None and place.side is None:
             sides = ["positive", "negative"]
-        found += [f"{at}.{place.number}" if side is None else f"{at}.{side}.{place.number}" for side in sides]
-    return found
+        paths += [f"{at}.{place.number}" if side is None else f"{at}.{side}.{place.number}" for side in sides]
+    return paths
 
 
 def is_law_number(path: str) -> bool:

@@ -22,8 +22,8 @@ _ANGLES = ("angle_low", "angle_middle", "angle_high")
 
 def _edges(data: Data) -> dict[Place, bool]:
     """Return the present edges and whether they have working points."""
-    found = (effect for effect in effects(data) if effect.kind == "edge_friction")
-    return {Place(effect.joint, effect.tendon): bool(effect.angles) for effect in found}
+    edges = (effect for effect in effects(data) if effect.kind == "edge_friction")
+    return {Place(effect.joint, effect.tendon): bool(effect.angles) for effect in edges}
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:

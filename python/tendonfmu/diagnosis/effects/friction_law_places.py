@@ -79,12 +79,12 @@ def all_tendons(data: Data) -> list[Place]:
 
 def rubbing_joints(data: Data) -> list[Place]:
     """Return the joints with friction of their own."""
-    return [Place(joint=j) for j in sorted({each.joint for each in effects(data) if not each.tendon})]
+    return [Place(joint=j) for j in sorted({effect.joint for effect in effects(data) if not effect.tendon})]
 
 
 def rubbing_tendons(data: Data) -> list[Place]:
     """Return the tendons with friction along them."""
-    return [Place(tendon=i) for i in sorted({each.tendon for each in effects(data) if each.tendon})]
+    return [Place(tendon=i) for i in sorted({effect.tendon for effect in effects(data) if effect.tendon})]
 
 
 def thresholds(data: Data) -> tuple[float, float]:

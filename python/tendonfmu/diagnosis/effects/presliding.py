@@ -46,7 +46,7 @@ def _threshold(data: Data, place: Place) -> float:
 def usual_time(data: Data, span: Span) -> float:
     """Return the travel between reversals over the threshold of motion, s: the median over the places with friction."""
     times = [_travel(place, span) / max(_threshold(data, place), _SLOWEST) for place in _single_places(data)]
-    return float(np.median([each for each in times if each > 0] or [0.0]))
+    return float(np.median([time for time in times if time > 0] or [0.0]))
 
 
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:

@@ -15,7 +15,7 @@ _PULLEY = {"pulley": 1.0}
 
 
 def _places(data: Data, kinematics: int) -> list[Place]:
-    present = {(each.joint, each.tendon) for each in effects(data) if each.kind == "pulley_friction"}
+    present = {(effect.joint, effect.tendon) for effect in effects(data) if effect.kind == "pulley_friction"}
     reached = list(passes(data))
     return [
         place

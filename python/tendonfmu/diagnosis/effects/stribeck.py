@@ -65,8 +65,8 @@ def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
         velocity = {"stribeck_velocity": float(shape["stribeck_velocity"])}
         return row_variant(data, NAME, place, shape, {"amplitude": -1}, velocity, _LEAST_AMPLITUDE)
     path = law_path(place, shape)
-    effect = next(each for each in laws_at(data, place) if each.path == path)
-    coulomb = max(each for each, _, _ in all_sides(data, effect)) or 1e-6
+    effect = next(law for law in laws_at(data, place) if law.path == path)
+    coulomb = max(side for side, _, _ in all_sides(data, effect)) or 1e-6
     numbers = {at: 1.0 for at, _ in law_columns(data, path, ["static"])}
     settings = {path: float(shape["stribeck_velocity"])}
     return Variant(data, shape, (Column(numbers, 1, _EXPECTED * coulomb),), settings=settings)

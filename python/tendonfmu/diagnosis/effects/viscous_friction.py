@@ -29,8 +29,8 @@ def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 def _variant(data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
     path = law_path(place, shape)
-    effect = next(each for each in laws_at(data, place) if each.path == path)
-    coulomb = max(each for each, _, _ in all_sides(data, effect)) or 1e-6
+    effect = next(law for law in laws_at(data, place) if law.path == path)
+    coulomb = max(side for side, _, _ in all_sides(data, effect)) or 1e-6
     numbers: dict[str, Any] = {at: 1.0 for at, _ in law_columns(data, path, ["viscous"])}
     expected = _EXPECTED * coulomb / (100 * (velocity_threshold(data, effect) or 1e-3))
     return Variant(data, shape, (Column(numbers, 1, expected),))

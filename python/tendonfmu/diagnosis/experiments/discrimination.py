@@ -75,11 +75,11 @@ def discriminating_motion(
         said = report.get("next_experiment") or "nothing is left to distinguish"
         raise InputError(f"{folder / REPORT}: no further experiment to plan: {said}")
     try:
-        found = performed_of(data, motion, rate)
+        performed = performed_of(data, motion, rate)
     except InputError as wrong:
         raise InputError(f"{folder / REPORT}: {wrong}") from None
-    _refuse_beyond(folder / REPORT, found[1], limits)
-    return Discrimination(str(experiment.get("sentence") or report.get("next_experiment") or ""), *found)
+    _refuse_beyond(folder / REPORT, performed[1], limits)
+    return Discrimination(str(experiment.get("sentence") or report.get("next_experiment") or ""), *performed)
 
 
 def performed_of(data: Mapping[str, Any], motion: Mapping[str, Any], rate: float = RATE) -> tuple[Entry, Performed]:
@@ -95,9 +95,9 @@ def _read_report(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: {failed.strerror}; expected the folder of a `tendonfmu diagnose`") from None
     except ValueError as wrong:
         raise InputError(f"{path}: not JSON ({wrong}); expected a report of `tendonfmu diagnose`") from None
-    found = report.get("format") if isinstance(report, dict) else None
-    if found != FORMAT:
-        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{FORMAT}"')
+    format_ = report.get("format") if isinstance(report, dict) else None
+    if format_ != FORMAT:
+        raise InputError(f'{path}: format = {json.dumps(format_)}; expected "{FORMAT}"')
     return dict(report)
 
 

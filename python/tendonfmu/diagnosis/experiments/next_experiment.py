@@ -68,7 +68,7 @@ class Answer:
     share: float  # share of the cause's variance that survives bias and refit, in all recordings together
 
     @property
-    def tells(self) -> bool:
+    def separates(self) -> bool:
         """Whether the entry is worth recording."""
         # The size of an effect that was never seen is unknown.
         if self.question.rival is None:
@@ -92,8 +92,8 @@ class Experiments:
 
     def motion(self, number: int) -> dict[str, Any]:
         """Return what answers one question in the form of `Experiment.motion`; empty if no entry of the menu does."""
-        told = bool(self.answers) and self.answers[number].tells
-        return {**self.answers[number].entry.as_json(), "seed": self.seed} if told else {}
+        separating = bool(self.answers) and self.answers[number].separates
+        return {**self.answers[number].entry.as_json(), "seed": self.seed} if separating else {}
 
     def sentence(self, number: int) -> str:
         """Return the experiment for one question in plain words."""
@@ -124,7 +124,7 @@ def plan_experiments(
     scores = []
     # effects that only change over time show in long recordings, which take long to predict
     slow = any(
-        each is not None and each.candidate.coordinate == "time" for q in questions for each in (q.cause, q.rival)
+        cause is not None and cause.candidate.coordinate == "time" for q in questions for cause in (q.cause, q.rival)
     )
     first = [*plain, *varied, *([long] if slow else [])]
     for k, entry in enumerate(first):
@@ -133,12 +133,12 @@ def plan_experiments(
             progress(k + 1, len(first))
     if not scores:
         return Experiments((), Experiment("No available motion is possible with this finger"))
-    open_ = [q for q in range(len(questions)) if max(found[q].distance for found in scores) < VISIBLE]
+    open_ = [q for q in range(len(questions)) if max(answers_of[q].distance for answers_of in scores) < VISIBLE]
     if open_:
-        simple = [found for found in scores if not (found[0].entry.tension or found[0].entry.load)]
-        motion = max(simple or scores, key=lambda found: sum(found[q].distance for q in open_))[0].entry
+        simple = [answers_of for answers_of in scores if not (answers_of[0].entry.tension or answers_of[0].entry.load)]
+        motion = max(simple or scores, key=lambda answers_of: sum(answers_of[q].distance for q in open_))[0].entry
         scores += lab.answers_of(combined(data, motion, recorded))
-    answers = tuple(_best([found[q] for found in scores]) for q in range(len(questions)))
+    answers = tuple(_best([answers_of[q] for answers_of in scores]) for q in range(len(questions)))
     return Experiments(answers, _first_of_all(answers, scores, seed), seed)
 
 
@@ -178,20 +178,20 @@ class _Laboratory:
         given = [settings.noise] * len(data["joints"]) if noise is None else list(noise)
         self.noise = np.maximum(np.array(given, dtype=float), 1e-9)
         self.constant_bias = settings.drift == 0
-        self.candidates = [_restricted(each, data, span) for each in _asked(questions)]
+        self.candidates = [_restricted(candidate, data, span) for candidate in _asked(questions)]
         self.columns: CandidateColumns | None = None
         self.old = sum(
-            (self._look(_shortened(each)) for each in recordings[1:3]), self._look(_shortened(recordings[0]))
+            (self._look(_shortened(recording)) for recording in recordings[1:3]), self._look(_shortened(recordings[0]))
         )
 
     def answers_of(self, entries: Iterable[Entry]) -> list[list[Answer]]:
         """Return the answers to all questions for each entry that this finger can make."""
-        found = []
+        answers = []
         for entry in entries:
             # skip entries with too short a stroke, a slack tendon, or forces outside the valid range
             with suppress(InputError, EstimationError, NativeError):
-                found.append(self.answers(entry))
-        return found
+                answers.append(self.answers(entry))
+        return answers
 
     def answers(self, entry: Entry) -> list[Answer]:
         """Return the answer to each question; raises InputError if the motion is not possible."""
@@ -203,9 +203,9 @@ class _Laboratory:
 
     def _look(self, recording: FitRecording) -> _Seen:
         blocks = regular_blocks([recording.time], [recording.parts], _BLOCK)
-        found = candidate_columns(self.data, [recording], blocks, candidates=self.candidates, span=self.span)
-        self.columns = found
-        values = np.concatenate([found.nominal, found.values], axis=2).astype(np.float64) / self.noise[:, None]
+        columns = candidate_columns(self.data, [recording], blocks, candidates=self.candidates, span=self.span)
+        self.columns = columns
+        values = np.concatenate([columns.nominal, columns.values], axis=2).astype(np.float64) / self.noise[:, None]
         time = np.bincount(blocks.of[0], weights=recording.time) / blocks.sizes()
         rest = _without_bias(time, values, self.constant_bias)
         flat, all_ = (each.reshape(-1, each.shape[2]) for each in (rest, values - values.mean(axis=0)))
@@ -249,9 +249,9 @@ class _Laboratory:
         assert self.columns is not None
         shape = self.columns.proposals[self._place(cause)].shapes[0]
         given = list(cause.magnitudes) if len(cause.magnitudes) else list(shape.expected)
-        found = np.zeros(self._offset + len(self.columns.names))
-        found[self._offset + shape.columns.start : self._offset + shape.columns.stop] = given
-        return found
+        direction = np.zeros(self._offset + len(self.columns.names))
+        direction[self._offset + shape.columns.start : self._offset + shape.columns.stop] = given
+        return direction
 
     def _all_columns(self, cause: Accepted) -> list[int]:
         assert self.columns is not None
@@ -297,12 +297,12 @@ def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
 
 def _asked(questions: Sequence[Question]) -> list[Accepted]:
     """Return every candidate at a place once, with the shape of its first mention."""
-    found: dict[tuple[str, Any], Accepted] = {}
+    causes: dict[tuple[str, Any], Accepted] = {}
     for question in questions:
-        for each in (question.cause, question.rival):
-            if each is not None:
-                found.setdefault((each.candidate.name, each.place), each)
-    return list(found.values())
+        for cause in (question.cause, question.rival):
+            if cause is not None:
+                causes.setdefault((cause.candidate.name, cause.place), cause)
+    return list(causes.values())
 
 
 def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
@@ -318,17 +318,19 @@ def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
 def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
     """Return the mean known load on the joints, N·m [n]."""
     arms = moment_arms(data)
-    loads = [(each.recording.groups["tendon_force"] @ arms - each.target).mean(axis=0) for each in recordings]
+    loads = [
+        (recording.recording.groups["tendon_force"] @ arms - recording.target).mean(axis=0) for recording in recordings
+    ]
     return (
         np.asarray(np.mean(loads, axis=0))
-        if any(each.external is not None for each in recordings)
+        if any(recording.external is not None for recording in recordings)
         else np.zeros(arms.shape[1])
     )
 
 
 def _shortened(recording: FitRecording) -> FitRecording:
     """Return the beginning of its longest part, thinned to the sample rate that a predicted recording needs."""
-    part = max(recording.parts, key=lambda each: recording.time[each.stop - 1] - recording.time[each.start])
+    part = max(recording.parts, key=lambda part: recording.time[part.stop - 1] - recording.time[part.start])
     time = recording.time[part]
     step = float(np.median(np.diff(time)))
     every = max(1, int(1 / (2 * _RATE * step)))
@@ -353,7 +355,7 @@ def _shortened(recording: FitRecording) -> FitRecording:
 
 def _best(answers: Sequence[Answer]) -> Answer:
     """Return the simplest entry that shows nearly as much as the best one; the simplest entries come first."""
-    able = [answer for answer in answers if answer.tells] or answers
+    able = [answer for answer in answers if answer.separates] or answers
     largest = max(answer.distance for answer in able)
     return next(answer for answer in able if answer.distance >= _SIMPLER * largest)
 
@@ -361,35 +363,35 @@ def _best(answers: Sequence[Answer]) -> Answer:
 def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
     """Return the entry that distinguishes most pairs of causes, then shows most effects, and is simplest."""
 
-    def told_by(found: Sequence[Answer]) -> tuple[int, int]:
-        told = [answer for answer in found if answer.tells]
-        return sum(answer.question.rival is not None for answer in told), len(told)
+    def separated_by(answers_of: Sequence[Answer]) -> tuple[int, int]:
+        separating = [answer for answer in answers_of if answer.separates]
+        return sum(answer.question.rival is not None for answer in separating), len(separating)
 
-    simple = [found for found in scores if not (found[0].entry.tension and found[0].entry.load)]
-    chosen = max(simple or scores, key=told_by)
-    pairs, count = told_by(chosen)
-    for found in scores:
-        if told_by(found)[0] > pairs or (not count and told_by(found)[1]):
-            chosen, (pairs, count) = found, told_by(found)
-    told = [answer for answer in chosen if answer.tells]
-    if not told:
+    simple = [answers_of for answers_of in scores if not (answers_of[0].entry.tension and answers_of[0].entry.load)]
+    chosen = max(simple or scores, key=separated_by)
+    pairs, count = separated_by(chosen)
+    for answers_of in scores:
+        if separated_by(answers_of)[0] > pairs or (not count and separated_by(answers_of)[1]):
+            chosen, (pairs, count) = answers_of, separated_by(answers_of)
+    separating = [answer for answer in chosen if answer.separates]
+    if not separating:
         return Experiment(_sentence([max(answers, key=lambda answer: answer.distance)]))
     return Experiment(
-        sentence=_sentence(told),
+        sentence=_sentence(separating),
         separates=tuple(
-            (answer.where, _where(answer.question.rival)) for answer in told if answer.question.rival is not None
+            (answer.where, _where(answer.question.rival)) for answer in separating if answer.question.rival is not None
         ),
-        makes_visible=tuple(answer.where for answer in told if answer.question.rival is None),
-        distance=min(answer.distance for answer in told),
+        makes_visible=tuple(answer.where for answer in separating if answer.question.rival is None),
+        distance=min(answer.distance for answer in separating),
         motion={**chosen[0].entry.as_json(), "seed": seed},
     )
 
 
-def _sentence(told: Sequence[Answer]) -> str:
+def _sentence(separating: Sequence[Answer]) -> str:
     """Put the first of the answers of one entry into words."""
-    first = told[0]
+    first = separating[0]
     cause, rival = _described(first.question.cause), first.question.rival
-    if not first.tells:
+    if not first.separates:
         what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
         return (
             f"No available experiment can distinguish {what}: at best {_times(first.distance)} the noise "
@@ -397,7 +399,7 @@ def _sentence(told: Sequence[Answer]) -> str:
         )
     what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
     apart = "the predictions then differ by" if rival is not None else "an ordinary effect then leaves"
-    more = len(told) - 1
+    more = len(separating) - 1
     others = f". It also answers {counted(more, 'more such question')}" if more else ""
     return (
         f"Record {first.entry.words}: it distinguishes {what}; {apart} {_times(first.distance)} the noise, now "

@@ -90,5 +90,5 @@ def _read(file: Path) -> NDArray[np.float64]:
         raise InputError(f"{file}: line {numbered[k][0]}, column {column + 1}: expected a finite number")
     if (np.diff(rows[:, 0]) <= 0).any():
         k = int(np.flatnonzero(np.diff(rows[:, 0]) <= 0)[0]) + 1
-        raise InputError(f"{file}: line {numbered[k][0]}, column 1: time does not increase")
+        raise InputError(f"{file}: line {numbered[k][0]}, column 1: expected increasing times")
     return rows
