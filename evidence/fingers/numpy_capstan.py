@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foreign_case import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
 
 ARMS = np.array([[0.0088, 0.0], [-0.0090, 0.0], [-0.0070, 0.0080], [0.0073, -0.0077]])  # m
 STIFFNESS = np.array([3900.0, 4500.0, 3400.0, 3700.0])  # N/m

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from foreign_case import (
+from evidence.fingers.foreign import (
     TEST_SECONDS,
     TRAIN_SECONDS,
     Array,
@@ -29,8 +29,8 @@ from foreign_case import (
     rms,
     rough,
 )
-from mujoco_model import Physics
-from mujoco_run import Trace, random_motion, run
+from evidence.fingers.mujoco_model import Physics
+from evidence.fingers.mujoco_run import Trace, random_motion, run
 
 FAMILY = "mujoco"
 DELAY = 0.02  # s

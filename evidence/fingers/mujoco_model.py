@@ -14,7 +14,7 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from foreign_case import Array
+from evidence.fingers.foreign import Array
 
 LINK = 0.04  # m, length of a link
 REACH = 0.012  # m, from a joint's axis to the sites before and after it

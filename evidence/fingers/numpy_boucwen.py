@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foreign_case import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
 
 ARMS = np.array([[0.0092, 0.0], [-0.0092, 0.0], [-0.0075, 0.0075], [0.0075, -0.0075]])  # m
 STIFFNESS = 3800.0  # N/m

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from foreign_case import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
 
 R1, R2, R3, R4 = (0.0085, 0.0), (-0.0091, 0.0), (-0.0066, 0.0083), (0.007, -0.0079)  # m
 ARMS = np.array([R1, R2, R3, R4])

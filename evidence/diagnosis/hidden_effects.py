@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from friction_physics import Effect, Finger, Motion, last_true
-from hidden_sensors import SENSORS
-from hidden_unknown import UNKNOWN
-from matched_rig import Description, Hand, Hidden, Unreachable, record
-from strength import look, residual, surviving
+from evidence.fingers.matched_physics import Effect, Finger, Motion, last_true
+from evidence.diagnosis.hidden_sensors import SENSORS
+from evidence.fingers.matched_rig import Description, Hand, Hidden, Unreachable, record
+from evidence.fingers.matched_strength import look, residual, surviving
 
 Array = NDArray[Any]
 Random = np.random.Generator
@@ -181,49 +181,47 @@ def held_sign(velocity: Array, threshold: float) -> Array:
     return np.where(last >= 0, np.sign(velocity[last]), 0.0)
 
 
+def at_joints(motion: Motion, joints: int | slice, torque: Array) -> Array:
+    """[N, n] a torque at some joints."""
+    torques = np.zeros_like(motion.angle)
+    torques[:, joints] = torque
+    return torques
+
+
 def hardening(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
-    found = np.zeros_like(motion.angle)
-    found[:, at["joint"]] = size * (motion.angle[:, at["joint"]] - finger.rest[at["joint"]]) ** 3
-    return found
+    j = at["joint"]
+    return at_joints(motion, j, size * (motion.angle[:, j] - finger.rest[j]) ** 3)
 
 
 def weight(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
     """A link whose pitch is the sum of the angles before it; the base stands at a random tilt."""
-    tilt = np.pi * draw[0]
-    pitch = motion.angle[:, : at["joint"] + 1].sum(axis=1)
-    found = np.zeros_like(motion.angle)
-    found[:, : at["joint"] + 1] = (size * np.sin(pitch + tilt))[:, None]
-    return found
+    before = slice(at["joint"] + 1)
+    pitch = motion.angle[:, before].sum(axis=1)
+    return at_joints(motion, before, (size * np.sin(pitch + np.pi * draw[0]))[:, None])
 
 
 def accelerated(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
-    found = np.zeros_like(motion.angle)
-    found[1:, at["joint"]] = size * np.diff(motion.velocity[:, at["joint"]]) / np.diff(motion.time)
-    return found
+    torque = np.zeros(len(motion.time))
+    torque[1:] = size * np.diff(motion.velocity[:, at["joint"]]) / np.diff(motion.time)
+    return at_joints(motion, at["joint"], torque)
 
 
 def coupling(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
     j = at["joint"]
     twist = (motion.angle[:, j] - finger.rest[j]) - (motion.angle[:, j + 1] - finger.rest[j + 1])
-    found = np.zeros_like(motion.angle)
-    found[:, j], found[:, j + 1] = size * twist, -size * twist
-    return found
+    return at_joints(motion, slice(j, j + 2), np.column_stack([size * twist, -size * twist]))
 
 
 def preload(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
     """A bushing before the joint that clamps the tendon whatever its force."""
     i, j = at["tendon"], at["joint"]
-    found = np.zeros_like(motion.angle)
     drag = size * held_sign(motion.tendon[:, i, j], finger.tendon_threshold)
-    found[:, j:] = drag[:, None] * finger.arms[i, j:]
-    return found
+    return at_joints(motion, slice(j, None), drag[:, None] * finger.arms[i, j:])
 
 
 def by_load(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
-    found = np.zeros_like(motion.angle)
     sign = held_sign(motion.velocity[:, at["joint"]], finger.joint_threshold)
-    found[:, at["joint"]] = size * np.abs(force[:, at["tendon"]]) * sign
-    return found
+    return at_joints(motion, at["joint"], size * np.abs(force[:, at["tendon"]]) * sign)
 
 
 def cover(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
@@ -238,12 +236,12 @@ def cover(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
 
 def some_place(hand: Hand, rng: Random, everywhere: bool) -> tuple[dict[str, int], list[tuple[str, tuple[int, ...]]]]:
     """A joint or a tendon that has friction (or, at times, the whole finger), and the laws there."""
-    found = law_places(hand.truth)
-    kind, at = chosen(rng, found)
+    every = law_places(hand.truth)
+    kind, at = chosen(rng, every)
     if everywhere and rng.random() < 0.4:
-        return {}, found
+        return {}, every
     tendon = kind in ("edge", "pulley")
-    laws = [(k, a) for k, a in found if (k in ("edge", "pulley")) == tendon and a[0] == at[0]]
+    laws = [(k, a) for k, a in every if (k in ("edge", "pulley")) == tendon and a[0] == at[0]]
     return {"tendon" if tendon else "joint": at[0] + 1}, laws
 
 
@@ -288,6 +286,68 @@ def drift(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
     note = f"time constant {time_constant:.1f} s"
     return hand, Hidden("friction_drift", **place, magnitude=0.3, note=note, finger=change)
 
+
+# --- not on the list of effects: the right answer is `unknown` --------------------------------------------------------
+
+
+def rubbing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """Two neighbouring tendons rub on each other before a joint: friction by their relative velocity."""
+    m, n = len(hand.truth["tendons"]), len(hand.truth["joints"])
+    i, j = int(rng.integers(m)), int(rng.integers(n))
+    other = (i + 1) % m
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        sign = held_sign(motion.tendon[:, i, j] - motion.tendon[:, other, j], finger.tendon_threshold)
+
+        def torque(motion: Motion, force: Array) -> Array:
+            drag = magnitude * np.sqrt(np.abs(force[:, i] * force[:, other])) * sign
+            return at_joints(motion, slice(j, None), drag[:, None] * (finger.arms[i, j:] - finger.arms[other, j:]))
+
+        finger.extras.append(torque)
+
+    note = f"tendons {i + 1} and {other + 1} before joint {j + 1}"
+    return hand, Hidden("rubbing", joint=j + 1, tendon=i + 1, magnitude=0.02, note=note, finger=change)
+
+
+def periodic(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """A torque that comes and goes in time alone, such as the cogging of a motor that turns by itself; half beat."""
+    j = int(rng.integers(len(hand.truth["joints"])))
+    frequency, phase = float(np.exp(rng.uniform(np.log(0.6), np.log(3.0)))), float(rng.uniform(0.0, 2.0 * np.pi))
+    beat = float(rng.uniform(0.05, 0.2)) if rng.random() < 0.5 else 0.0
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        def torque(motion: Motion, force: Array) -> Array:
+            envelope = np.cos(2.0 * np.pi * beat * motion.time)
+            return at_joints(motion, j, magnitude * envelope * np.sin(2.0 * np.pi * frequency * motion.time + phase))
+
+        finger.extras.append(torque)
+
+    return hand, Hidden("periodic", joint=j + 1, magnitude=0.002, note=f"{frequency:.2f} Hz", finger=change)
+
+
+def ageing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
+    """Friction of a tendon that remembers for seconds how much it slid: it falls while it slides and heals at rest."""
+    with_edge = [i for i, tendon in enumerate(hand.truth["tendons"]) if any(law for law in tendon["edge_friction"])]
+    if not with_edge:
+        raise Unreachable("ageing: no tendon has an edge that rubs")
+    i = chosen(rng, with_edge)
+    memory = float(rng.uniform(2.0, 5.0))
+
+    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
+        share = 1.0 - np.exp(-(motion.time[1] - motion.time[0]) / memory)
+        slides = np.minimum(np.abs(motion.tendon[:, i, 0]) / 0.005, 1.0)
+        level = lfilter([share], [1.0, share - 1.0], slides)
+        factor = 1.0 - magnitude * (level - level.mean())
+        if factor.min() < 0.02:
+            raise Unreachable("ageing: friction would turn round")
+        for effect in finger.effects:
+            if effect.kind in ("edge", "pulley") and effect.at[0] == i:
+                effect.factor = factor
+
+    return hand, Hidden("ageing", tendon=i + 1, magnitude=0.5, note=f"memory {memory:.1f} s", finger=change)
+
+
+UNKNOWN: dict[str, Builder] = {"rubbing": rubbing, "periodic": periodic, "ageing": ageing}
 
 BUILDERS: dict[str, Builder] = {
     "viscous_friction": at_a_law("viscous_friction", "viscous", 0.2, 3),
@@ -338,21 +398,21 @@ def scaled(
         alone = replace(base, hidden=(replace(hidden, magnitude=size),))
         made = record(alone, motion, seconds, quiet=True)
         seen = look(base, made) if seen is None or hidden.hand is not None else seen
-        found, share = surviving(seen, residual(base, made), hand)
-        miss = 0.0 if strength is None else abs(np.log(max(found, 1e-300) / strength))
-        best = (miss, size, found, share) if best is None or miss < best[0] else best
+        reached, share = surviving(seen, residual(base, made), hand)
+        miss = 0.0 if strength is None else abs(np.log(max(reached, 1e-300) / strength))
+        best = (miss, size, reached, share) if best is None or miss < best[0] else best
         if miss < CLOSE:
             break
-        size *= float(np.clip(np.sqrt(strength / max(found, 1e-300)), 0.05, 20.0))
+        size *= float(np.clip(np.sqrt(strength / max(reached, 1e-300)), 0.05, 20.0))
         if not hidden.magnitude / 300.0 < size < hidden.magnitude * 300.0:
             break
     assert best is not None
-    miss, size, found, share = best
+    miss, size, reached, share = best
     if miss > STILL_CLOSE:
-        raise Unreachable(f"{hidden.effect}: strength {found:.3g} at {size:.3g}, expected {strength}")
+        raise Unreachable(f"{hidden.effect}: strength {reached:.3g} at {size:.3g}, expected {strength}")
     label = {
         "effect": hidden.effect, "joint": hidden.joint, "tendon": hidden.tendon, "magnitude": size,
-        "strength": found, "surviving_share": share, "note": hidden.note,
+        "strength": reached, "surviving_share": share, "note": hidden.note,
     }  # fmt: skip
     base = hand if hidden.hand is None else hidden.hand(hand, size)
     return replace(base, hidden=(*hand.hidden, replace(hidden, magnitude=size))), label

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from foreign_case import Case, Truth
+from evidence.fingers.foreign import Case, Truth
 
 FAMILY = "recorded"
 ROOT = Path(__file__).resolve().parents[2]

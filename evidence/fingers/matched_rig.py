@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from friction_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
-from rig_motion import pretension, pulling_null_vector, strokes
+from evidence.fingers.matched_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
+from evidence.fingers.matched_motion import pretension, pulling_null_vector, strokes
 
 Array = NDArray[Any]
 Description = dict[str, Any]

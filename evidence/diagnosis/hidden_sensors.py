@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from friction_physics import Finger, Motion
-from matched_rig import Hand, Hidden
+from evidence.fingers.matched_physics import Finger, Motion
+from evidence.fingers.matched_rig import Hand, Hidden
 
 Array = NDArray[Any]
 Random = np.random.Generator
@@ -38,9 +38,9 @@ def wrong_arm(name: str, size: float, arm: Callable[[Array, Array], Array], path
 
         def turn(finger: Finger, motion: Motion, magnitude: float) -> None:
             def torque(motion: Motion, force: Array) -> Array:
-                found = np.zeros_like(motion.angle)
-                found[:, j] = -magnitude * arm(motion.angle[:, j], draw) * force[:, i]
-                return found
+                lost = np.zeros_like(motion.angle)
+                lost[:, j] = -magnitude * arm(motion.angle[:, j], draw) * force[:, i]
+                return lost
 
             finger.extras.append(torque)
 

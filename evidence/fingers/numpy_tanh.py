@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foreign_case import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
 
 ARMS = np.array([[0.009, 0.0], [-0.0088, 0.0], [-0.007, 0.0081], [0.0072, -0.0078]])  # m
 STIFFNESS = 4000.0  # N/m

@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 import pandas as pd
 
-from fingers_in_mujoco import PLANS, describe, finger
-from foreign_case import Array, Nominal, Truth, frame, noisy, quantised
-from mujoco_model import LINK, Physics
-from mujoco_run import SETTLE, STEP, Runner
+from evidence.fingers.mujoco_cases import PLANS, describe, finger
+from evidence.fingers.foreign import Array, Nominal, Truth, frame, noisy, quantised
+from evidence.fingers.mujoco_model import LINK, Physics
+from evidence.fingers.mujoco_run import SETTLE, STEP, Runner
 
 MOVE = 0.8  # s
 REST, LEAD = (2.0, 60.0), (1.2, 30.0)  # s: without a push; from the stop to the push; evenly in their logarithm

@@ -15,8 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from friction_physics import Finger, Motion, filtered_velocity, friction_torque, motion_of, read_finger, values_of
-from matched_rig import Hand, Made, record
+from evidence.fingers.matched_physics import (
+    Finger,
+    Motion,
+    filtered_velocity,
+    friction_torque,
+    motion_of,
+    read_finger,
+    values_of,
+)
+from evidence.fingers.matched_rig import Hand, Made, record
 
 Array = NDArray[Any]
 BLOCK = 0.01  # s, over which series are averaged

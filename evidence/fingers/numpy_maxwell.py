@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from foreign_case import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
 
 ARMS = (
     np.array([[9.0, 0, 0], [-8.7, 0, 0], [-7.1, 8.2, 0], [7.4, -7.9, 0], [6.9, -6.4, 7.2], [-7.2, 6.6, -7.0]]) / 1000.0

@@ -8,8 +8,8 @@ import math
 import mujoco
 import numpy as np
 
-from foreign_case import Array, Truth
-from mujoco_model import Physics, compiled
+from evidence.fingers.foreign import Array, Truth
+from evidence.fingers.mujoco_model import Physics, compiled
 
 STEP = 0.001  # s
 SETTLE = 1.5  # s before the recording begins

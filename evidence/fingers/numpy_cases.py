@@ -8,12 +8,12 @@ from types import ModuleType
 import numpy as np
 import pandas as pd
 
-import numpy_boucwen
-import numpy_capstan
-import numpy_karnopp
-import numpy_maxwell
-import numpy_tanh
-from foreign_case import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
+from evidence.fingers import numpy_boucwen
+from evidence.fingers import numpy_capstan
+from evidence.fingers import numpy_karnopp
+from evidence.fingers import numpy_maxwell
+from evidence.fingers import numpy_tanh
+from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
 
 FAMILY = "numpy"
 
