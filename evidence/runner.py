@@ -16,6 +16,7 @@ import argparse
 import functools
 import json
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,6 +33,8 @@ ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
 INDEX_FINGER = EXAMPLES / "fingers" / "index_finger.json"
 INDEX_RIG = EXAMPLES / "rigs" / "index_finger.json"
+DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")  # recordings that others have made
+FOREIGN = DATA.parent / "foreign"
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------

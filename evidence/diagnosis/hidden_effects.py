@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import Effect, Finger, Motion, last_true
 from evidence.diagnosis.hidden_sensors import SENSORS
+from evidence.fingers.matched_physics import Effect, Finger, Motion, last_true
 from evidence.fingers.matched_rig import Description, Hand, Hidden, Unreachable, record
 from evidence.fingers.matched_strength import look, residual, surviving
 

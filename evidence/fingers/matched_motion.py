@@ -49,7 +49,7 @@ def pulling_null_vector(arms: Array) -> Array | None:
     tendons, joints = arms.shape
     balance = np.vstack([np.hstack([arms.T, np.zeros((joints, 1))]), np.append(np.ones(tendons), 0.0)])
     above = np.hstack([-np.eye(tendons), np.ones((tendons, 1))])
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(tendons), -1.0),
         A_ub=above,
         b_ub=np.zeros(tendons),
@@ -57,7 +57,7 @@ def pulling_null_vector(arms: Array) -> Array | None:
         b_eq=np.append(np.zeros(joints), float(tendons)),
         bounds=[(0.0, None)] * (tendons + 1),
     )
-    return found.x[:tendons] if found.success and found.x[-1] > 0.3 else None
+    return solution.x[:tendons] if solution.success and solution.x[-1] > 0.3 else None
 
 
 def pretension(rng: np.random.Generator, time: Array, arms: Array, level: float, knots: float) -> Array:

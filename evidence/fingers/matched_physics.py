@@ -201,36 +201,36 @@ def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
     """Friction over the whole series by docs/reference/semantics.md#friction-effects (`entry_load`), or presliding."""
     v = velocity_seen(effect, motion)
     threshold = finger.tendon_threshold if effect.kind in ("edge", "pulley") else finger.joint_threshold
-    found = contacts_of(v, threshold)
+    contacts = contacts_of(v, threshold)
     factor = np.ones(len(v)) if effect.factor is None else effect.factor
 
     def at(side: Array, speed: Array | float) -> Array:
         return np.where(side >= 0, side_value(effect.sides[0], speed), side_value(effect.sides[1], speed))
 
     if effect.memory is not None:
-        side = np.where(found.side == 0.0, 1.0, found.side)
+        side = np.where(contacts.side == 0.0, 1.0, contacts.side)
         return Values(build_up(v, motion.time, effect.memory) * at(side, np.abs(v)) * factor)
-    F = np.where(found.moving, np.sign(v) * at(np.sign(v), np.abs(v)), 0.0) * factor
-    side_in = found.side[found.enters - 1] if len(found.enters) else np.zeros(0)
-    side_out = found.side[found.leaves]
-    entry = side_in * at(side_in, threshold) * factor[found.enters]
-    leaving = -side_out * at(side_out, threshold) * factor[found.leaves]
-    rested = motion.time[found.leaves - 1] - motion.time[found.stuck_since]
-    kept = np.where(found.entered >= 0, np.exp(-finger.forget_rate * rested), 0.0)
-    return Values(F, found, entry, kept, leaving)
+    F = np.where(contacts.moving, np.sign(v) * at(np.sign(v), np.abs(v)), 0.0) * factor
+    side_in = contacts.side[contacts.enters - 1] if len(contacts.enters) else np.zeros(0)
+    side_out = contacts.side[contacts.leaves]
+    entry = side_in * at(side_in, threshold) * factor[contacts.enters]
+    leaving = -side_out * at(side_out, threshold) * factor[contacts.leaves]
+    rested = motion.time[contacts.leaves - 1] - motion.time[contacts.stuck_since]
+    kept = np.where(contacts.entered >= 0, np.exp(-finger.forget_rate * rested), 0.0)
+    return Values(F, contacts, entry, kept, leaving)
 
 
 def jumps(values: Values, load: Array) -> Array:
     """[N] cumulated Δb of one effect, its loads [N] multiplied in (docs/reference/semantics.md#entry-load)."""
-    found, total = values.contacts, np.zeros(len(load))
-    if found is None:
+    contacts, total = values.contacts, np.zeros(len(load))
+    if contacts is None:
         return total
     assert values.entry is not None and values.kept is not None and values.leaving is not None
-    e = values.entry * load[found.enters]
-    np.add.at(total, found.enters, e)
-    back = np.where(found.entered >= 0, e[np.maximum(found.entered, 0)] if len(e) else 0.0, 0.0)
+    e = values.entry * load[contacts.enters]
+    np.add.at(total, contacts.enters, e)
+    back = np.where(contacts.entered >= 0, e[np.maximum(contacts.entered, 0)] if len(e) else 0.0, 0.0)
     np.add.at(
-        total, found.leaves, -values.kept * back + (1.0 - values.kept) * values.leaving * load[found.leaves]
+        total, contacts.leaves, -values.kept * back + (1.0 - values.kept) * values.leaving * load[contacts.leaves]
     )  # fmt: skip
     return np.asarray(np.cumsum(total))
 

@@ -1,7 +1,7 @@
 """Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect.
 
     hand = random_hand(seed=1, joints=2)                       # the truth, and the tool's nominal description
-    hidden = hide(hand, "load_friction", strength=0.1, seed=3) # effects_hidden.py; strength after refitting, over noise
+    hidden = hide(hand, "load_friction", strength=0.1, seed=3) # hidden_effects.py; strength after refitting, over noise
     made = record(hidden, seed=5, seconds=60.0)                # made.columns: a recording; made.nominal: for the tool
     made.write(folder)                                         # recording.parquet, nominal.json
 
@@ -19,16 +19,19 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
 from evidence.fingers.matched_motion import pretension, pulling_null_vector, strokes
+from evidence.fingers.matched_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
 
 Array = NDArray[Any]
 Description = dict[str, Any]
@@ -102,9 +105,6 @@ class Made:
 
     def write(self, folder: Path) -> tuple[Path, Path]:
         """recording.parquet and nominal.json."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         folder.mkdir(parents=True, exist_ok=True)
         pq.write_table(pa.table(self.columns), folder / "recording.parquet")
         (folder / "nominal.json").write_text(json.dumps(self.hand.nominal), encoding="utf-8")
@@ -154,11 +154,11 @@ def random_truth(rng: np.random.Generator, joints: int, presliding: bool) -> Des
         if rng.random() < 0.3:
             joint["load_friction"] = random_law(rng, 1e-4, 0.3)
         members.append(joint)
-    found: Description = {
+    data: Description = {
         "format": "tendonfmu-finger-1",
         "name": "matched",
-        "joints": [{"name": f"joint_{j + 1}", **each} for j, each in enumerate(members)],
-        "tendons": [{"name": f"tendon_{i + 1}", **each} for i, each in enumerate(tendons)],
+        "joints": [{"name": f"joint_{j + 1}", **joint} for j, joint in enumerate(members)],
+        "tendons": [{"name": f"tendon_{i + 1}", **tendon} for i, tendon in enumerate(tendons)],
         "velocity_threshold": {"tendon": 0.0004, "joint": 0.04},
         "velocity_filter_cutoff": 0.0,
         "bias": {"initial_variance": 1e-4, "forget_rate": 0.0, "entry_load": True},
@@ -166,8 +166,8 @@ def random_truth(rng: np.random.Generator, joints: int, presliding: bool) -> Des
         "extensions": [],
     }  # fmt: skip
     if presliding:
-        add_presliding(rng, found)
-    return found
+        add_presliding(rng, data)
+    return data
 
 
 def add_presliding(rng: np.random.Generator, data: Description) -> None:
@@ -184,7 +184,7 @@ def add_presliding(rng: np.random.Generator, data: Description) -> None:
 
 def off_start(rng: np.random.Generator, data: Description, share: float = 0.5) -> Description:
     """The numbers that fit estimates, each off by up to `share`; what is absent stays absent."""
-    found = copy.deepcopy(data)
+    rough = copy.deepcopy(data)
 
     def move(law: Description | None) -> None:
         for side in [] if law is None else [law["positive"], law["negative"]] if "positive" in law else [law]:
@@ -195,17 +195,17 @@ def off_start(rng: np.random.Generator, data: Description, share: float = 0.5) -
             side["stribeck_velocity"] = float(side["stribeck_velocity"] * scale[2])
             side["viscous"] = float(side["viscous"] * scale[3])
 
-    for joint in found["joints"]:
+    for joint in rough["joints"]:
         move(joint.get("friction"))
         move(joint.get("load_friction"))
         if joint.get("cover"):
             joint["cover"]["stiffness"] *= float(rng.uniform(1.0 - share, 1.0 + share))
-    for tendon in found["tendons"]:
+    for tendon in rough["tendons"]:
         for law in [*tendon["edge_friction"], *tendon["pulley_friction"]]:
             move(law)
-    for row in found["extensions"]:
+    for row in rough["extensions"]:
         row["displacement"] *= float(rng.uniform(1.0 - share, 1.0 + share))
-    return found
+    return rough
 
 
 def random_hand(
@@ -231,8 +231,6 @@ def random_hand(
 
 def coloured(rng: np.random.Generator, samples: int, width: int, step: float, noise: Noise) -> Array:
     """[N, width] N·m: AR(1) of standard deviation std, stationary from the first sample on."""
-    from scipy.signal import lfilter
-
     a = np.exp(-step / noise.time)
     drive = rng.standard_normal((samples, width)) * np.sqrt(1.0 - a**2)
     drive[0] /= np.sqrt(1.0 - a**2)
@@ -251,48 +249,70 @@ def balanced_forces(finger: Finger, motion: Motion, pretensions: Array, load: Ar
     raise RuntimeError(f"matched rig: no balance, forces still move by {np.max(np.abs(force - last)):.2e} N")
 
 
-def true_motion(hand: Hand, finger: Finger, seed: int, seconds: float, speed: float) -> tuple[Motion, dict[str, Array]]:
-    """The motion of friction (velocities as the nominal's filter makes them), and what joint sensors tell of it."""
-    rng = np.random.default_rng([seed, 61])
-    time = np.arange(round(seconds * hand.rate)) / hand.rate
-    encoders = np.column_stack([strokes(rng, time, speed) for _ in range(finger.joints)])
-    angle = encoders
-    for each in hand.hidden:
-        if each.path is not None:
-            angle = each.path(angle, each.magnitude)
-    exact = np.gradient(angle, time, axis=0)
-    velocity = exact if hand.source == 3 else filtered_velocity(angle, 1.0 / hand.rate, finger.cutoff)
-    return motion_of(time, angle, velocity, finger.arms), {"joint_position": encoders.copy(), "joint_velocity": exact}
-
-
 def record(
     hand: Hand, seed: int, seconds: float = 60.0, *, quiet: bool = False, speed: float = 1.0, level: float = 1.0,
     external: Array | None = None,
 ) -> Made:  # fmt: skip
     """A recording of this hand. quiet: without noise, wander and quantisation. speed, level: factors of the motion's
     speed and the pretension. external: [N, n] N·m, a load nobody tells the tool of."""
-    finger = read_finger(hand.truth)
-    motion, joints = true_motion(hand, finger, seed, seconds, speed)
-    for each in hand.hidden:
-        if each.finger is not None:
-            each.finger(finger, motion, each.magnitude)
+    arms = read_finger(hand.truth).arms
+    time = np.arange(round(seconds * hand.rate)) / hand.rate
+    rng = np.random.default_rng([seed, 61])
+    encoders = np.column_stack([strokes(rng, time, speed) for _ in range(arms.shape[1])])
     rng = np.random.default_rng([seed, 62])
-    samples, step = len(motion.time), 1.0 / hand.rate
-    noise = QUIET if quiet else hand.noise
-    pretensions = pretension(rng, motion.time, finger.arms, level * hand.level, hand.tension_time)
+    pretensions = pretension(rng, time, arms, level * hand.level, hand.tension_time)
+    load = 0.0 if external is None else external
+    return recorded(hand, time, encoders, pretensions, load, rng, QUIET if quiet else hand.noise)
+
+
+def perform(hand: Hand, motion: Mapping[str, Any], seed: int) -> Made:
+    """A recording that carries out a motion of `diagnose.result.Experiment` or `Invisible`. The known load stands in it
+    as `external_torque`, as a reference sensor would have it."""
+    from tendonfmu.diagnosis.experiments.discrimination import performed_of  # the rig shares no other code with it
+
+    _, plan = performed_of(hand.nominal, motion, hand.rate)
+    rng = np.random.default_rng([seed, 66])
+    made = recorded(hand, plan.time, plan.position, plan.tension, plan.load, rng, hand.noise)
+    if plan.load.any():
+        made.columns.update({f"external_torque[{j + 1}]": torque for j, torque in enumerate(plan.load.T)})
+    return made
+
+
+def recorded(
+    hand: Hand,
+    time: Array,
+    encoders: Array,
+    pretensions: Array,
+    load: Array | float,
+    rng: np.random.Generator,
+    noise: Noise,
+) -> Made:
+    """What sensors see of the hand: joint angles are those of its encoders, and a load [N, n] N·m acts on it."""
+    finger = read_finger(hand.truth)
+    angle = encoders
+    for hidden in hand.hidden:
+        if hidden.path is not None:
+            angle = hidden.path(angle, hidden.magnitude)
+    exact = np.gradient(angle, time, axis=0)
+    velocity = exact if hand.source == 3 else filtered_velocity(angle, 1.0 / hand.rate, finger.cutoff)
+    motion = motion_of(time, angle, velocity, finger.arms)
+    for hidden in hand.hidden:
+        if hidden.finger is not None:
+            hidden.finger(finger, motion, hidden.magnitude)
+    samples, step = len(time), 1.0 / hand.rate
     walk = noise.wander * np.sqrt(step) * np.cumsum(rng.standard_normal((samples, finger.joints)), axis=0)
     disturbance = coloured(rng, samples, finger.joints, step, noise)
-    load = disturbance + walk + (0.0 if external is None else external)
-    force = balanced_forces(finger, motion, pretensions, load)
+    force = balanced_forces(finger, motion, pretensions, disturbance + walk + load)
     signals = {
-        "time": motion.time,
+        "time": time,
         "tendon_force": force.copy(),
         "tendon_position": motion.angle @ finger.arms.T + force / finger.stiffness,
-        **joints,
+        "joint_position": encoders.copy(),
+        "joint_velocity": exact,
     }
-    for each in hand.hidden:
-        if each.sensors is not None:
-            each.sensors(signals, finger, each.magnitude)
+    for hidden in hand.hidden:
+        if hidden.sensors is not None:
+            hidden.sensors(signals, finger, hidden.magnitude)
     measure(rng, signals, noise)
     return Made(hand, columns_of(signals, hand.source), motion, force, disturbance)
 
@@ -311,7 +331,7 @@ def columns_of(signals: dict[str, Array], source: int) -> dict[str, Array]:
     """Columns of docs/reference/semantics.md#recordings; joint sensors only where these kinematics use them."""
     groups = ["tendon_force", "tendon_position"]
     groups += ["joint_position"] * (source >= 2) + ["joint_velocity"] * (source == 3)
-    found = {"time": signals["time"]}
+    columns = {"time": signals["time"]}
     for name in groups:
-        found |= {f"{name}[{k + 1}]": signals[name][:, k] for k in range(signals[name].shape[1])}
-    return found
+        columns |= {f"{name}[{k + 1}]": signals[name][:, k] for k in range(signals[name].shape[1])}
+    return columns

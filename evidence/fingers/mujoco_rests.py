@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 import pandas as pd
 
-from evidence.fingers.mujoco_cases import PLANS, describe, finger
 from evidence.fingers.foreign import Array, Nominal, Truth, frame, noisy, quantised
+from evidence.fingers.mujoco_cases import PLANS, describe, finger
 from evidence.fingers.mujoco_model import LINK, Physics
 from evidence.fingers.mujoco_run import SETTLE, STEP, Runner
 

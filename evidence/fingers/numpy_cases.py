@@ -8,11 +8,7 @@ from types import ModuleType
 import numpy as np
 import pandas as pd
 
-from evidence.fingers import numpy_boucwen
-from evidence.fingers import numpy_capstan
-from evidence.fingers import numpy_karnopp
-from evidence.fingers import numpy_maxwell
-from evidence.fingers import numpy_tanh
+from evidence.fingers import numpy_boucwen, numpy_capstan, numpy_karnopp, numpy_maxwell, numpy_tanh
 from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
 
 FAMILY = "numpy"
