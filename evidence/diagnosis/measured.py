@@ -1,19 +1,17 @@
-"""Known effects hidden in measured recordings: EMPS and the da Vinci jaw.
+"""Measured machines (EMPS, the da Vinci jaw), and known effects that can be put on their recordings.
 
-The starting point of each machine is its own diagnosed model (measured_*.json): on the unaltered recording there is
-nothing left to name, that is the null. What is to be hidden is first taken off recording and model where they
-have it already. All formulas are physics written here; nothing is taken from the candidates or the core's terms.
-
-Strength: variance of the torque that the effect adds and that refitting the model's own numbers cannot absorb, over
-the variance of what the model leaves of the unaltered recording, both in blocks of 10 ms.
-measured_table.py runs them.
+All formulas are physics written here; nothing is taken from the candidates or the core's terms. A change needs no room:
+friction that is there already grows or falls. The model of a machine is its diagnosed one (measured_*.json: diagnosed
+again until nothing was found), and says how presliding and friction of the real machine are.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,9 @@ Columns = dict[str, Array]
 Description = dict[str, Any]
 BLOCK = 0.01  # s
 STEP = 1e-4  # relative, of numeric derivatives
-ROUNDS, CLOSE = 8, 0.03  # of scaling to a strength; how near, relative
+CLOSE = 0.03  # how near to a strength, relative
+LEANING = 0.8  # rad
+SLOW_SHARE = 0.15  # of the usual speed: what is near standstill
 
 FORCE, POSITION, ANGLE = "tendon_force[1]", "tendon_position[1]", "joint_position[1]"
 SPEED, LOAD = "joint_velocity[1]", "external_torque[1]"
@@ -34,19 +34,23 @@ SPEED, LOAD = "joint_velocity[1]", "external_torque[1]"
 
 @dataclass(frozen=True)
 class Machine:
-    """One joint, one tendon of a constant moment arm. recordings: by name. kinematics: source 1 or 3."""
+    """One joint, one tendon of a constant moment arm."""
 
     name: str
     model: Description
-    recordings: dict[str, Columns]
-    kinematics: int
+    recordings: dict[str, Columns]  # by name
+    kinematics: int  # source 1 or 3
 
     @property
     def arm(self) -> float:
         return float(self.model["tendons"][0]["moment_arms"][0])
 
-    def chosen(self, names: Sequence[str]) -> Machine:
-        return replace(self, recordings={name: self.recordings[name] for name in names})
+
+def diagnosed_model(name: str) -> Description:
+    """The model of emps or davinci."""
+    file = Path(__file__).resolve().parent / f"measured_{name}.json"
+    model: Description = json.loads(file.read_text(encoding="utf-8"))
+    return model
 
 
 # --- motion, as the machine's sensors show it -------------------------------------------------------------------------
@@ -73,7 +77,37 @@ def side_of(machine: Machine, columns: Columns) -> Array:
     return np.sign(speed[last])
 
 
-# --- effects: what a recording becomes, and what the model loses to make room for it ----------------------------------
+def usual_speed(machine: Machine, columns: Columns) -> float:
+    return float(np.percentile(np.abs(speed_of(machine, columns)), 95))
+
+
+def travelled(machine: Machine, columns: Columns) -> Array:
+    """Angle as a share of the stroke, −½ to ½."""
+    angle = angle_of(machine, columns)
+    return np.asarray((angle - angle.min()) / np.ptp(angle) - 0.5)
+
+
+def rows_of(model: Description, effect: str) -> list[Description]:
+    return [row for row in model.get("extensions") or [] if row["effect"] == effect]
+
+
+def built_up(side: Array, travel: Array, displacement: float) -> Array:
+    """Dahl's share of the friction that is there, from 0 at the start: it nears the side over a displacement."""
+    share = np.zeros(len(side))
+    for k in range(1, len(side)):
+        share[k] = side[k] - (side[k] - share[k - 1]) * np.exp(-abs(travel[k]) / displacement)
+    return share
+
+
+def friction_side(machine: Machine, columns: Columns, displacement: float | None = None) -> Array:
+    """Sign of the friction, as it builds up over the presliding distance of the diagnosed model."""
+    side, angle = side_of(machine, columns), angle_of(machine, columns)
+    for row in rows_of(machine.model, "presliding"):
+        return built_up(side, np.diff(angle, prepend=angle[0]), displacement or row["displacement"])
+    return side
+
+
+# --- effects: what a recording becomes, by machine, columns and magnitude ---------------------------------------------
 
 
 def add_torque(machine: Machine, columns: Columns, torque: Array) -> Columns:
@@ -83,11 +117,7 @@ def add_torque(machine: Machine, columns: Columns, torque: Array) -> Columns:
 
 def coulomb(machine: Machine, columns: Columns, magnitude: float) -> Columns:
     """Coulomb friction in the joint, N·m; where the model's joint has presliding, it turns round over that distance."""
-    side = side_of(machine, columns)
-    for row in rows_of(machine.model, "presliding"):
-        angle = angle_of(machine, columns)
-        side = built_up(side, np.diff(angle, prepend=angle[0]), row["displacement"])
-    return add_torque(machine, columns, magnitude * side)
+    return add_torque(machine, columns, magnitude * friction_side(machine, columns))
 
 
 def gain(machine: Machine, columns: Columns, magnitude: float) -> Columns:
@@ -114,155 +144,138 @@ def growing(machine: Machine, columns: Columns, magnitude: float) -> Columns:
     return columns | {FORCE: force / (1.0 - lost * np.sign(force))}
 
 
+def viscous(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """N·m·s/rad"""
+    return add_torque(machine, columns, magnitude * speed_of(machine, columns))
+
+
+def viscous_one_way(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """N·m·s/rad, while the angle grows"""
+    return add_torque(machine, columns, magnitude * np.maximum(speed_of(machine, columns), 0.0))
+
+
+def near_standstill(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """Friction that falls with speed, N·m at standstill (Stribeck)."""
+    slow = SLOW_SHARE * usual_speed(machine, columns)
+    fading = np.exp(-np.abs(speed_of(machine, columns)) / slow)
+    return add_torque(machine, columns, magnitude * fading * friction_side(machine, columns))
+
+
+def along_the_stroke(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """Friction under load that grows along the stroke, m at its end: an edge that the cable wraps more and more."""
+    share = travelled(machine, columns) + 0.5
+    lost = magnitude * share * np.abs(columns[FORCE]) * friction_side(machine, columns)
+    return add_torque(machine, columns, lost)
+
+
+def with_time(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """Coulomb friction that comes in the course of the recording, N·m in the end."""
+    time = columns["time"] - columns["time"][0]
+    grown = 1.0 - np.exp(-time / (time[-1] / 3.0))
+    return add_torque(machine, columns, magnitude * grown * friction_side(machine, columns))
+
+
+def heavier(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """kg·m² more"""
+    return add_torque(machine, columns, magnitude * np.gradient(speed_of(machine, columns), columns["time"]))
+
+
+def longer_presliding(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """The distance over which the machine's friction builds up becomes longer, rad."""
+    before = rows_of(machine.model, "presliding")[0]["displacement"]
+    law = machine.model["joints"][0]["friction"]
+    law = law.get("positive", law)
+    load = sum(row["coulomb"] for row in rows_of(machine.model, "load_friction"))
+    load += (machine.model["joints"][0].get("load_friction") or {"coulomb": 0.0})["coulomb"]
+    friction = law["coulomb"] + load * np.abs(columns[FORCE])
+    turned = friction_side(machine, columns, before + magnitude) - friction_side(machine, columns)
+    return add_torque(machine, columns, friction * turned)
+
+
+def weight(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """A weight that hangs LEANING from its lowest point in the middle of the stroke, N·m, less its torque there."""
+    angle = angle_of(machine, columns)
+    middle = 0.5 * (angle.min() + angle.max())
+    return add_torque(machine, columns, magnitude * (np.sin(angle - middle + LEANING) - np.sin(LEANING)))
+
+
+def longer_arm(machine: Machine, columns: Columns, magnitude: float) -> Columns:
+    """The arm grows along the stroke by this share of it from end to end: the same torque takes less force."""
+    return dict(columns) | {FORCE: columns[FORCE] / (1.0 + magnitude * travelled(machine, columns))}
+
+
 @dataclass(frozen=True)
 class Effect:
-    """names: of effects that are the truth (one joint: some are one and the same). usual: a first magnitude, as a
-    share of the largest torque where it is one. both: whether either sign can be. most: the largest that makes
-    sense. free: takes it off a machine that has it already."""
+    """A known effect, and which answers to it count."""
 
-    names: tuple[str, ...]
     put: Callable[[Machine, Columns, float], Columns]
-    usual: float
-    both: bool = False
-    most: float = np.inf
-    free: Callable[[Machine], Machine] | None = None
+    names: tuple[str, ...]  # names that are the truth (one joint: some are one and the same)
+    unit: str
+    signs: Mapping[str, int] = field(default_factory=dict)  # by name, of a positive magnitude
+    first: float = 0.05  # where the search for a strength starts, as a share of `scale`
+    scale: str = "torque"
+    also: tuple[str, ...] = ()  # names that are not false either
+    sign: int = 1
+    most: float = np.inf  # the largest magnitude that makes sense
+    machines: tuple[str, ...] = ("emps", "davinci")
 
 
-def without_rows(model: Description, *effects: str) -> Description:
-    model = copy.deepcopy(model)
-    model["extensions"] = [row for row in model.get("extensions") or [] if row["effect"] not in effects]
-    return model
-
-
-def rows_of(model: Description, effect: str) -> list[Description]:
-    return [row for row in model.get("extensions") or [] if row["effect"] == effect]
-
-
-def law_torque(law: Description, speed: Array, side: Array) -> Array:
-    """A law's F(v), the side given (docs/reference/semantics.md#friction-laws)."""
-
-    def one(half: Description) -> Array:
-        drop, slow = half["static"] - half["coulomb"], half["stribeck_velocity"]
-        return half["coulomb"] + drop * np.exp(-np.abs(speed) / slow) + half.get("viscous", 0.0) * np.abs(speed)
-
-    forward, back = law.get("positive", law), law.get("negative", law)
-    return np.where(side > 0, one(forward), -one(back))
-
-
-def built_up(side: Array, travel: Array, displacement: float) -> Array:
-    """Dahl's share of the friction that is there, from 0 at the start: it nears the side over a displacement."""
-    share = np.zeros(len(side))
-    for k in range(1, len(side)):
-        share[k] = side[k] - (side[k] - share[k - 1]) * np.exp(-abs(travel[k]) / displacement)
-    return share
-
-
-def free_of_friction(machine: Machine) -> Machine:
-    """Recordings less the joint's own friction by the model, which then has none."""
-    law = machine.model["joints"][0]["friction"]
-    near = rows_of(machine.model, "stribeck")
-    sliding = rows_of(machine.model, "presliding")
-    constant = sum(row["coulomb"] for row in rows_of(machine.model, "preload_friction")) * machine.arm
-
-    def taken(columns: Columns) -> Columns:
-        speed = speed_of(machine, columns)
-        side = np.where(speed < 0, -1.0, 1.0)
-        torque = law_torque(law, speed, side)
-        for row in near:
-            torque = torque * (1.0 + row["amplitude"] * np.exp(-np.abs(speed) / row["stribeck_velocity"]))
-        for row in sliding:
-            step = np.diff(angle_of(machine, columns), prepend=angle_of(machine, columns)[0])
-            torque = np.abs(torque) * built_up(side, step, row["displacement"])
-        return add_torque(machine, columns, -torque - constant * side)
-
-    # presliding stays where the joint has friction that grows with the load, which it acts on too
-    kept = machine.model["joints"][0].get("load_friction") is not None
-    model = without_rows(machine.model, "stribeck", "preload_friction", *([] if kept else ["presliding"]))
-    model["joints"][0]["friction"] = None
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
-
-
-def free_of_delay(machine: Machine) -> Machine:
-    """Forces moved to the time of the positions by the model's own delay, which it then has not."""
-    rows = rows_of(machine.model, "time_delay")
-    if not rows:
-        return machine
-    late = rows[0]["delay"]  # negative: the force of t answers to the motion of t − late
-
-    def moved(columns: Columns) -> Columns:
-        return columns | {FORCE: np.interp(columns["time"] + late, columns["time"], columns[FORCE])}
-
-    model = without_rows(machine.model, "time_delay")
-    return replace(machine, model=model, recordings={k: moved(v) for k, v in machine.recordings.items()})
-
-
-def free_of_spring(machine: Machine) -> Machine:
-    """Recordings less all torques that follow the angle alone, as the model has them: cover and weight."""
-    cover = machine.model["joints"][0].get("cover") or {"stiffness": 0.0, "rest_angle": 0.0}
-    weights, cubes = rows_of(machine.model, "gravity"), rows_of(machine.model, "cover_hardening")
-
-    def taken(columns: Columns) -> Columns:
-        angle = angle_of(machine, columns)
-        bent = angle - cover.get("rest_angle", 0.0)
-        torque = cover["stiffness"] * bent
-        for row in weights:
-            torque = torque + row.get("sine", 0.0) * np.sin(angle) + row.get("cosine", 0.0) * np.cos(angle)
-        for row in cubes:
-            torque = torque + row["stiffness"] * bent**3
-        return add_torque(machine, columns, -torque)
-
-    model = without_rows(machine.model, "gravity", "cover_hardening")
-    model["joints"][0].pop("cover", None)
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
-
-
-def free_of_growth(machine: Machine) -> Machine:
-    """Recordings less the friction that grows with the force, as the model's rows have it; a law of the joint that does
-    so stays, and takes its share of what is hidden."""
-    rows = rows_of(machine.model, "load_friction")
-    if not rows:
-        return machine
-    lost = sum(row["coulomb"] for row in rows)
-
-    def taken(columns: Columns) -> Columns:
-        return add_torque(machine, columns, -lost * np.abs(columns[FORCE]) * side_of(machine, columns))
-
-    model = without_rows(machine.model, "load_friction")
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
-
-
+FRICTION = ("joint_friction", "preload_friction")
 GROWING = ("load_friction", "edge_friction", "joint_load_friction")  # at one joint, along one tendon: the same
-
-
-def free_of_coulomb(machine: Machine) -> Machine:
-    """Friction is taken off at the time at which it acts, so the forces are moved there first."""
-    return free_of_friction(free_of_delay(machine))
-
+UP = dict.fromkeys((*FRICTION, "viscous_friction", "stribeck", "friction_drift", *GROWING), 1)
+GAIN = Effect(gain, ("force_gain", "moment_arm"), "1", {"force_gain": 1, "moment_arm": 1}, 0.02, "one", most=0.5)
 
 EFFECTS = {
-    "coulomb": Effect(
-        ("joint_friction", "preload_friction"),
-        coulomb,
-        0.05,
-        free=free_of_coulomb,
+    "coulomb": Effect(coulomb, FRICTION, "N.m", UP),
+    "less_coulomb": Effect(coulomb, FRICTION, "N.m", UP, sign=-1),
+    "gain": GAIN,
+    "less_gain": replace(GAIN, sign=-1),
+    "delay": Effect(delay, ("time_delay",), "s", {"time_delay": -1}, 0.002, "one", most=0.05),
+    "spring": Effect(spring, ("cover_stiffness",), "N.m/rad", {"cover_stiffness": 1}, scale="stiffness"),
+    "growing": Effect(growing, GROWING, "m", UP, 0.02, "arm"),
+    "viscous": Effect(viscous, ("viscous_friction",), "N.m.s/rad", UP, scale="damping"),
+    "viscous_one_way": Effect(
+        viscous_one_way, ("asymmetric_friction", "viscous_friction"), "N.m.s/rad", UP, scale="damping"
     ),
-    "gain": Effect(("force_gain", "moment_arm"), gain, 0.02, both=True, most=0.5),
-    "delay": Effect(("time_delay",), delay, 0.002, most=0.05, free=free_of_delay),
-    "spring": Effect(("cover_stiffness",), spring, 0.05, free=free_of_spring),
-    "growing": Effect(GROWING, growing, 0.02, free=free_of_growth),
+    "near_standstill": Effect(near_standstill, ("stribeck",), "N.m", UP),
+    "along_the_stroke": Effect(along_the_stroke, GROWING, "m", UP, 0.02, "arm"),
+    # there is more friction now, and it grows: either is right
+    "with_time": Effect(with_time, ("friction_drift", *FRICTION), "N.m", UP),
+    "longer_presliding": Effect(longer_presliding, ("presliding",), "rad", {"presliding": 1}, 0.01, "stroke"),
+    "heavier": Effect(heavier, ("inertia",), "kg.m2", {"inertia": 1}, 1.0, "one", machines=("emps",)),
+    "weight": Effect(weight, ("gravity",), "N.m", {}, also=("cover_stiffness",), machines=("davinci",)),
+    "longer_arm": Effect(
+        longer_arm,
+        ("moment_arm_variation", "pulley_eccentricity"),
+        "1",
+        {"moment_arm_variation": 1},
+        0.05,
+        "one",
+        most=1.0,
+        machines=("davinci",),
+    ),
 }
 
 
-def usual(effect: Effect, machine: Machine) -> float:
-    """A first magnitude, in the unit of the effect."""
-    if effect.put in (gain, delay):
-        return effect.usual
-    largest = max(float(np.percentile(np.abs(c[FORCE]), 95)) for c in machine.recordings.values()) * machine.arm
-    if effect.put is growing:
-        return effect.usual * machine.arm
-    if effect.put is spring:
-        return effect.usual * largest / max(float(np.ptp(angle_of(machine, c))) for c in machine.recordings.values())
-    return effect.usual * largest
+def first_magnitude(effect: Effect, machine: Machine) -> float:
+    """In the unit of the effect, above 0."""
+    recordings = list(machine.recordings.values())
+    torque = largest_force(machine) * machine.arm
+    stroke = max(float(np.ptp(angle_of(machine, columns))) for columns in recordings)
+    speed = max(usual_speed(machine, columns) for columns in recordings)
+    scales = {"one": 1.0, "torque": torque, "arm": machine.arm, "stroke": stroke}
+    scales |= {"stiffness": torque / stroke, "damping": torque / speed}
+    return effect.first * scales[effect.scale]
+
+
+def largest_force(machine: Machine) -> float:
+    return max(float(np.percentile(np.abs(columns[FORCE]), 95)) for columns in machine.recordings.values())
+
+
+def put(machine: Machine, effect: Effect, magnitude: float) -> Machine:
+    """The recordings with the effect; the model as it is."""
+    altered = {name: effect.put(machine, columns, magnitude) for name, columns in machine.recordings.items()}
+    return replace(machine, recordings=altered)
 
 
 # --- strength ---------------------------------------------------------------------------------------------------------
@@ -271,8 +284,8 @@ def usual(effect: Effect, machine: Machine) -> float:
 def residual(machine: Machine, columns: Columns) -> Array:
     """[B] N·m: measured torque less known load less the model's, in blocks."""
     arrays = {key.removesuffix("[1]"): value if key == "time" else value[:, None] for key, value in columns.items()}
-    found = run_recording(machine.model, arrays, machine.kinematics)
-    left = (found["compensated_torque"][:, 0] - columns[LOAD]).astype(float)
+    outputs = run_recording(machine.model, arrays, machine.kinematics)
+    left = (outputs["compensated_torque"][:, 0] - columns[LOAD]).astype(float)
     size = max(1, round(BLOCK / float(np.median(np.diff(columns["time"])))))
     return np.asarray(left[: len(left) // size * size].reshape(-1, size).mean(axis=1))
 
@@ -315,39 +328,3 @@ def bent(machine: Machine) -> Array:
     matrix = matrix[:, np.linalg.norm(matrix, axis=0) > 0.0]
     left, size, _ = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), full_matrices=False)
     return np.asarray(left[:, size > 1e-9 * size[0]])
-
-
-def put(machine: Machine, effect: Effect, magnitude: float) -> Machine:
-    """The recordings with the effect; the model as it is."""
-    altered = {name: effect.put(machine, columns, magnitude) for name, columns in machine.recordings.items()}
-    return replace(machine, recordings=altered)
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """machine: with the effect in its recordings. strength, share: what survives refitting, over the remainder of the
-    model and over the effect's own variance."""
-
-    machine: Machine
-    magnitude: float
-    strength: float
-    share: float
-
-
-def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -> Hidden:
-    """The effect at a strength. machine: freed of it. Raises ValueError where no magnitude has the strength."""
-    before, nuisance = residuals(machine), bent(machine)
-    noise = before - nuisance @ (nuisance.T @ before)
-    magnitude = usual(effect, machine)
-    for _ in range(ROUNDS):
-        if not magnitude <= effect.most:
-            break
-        made = put(machine, effect, sign * magnitude)
-        added = residuals(made) - before
-        left = added - nuisance @ (nuisance.T @ added)
-        found = float(left @ left) / float(noise @ noise)
-        if abs(found / strength - 1.0) < CLOSE:
-            share = float(left @ left) / max(float((added - added.mean()) @ (added - added.mean())), 1e-300)
-            return Hidden(made, sign * magnitude, found, share)
-        magnitude *= float(np.sqrt(strength / found))
-    raise ValueError(f"strength {strength}: no sound magnitude of this effect has it; tried up to {magnitude:g}")
