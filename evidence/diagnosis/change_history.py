@@ -1,6 +1,6 @@
-"""Six recordings of a finger in numpy, the friction of one edge 6 % higher from each to the next: dated, for --history.
+"""Six dated recordings of a finger in numpy, the friction of one edge 6 % higher from each to the next.
 
-python python_tests/hidden_effects/change_history_case.py -o history
+python -m evidence.diagnosis.change_history -o history
 cd history && tendonfmu diagnose finger.json 2026-*.parquet --history -o out
 """
 
@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from change_fingers import NO_CHANGE, How, record_numpy
-from change_simulated import Plan, described, fitted, numpy_maxwell, scaled
+from evidence.diagnosis.change_measured import fitted
+from evidence.diagnosis.change_simulated import NONE, How, described, numpy_maxwell, record, scaled
 from tendonfmu.files.tables import write_table
 
 DAYS = ("2026-03-01", "2026-03-08", "2026-03-15", "2026-03-22", "2026-04-05", "2026-04-12")
@@ -23,16 +20,16 @@ SECONDS = 30.0
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if it is not there")
     folder: Path = parser.parse_args().output
     folder.mkdir(parents=True, exist_ok=True)
     for k, day in enumerate(DAYS):
-        change = scaled("SHARE", 1.0 + GROWTH * k, 4, 0) if k else NO_CHANGE
-        columns = record_numpy(numpy_maxwell, change, How(motion=100 + k, noise=200 + k, seconds=SECONDS)).columns
-        write_table(folder / f"{day}.parquet", columns)
+        difference = scaled("SHARE", 1.0 + GROWTH * k, 4, 0) if k else NONE
+        columns = record(numpy_maxwell, difference, How(motion=100 + k, noise=200 + k, seconds=SECONDS)).columns
+        write_table(folder / f"{day}.parquet", dict(columns))
         if not k:
-            model = fitted(described(Plan("maxwell", "motion")), columns)
+            model = fitted(described(numpy_maxwell), [columns])
             (folder / "finger.json").write_text(json.dumps(model), encoding="utf-8")
 
 
