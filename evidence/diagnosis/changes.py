@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evidence.diagnosis.command import HALVES, Run, run_diagnose
-from evidence.judge import UNKNOWN, Truth, effects_of, holds, judge
+from evidence.judge import UNKNOWN, Truth, alternatives, holds, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, by, count, table
 from tendonfmu.files.tables import write_table
@@ -105,7 +105,9 @@ def answer_of(change: Change, asked: str, run: Run) -> dict[str, Any]:
     judgement = judge(run.report["causes"], truth)
     return answer | {
         "verdict": run.report["verdict"],
-        "causes": " ".join("/".join([cause["effect"], *sorted(effects_of(cause))]) for cause in causes),
+        "causes": " ".join(
+            "/".join([cause["effect"], *(other["effect"] for other in alternatives(cause))]) for cause in causes
+        ),
         "named": judgement.named,
         "false": judgement.false,
         "friction": judgement.friction,
