@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import hashlib
 import json
 import math
 import os
@@ -82,12 +83,17 @@ def plain(value: Any) -> Any:
     """The value as JSON has it: arrays as lists, numbers that are not finite as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, list | tuple):
         return [plain(inner) for inner in value]
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def digest(*values: Any) -> str:
+    """Of all that a case depends on, for its name: what was computed with other settings is not taken for it."""
+    return hashlib.sha256(json.dumps(plain(values), sort_keys=True).encode()).hexdigest()[:12]
 
 
 # --- command line -----------------------------------------------------------------------------------------------------

@@ -87,7 +87,7 @@ def values_of(rows: Iterable[Row], key: str) -> list[Any]:
 
 def where(rows: Iterable[Row], **wanted: Any) -> list[Row]:
     """The rows that have these values."""
-    return [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
+    return list(filter(equal(**wanted), rows))
 
 
 def by(rows: Sequence[Row], keys: Sequence[str], cells: Callable[[Sequence[Row]], Sequence[str]]) -> list[list[str]]:
@@ -96,6 +96,25 @@ def by(rows: Sequence[Row], keys: Sequence[str], cells: Callable[[Sequence[Row]]
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
     return [[*map(_word, group), *cells(members)] for group, members in groups.items()]
+
+
+def crossed(
+    rows: Sequence[Row],
+    lines: Mapping[str, Callable[[Row], Any]],
+    columns: Mapping[str, Callable[[Row], Any]],
+    cell: Callable[[list[Row]], str],
+) -> str:
+    """A table whose cells say something of the rows for which both the line and the column hold."""
+    cells = []
+    for name, in_line in lines.items():
+        members = [row for row in rows if in_line(row)]
+        cells.append([name, *(cell([row for row in members if in_column(row)]) for in_column in columns.values())])
+    return table(["", *columns], cells)
+
+
+def equal(**wanted: Any) -> Callable[[Row], bool]:
+    """Whether a row has these values."""
+    return lambda row: all(row.get(key) == value for key, value in wanted.items())
 
 
 def _word(value: Any) -> str:
