@@ -22,9 +22,8 @@ from repository_paths import ROOT
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 
-sys.path.insert(0, str(ROOT / "python_tests" / "hidden_effects"))
-
-from measured import EFFECTS, FORCE, Columns, Description, Machine, hide, put, residuals
+from evidence.diagnosis.measured import EFFECTS, FORCE, Columns, Description, Machine, put, residuals
+from evidence.diagnosis.measured_cases import hide
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.files.tables import write_table

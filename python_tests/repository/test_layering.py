@@ -56,7 +56,6 @@ COMMANDS = {
     "cli/program.py",
     "cli/build.py",
     "cli/calibrate.py",
-    "cli/campaign.py",
     "cli/check.py",
     "cli/convert.py",
     "cli/demo.py",

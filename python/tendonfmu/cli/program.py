@@ -19,7 +19,6 @@ from typer.main import get_command
 from tendonfmu.cli import (
     build,
     calibrate,
-    campaign,
     check,
     convert,
     demo,
@@ -60,7 +59,6 @@ for command in (
     calibrate,
     diagnose,
     detect,
-    campaign,
     demo,
 ):  # the order of --help
     command.register(app)

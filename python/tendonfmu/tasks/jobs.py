@@ -225,7 +225,7 @@ def _library() -> Any:
 
 @contextmanager
 def _local_workers(library: Any, count: int) -> Iterator[Any]:
-    """Start workers with one thread of linear algebra each, on a free port, so that two campaigns do not conflict."""
+    """Start workers with one thread of linear algebra each, on a free port, so that two runs do not conflict."""
     import dask
 
     limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")

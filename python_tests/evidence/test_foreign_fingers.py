@@ -1,12 +1,14 @@
-"""The foreign test beds themselves: same seed same bits, sound mechanics, hidden effects of the stated size."""
+"""The foreign fingers: same seed same bits, sound mechanics, hidden effects of the stated size; and a run on them."""
 
 from __future__ import annotations
 
 import ast
 import dataclasses
 import functools
+import json
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
@@ -14,14 +16,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import fingers_in_numpy
-import recorded
-from foreign_case import Array, Case, Truth
+from evidence.diagnosis import command
+from evidence.diagnosis.command import run_diagnose
+from evidence.diagnosis.foreign_cases import cases_of, markdown, row_of
+from evidence.fingers import numpy_cases, recorded
+from evidence.fingers.foreign import Array, Case, Truth
 from repetitions import repeated
+from repository_paths import ROOT
 
 try:
-    import fingers_in_mujoco
-    import mujoco_run
+    from evidence.fingers import mujoco_cases, mujoco_run
 
     HAS_MUJOCO = True
 except ModuleNotFoundError as missing:
@@ -29,15 +33,14 @@ except ModuleNotFoundError as missing:
         raise
     HAS_MUJOCO = False
 
-FOLDER = Path(__file__).resolve().parent
+FOLDER = ROOT / "evidence" / "fingers"
 SECONDS = 6.0  # of the training recordings that are made here
 NEEDS_MUJOCO = pytest.mark.skipif(not HAS_MUJOCO, reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
 # every numpy case, and the MuJoCo cases that use different parts of its model
 MUJOCO_NUMBERS = (3, 11, 14)
-BEDS = [pytest.param("fingers_in_numpy", number, id=f"numpy_{number:02d}") for number in fingers_in_numpy.NUMBERS]
+BEDS = [pytest.param("numpy_cases", number, id=f"numpy_{number:02d}") for number in numpy_cases.NUMBERS]
 BEDS += [
-    pytest.param("fingers_in_mujoco", number, id=f"mujoco_{number:02d}", marks=NEEDS_MUJOCO)
-    for number in MUJOCO_NUMBERS
+    pytest.param("mujoco_cases", number, id=f"mujoco_{number:02d}", marks=NEEDS_MUJOCO) for number in MUJOCO_NUMBERS
 ]
 # Effects that alter what the sensors say of a position, so that R⁺ x1 is not the joint angle.
 BENT = {"time_delay", "pulley_eccentricity", "moment_arm_variation", "force_gain", "force_offset"}
@@ -47,7 +50,7 @@ UNSIZED = {"none", "time_delay", "force_gain", "force_offset"}
 
 
 def bed(module: str) -> ModuleType:
-    return sys.modules[module]
+    return import_module(f"evidence.fingers.{module}")
 
 
 @functools.cache
@@ -70,9 +73,9 @@ def spring(case: Case) -> Array:
 @pytest.mark.parametrize(
     ("module", "number"),
     [
-        ("fingers_in_numpy", 1),
-        ("fingers_in_numpy", 2),
-        pytest.param("fingers_in_mujoco", 1, marks=NEEDS_MUJOCO),
+        ("numpy_cases", 1),
+        ("numpy_cases", 2),
+        pytest.param("mujoco_cases", 1, marks=NEEDS_MUJOCO),
     ],
 )
 def test_the_same_seed_gives_the_same_case(module: str, number: int) -> None:
@@ -156,8 +159,8 @@ def test_hidden_torques_have_their_size(module: str, number: int) -> None:
 @NEEDS_MUJOCO
 def test_spatial_and_fixed_tendons_make_the_same_finger() -> None:
     """Wrapped around cylinders on the joints' axes, tendons have constant arms: the two routings must agree."""
-    plan = fingers_in_mujoco.Plan("none", 3)
-    physics = fingers_in_mujoco.finger(plan, np.random.default_rng(1))
+    plan = mujoco_cases.Plan("none", 3)
+    physics = mujoco_cases.finger(plan, np.random.default_rng(1))
     motion = mujoco_run.random_motion(3, np.random.default_rng(2))
     fixed, spatial = (
         mujoco_run.run(dataclasses.replace(physics, spatial=each), Truth("none", 3), motion, 0.5, 250.0)
@@ -169,10 +172,10 @@ def test_spatial_and_fixed_tendons_make_the_same_finger() -> None:
 
 @NEEDS_MUJOCO
 def test_the_probe_touches_while_it_pushes() -> None:
-    number = next(k for k in fingers_in_mujoco.NUMBERS if fingers_in_mujoco.PLANS[k - 1].hidden == "contact")
-    plan = fingers_in_mujoco.PLANS[number - 1]
+    number = next(k for k in mujoco_cases.NUMBERS if mujoco_cases.PLANS[k - 1].hidden == "contact")
+    plan = mujoco_cases.PLANS[number - 1]
     rng = np.random.default_rng(3)
-    physics = fingers_in_mujoco.finger(plan, rng)
+    physics = mujoco_cases.finger(plan, rng)
     physics = dataclasses.replace(physics, pushes=((1.0, 2.0, 0.8),))
     motion = mujoco_run.random_motion(plan.joints, rng)
     trace = mujoco_run.run(physics, Truth("contact", plan.joints), motion, 2.5, 250.0)
@@ -181,18 +184,7 @@ def test_the_probe_touches_while_it_pushes() -> None:
     assert touched[(trace.time > 1.5) & (trace.time < 2.0)].min() > 0.01
 
 
-def test_numbers_of_the_families() -> None:
-    hidden = [plan.hidden for plan in fingers_in_numpy.PLANS]
-    assert len(hidden) >= 14 and hidden.count("none") >= 4
-    assert {fingers_in_numpy.PLANS[k].simulator for k in range(0, len(hidden), 2)} == {
-        plan.simulator for plan in fingers_in_numpy.PLANS
-    }
-    if HAS_MUJOCO:
-        assert len(fingers_in_mujoco.PLANS) >= 12
-        assert {plan.joints for plan in fingers_in_mujoco.PLANS if plan.hidden == "none"} == {2, 3, 4}
-
-
-@pytest.mark.skipif(recorded.folder() is None, reason="SKIPPED: no folder shared/foreign beside the repository")
+@pytest.mark.skipif(not recorded.TRUTHS.is_file(), reason="SKIPPED: no folder shared/foreign beside the repository")
 def test_recorded_cases_are_read() -> None:
     numbers = recorded.numbers()
     assert len(numbers) == 26
@@ -204,17 +196,65 @@ def test_recorded_cases_are_read() -> None:
 def imports(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield (node.module or "").partition(".")[0]
+            yield node.module or ""
 
 
-def test_beds_share_nothing_with_the_product() -> None:
-    own = {path.stem for path in FOLDER.glob("*.py")}
-    allowed = own | set(sys.stdlib_module_names) | {"numpy", "scipy", "pandas", "mujoco", "pytest", "repetitions"}
-    beds = [path for path in FOLDER.glob("*.py") if path.name != "visibility.py"]  # the judge's own computation
-    foreign = {path.name: set(imports(path)) - allowed for path in beds}
-    assert {name: found for name, found in foreign.items() if found} == {}
-    simulators = {path: set(imports(path)) & own for path in FOLDER.glob("numpy_*.py")}
-    assert len(simulators) >= 4
-    assert all(found == {"foreign_case"} for found in simulators.values())
+def test_foreign_fingers_share_nothing_with_the_product() -> None:
+    foreign = [
+        path for path in FOLDER.glob("*.py") if path.name.startswith(("numpy_", "mujoco_", "foreign", "sticking"))
+    ]
+    assert len(foreign) >= 11
+    for path in foreign:
+        shared = {name for name in imports(path) if name.partition(".")[0] == "tendonfmu" or "matched" in name}
+        assert shared == set(), path.name
+    for path in FOLDER.glob("numpy_*.py"):
+        own = {name for name in imports(path) if name.startswith("evidence.")}
+        assert path.stem == "numpy_cases" or own == {"evidence.fingers.foreign"}
+
+
+# --- a run of the command, with a program in its place that writes what a test wants ----------------------------------
+
+REPORT = {
+    "verdict": "explained",
+    "nominal": {"test_rms": [0.02, 0.01]},
+    "extended": {"test_rms": [0.01, 0.005]},
+    "gain": {"value": 0.5, "interval": [0.4, 0.6]},
+    "causes": [{"effect": "gravity", "joint": 1, "tendon": None, "gain": {"value": 0.5, "interval": [0.4, 0.6]}}],
+}
+WRITES = f"""
+import os, sys
+assert sys.argv[1:] == "diagnose finger.json -o report --no-progress".split()
+spent = sum(k * k for k in range(2_000_000))
+os.mkdir("report")
+open("report/diagnosis.json", "w").write({json.dumps(REPORT)!r})
+"""
+FAILS = "import sys\nprint('some words', file=sys.stderr)\nsys.exit('internal error: x | y')"
+SLEEPS = "import time\ntime.sleep(60)"
+
+
+def test_the_table_has_a_row_for_each_end_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = numpy_cases.make(6, 1.0, 0.5)
+    rows = []
+    for k, (program, limit) in enumerate(((WRITES, 60.0), (FAILS, 60.0), (SLEEPS, 0.5))):
+        monkeypatch.setattr(command, "PROGRAM", (sys.executable, "-c", program))
+        (tmp_path / str(k)).mkdir()
+        run = run_diagnose(["finger.json"], tmp_path / str(k), limit)
+        rows.append(json.loads(json.dumps(row_of(case, run) | {"name": f"made_0{k}"})))
+    assert [row["exit"] for row in rows] == [0, 1, None] and rows[2]["message"] == "ended after 0.5 s"
+    assert rows[0]["seconds"] > 0.02 and rows[0]["peak_megabytes"] > 3.0
+    assert rows[0]["first"] and rows[0]["false"] == [] and rows[0]["error_ratio"] == pytest.approx(0.5)
+    text = markdown(rows)
+    assert "gravity j1 50 %" in text and "internal error: x / y" in text
+    # a run without a report counts as wrong
+    assert "| runs that end with a report | 1/3 |" in text and "| true cause in the set | 1/3 |" in text
+    assert "| gain ≥ 0 | 1/3 |" in text and "| false causes per case | 0.00 |" in text
+    nothing = rows[0] | {"hidden": rows[0]["hidden"] | {"effect": "none"}, "asked": False}
+    assert "| made_00 | 2 | 20.00, 10.00 | 10.00, 5.00 |" in markdown([nothing])
+
+
+def test_halves_are_by_number() -> None:
+    odd, even = (cases_of(half) for half in ("odd", "even"))
+    assert all(number % 2 for _, number in odd.values()) and not set(odd) & set(even)
+    assert cases_of("all").keys() == odd.keys() | even.keys()

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from corruptions import Corruption, applicable, columns_of, corrupt, corruptions
-from foreign_case import frame
+from evidence.fingers.corruptions import Corruption, applicable, columns_of, corrupt, corruptions
+from evidence.fingers.foreign import frame
 
 CORRUPTIONS = list(corruptions())
 

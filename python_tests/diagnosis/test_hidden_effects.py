@@ -6,32 +6,28 @@ runs online, where a bias follows what is slow, and certain on unseen data: its 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import cases
+from evidence.diagnosis import makers
+from evidence.diagnosis.makers import Made, Options
 from tendonfmu.diagnosis.diagnosis import diagnose
-from tendonfmu.diagnosis.result import Cause, Diagnosis
+from tendonfmu.diagnosis.result import Diagnosis
 
-SHORT = {"joints": 1, "seconds": 40.0, "rate": 250.0}
+SHORT = Options(joints=1, seconds=40.0, rate=250.0)
 
 
-def diagnosed(folder: Path, made: Mapping[str, Any]) -> Diagnosis:
-    recordings, tests = ([folder / name for name in made.get(key, [])] for key in ("recordings", "test"))
-    return diagnose(folder / made["finger"], recordings, tests, kinematics=made["kinematics"])
+def diagnosed(made: Made) -> Diagnosis:
+    return diagnose(made.finger, list(made.recordings), list(made.test), kinematics=made.kinematics)
 
 
 def sets_of(found: Diagnosis) -> list[set[str]]:
     """Effects of each cause and of those that it may be confused with."""
     return [{cause.where.effect, *(each.effect for each in cause.confusable_with)} for cause in found.causes]
-
-
-def places_of(cause: Cause) -> set[tuple[int | None, int | None]]:
-    return {(place.joint, place.tendon) for place in cause.places}
 
 
 # effect: strength, on the presliding rig
@@ -72,9 +68,9 @@ def of_long(effect: str) -> Any:
 @pytest.mark.parametrize("effect", [*DEFAULT, *map(of_long, LONG)])
 def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -> None:
     strength, presliding = (DEFAULT | LONG)[effect]
-    made = cases.single(tmp_path, effect, strength, 1, presliding=presliding, **SHORT)
-    assert made["facts"]["surviving_share"] >= cases.VISIBLE
-    found = diagnosed(tmp_path, made)
+    made = makers.single(tmp_path, 1, replace(SHORT, presliding=presliding), effect, strength)
+    assert made.facts["surviving_share"] >= makers.VISIBLE
+    found = diagnosed(made)
     assert any(effect in names for names in sets_of(found))
     assert all(cause.gain.low > 0.0 and cause.gain.value >= found.least_gain for cause in found.causes)
     assert found.gain.value >= 0.0
@@ -90,7 +86,7 @@ def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -
     ],
 )
 def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, wander: float, tmp_path: Path) -> None:
-    found = diagnosed(tmp_path, cases.null(tmp_path, seed, presliding=presliding, wander=wander, **SHORT))
+    found = diagnosed(makers.null(tmp_path, seed, replace(SHORT, presliding=presliding, wander=wander)))
     assert found.causes == () and found.verdict == "adequate"
     assert {each.where.effect for each in found.invisible} >= {"force_offset"}
     assert "cover_hardening" not in {each.where.effect for each in found.invisible}  # one of ordinary size would show
@@ -103,7 +99,8 @@ def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, w
     ("effects", "strength"), [(("preload_friction", "inertia"), 1.0), (("gravity", "load_friction"), 3.0)]
 )
 def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: float, tmp_path: Path) -> None:
-    found = sets_of(diagnosed(tmp_path, cases.double(tmp_path, list(effects), strength, 1, presliding=True, **SHORT)))
+    made = makers.double(tmp_path, 1, replace(SHORT, presliding=True), effects, strength)
+    found = sets_of(diagnosed(made))
     assert all(any(effect in names for names in found) for effect in effects)
 
 
@@ -120,21 +117,19 @@ def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: f
     ],
 )
 def test_what_the_list_lacks_is_called_unexplained(kind: str, strength: float, tmp_path: Path) -> None:
-    made = cases.single(tmp_path, kind, strength, 1, presliding=True, **(SHORT | {"seconds": 60.0}))
-    found = diagnosed(tmp_path, made)
+    found = diagnosed(makers.single(tmp_path, 1, replace(SHORT, presliding=True, seconds=60.0), kind, strength))
     assert found.verdict in ("unexplained", "partly explained")
     assert found.unexplained.share > 0.05
 
 
 def test_a_diagnosis_names_measures_and_extends(tmp_path: Path) -> None:
     """The whole of it: place, size and gain of friction that grows with a tendon's force."""
-    made = cases.single(tmp_path, "load_friction", 1.0, 5, presliding=True, test=40.0, **SHORT)
-    truth, size = made["truth"][0], made["facts"]["magnitude"]
-    found = diagnosed(tmp_path, made)
+    made = makers.single(tmp_path, 5, replace(SHORT, presliding=True, test=40.0), "load_friction", 1.0)
+    (truth,), size = made.truths, made.facts["magnitude"]
+    found = diagnosed(made)
     first = found.causes[0]
-    assert first.where.effect == truth["effect"]
-    assert (truth["joint"], truth["tendon"]) in places_of(first)
-    own = next(place for place in first.places if (place.joint, place.tendon) == (truth["joint"], truth["tendon"]))
+    assert (first.where.effect,) == truth.effects
+    own = next(place for place in first.places if (place.joint, place.tendon) == (truth.joint, truth.tendon))
     value = next(value for path, (value, _) in own.parameters.items() if path.endswith(".coulomb"))
     assert value == pytest.approx(size, rel=0.3)
     assert not found.held_out
@@ -145,7 +140,7 @@ def test_a_diagnosis_names_measures_and_extends(tmp_path: Path) -> None:
 @pytest.mark.parametrize("effect", ["force_offset", "gravity", "moment_arm"])
 def test_absorbed_is_told_to_be_invisible(effect: str, tmp_path: Path) -> None:
     """A constant or slow torque goes into the bias. What is left of an arm that is off goes down in the noise."""
-    found = diagnosed(tmp_path, cases.absorbed(tmp_path, effect, 1, presliding=True, **SHORT))
+    found = diagnosed(makers.absorbed(tmp_path, 1, replace(SHORT, presliding=True), effect))
     listed = [each for each in found.invisible if each.where.effect == effect]
     assert listed and all(each.experiment for each in listed)
     assert all(each.absorbed or (each.ordinary_gain or 0.0) < found.least_gain for each in found.invisible)

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from effects_hidden import BUILDERS, hide
-from friction_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
-from hidden_unknown import UNKNOWN
-from matched_rig import Hand, Made, Noise, coloured, random_hand, record
+from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN, hide, placed, scaled
+from evidence.fingers.matched_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
+from evidence.fingers.matched_rig import Hand, Made, Noise, coloured, random_hand, record
+from evidence.fingers.matched_strength import group, kinematics, residual, shown_strength, strength_of
 from repetitions import repeated
-from strength import group, kinematics, residual, strength_of
 from tendonfmu.model import native
 
 Array = NDArray[Any]
@@ -162,3 +161,14 @@ def test_relative_tendon_velocity_is_that_of_the_joints_beyond() -> None:
         [pytest.approx(0.05), pytest.approx(0.04), 0.0],
         [0.0, pytest.approx(0.01), 0.0],
     ]
+
+
+def test_what_a_force_sensor_adds_stays_absorbed_and_what_it_scales_shows_at_other_tensions() -> None:
+    """An offset is a constant torque at every pretension; a gain grows with it."""
+    bare = replace(random_hand(4, 1, rate=250.0), tension_time=8.0)
+    strengths = {}
+    for effect in ("force_offset", "force_gain"):
+        hand, hidden = placed(bare, effect, 1)
+        hand, _ = scaled(hand, hidden, None, motion=2, seconds=20.0)
+        strengths[effect] = shown_strength(hand, 2, 20.0)
+    assert strengths["force_offset"] < 0.01 and strengths["force_gain"] > 1.0
