@@ -16,10 +16,14 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-from .programs import call_program, compiler, small
-from .row import ROOT, Outcome, Row, Run, called
+import pandas as pd
 
-DEMO = ROOT / "examples" / "demo_recording"
+from evidence.reliability.binaries import answers
+from evidence.reliability.programs import small
+from evidence.reliability.row import Outcome, Row, Run, with_wrong
+from evidence.runner import EXAMPLES
+
+DEMO = EXAMPLES / "demo_recording"
 COMMAND = [sys.executable, "-m", "tendonfmu.cli"]
 SECONDS = 12.0  # of motion: commands have to end within seconds
 
@@ -28,24 +32,16 @@ COMMANDS: dict[str, list[str]] = {
     "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json", "--report", "out/report.json"],
     "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
     "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
-    "campaign": ["campaign", "cases.json", "-o", "out/rows"],
 }
 
 
 def inputs(folder: Path) -> None:
-    """finger.json, free.parquet and cases.json of the demo's small finger."""
-    import pandas as pd
-
+    """The demo's small finger and seconds of its motion."""
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "out").mkdir(parents=True)
     shutil.copy(DEMO / "two_joints.json", folder / "finger.json")
     frame = pd.read_parquet(DEMO / "two_joints_training.parquet")
     frame[frame["time"] < frame["time"].iloc[0] + SECONDS].to_parquet(folder / "free.parquet")
-    cases = [
-        {"name": f"case_{k}", "group": "null", "finger": "finger.json", "recordings": ["free.parquet"], "seed": k}
-        for k in range(2)
-    ]
-    (folder / "cases.json").write_text(json.dumps({"format": "tendonfmu-campaign-1", "cases": cases}))
 
 
 # --- is a file whole? -------------------------------------------------------------------------------------------------
@@ -80,8 +76,8 @@ def entries(folder: Path) -> list[Path]:
 
 def results(folder: Path) -> dict[str, Path]:
     """Files that a user sees: no part of the name begins with a dot."""
-    found = {path.relative_to(folder): path for path in entries(folder) if path.is_file()}
-    return {str(name): path for name, path in found.items() if not any(part.startswith(".") for part in name.parts)}
+    files = {path.relative_to(folder): path for path in entries(folder) if path.is_file()}
+    return {str(name): path for name, path in files.items() if not any(part.startswith(".") for part in name.parts)}
 
 
 def hidden(folder: Path) -> list[Path]:
@@ -115,7 +111,7 @@ def killed(folder: Path, words: list[str], chance: random.Random, longest: float
 
 def kills(run: Run) -> Outcome:
     chance = random.Random(1)
-    each = run.count(40, 2)
+    kills_of_each = run.count(50, 2)
     total = 0
     wrong: list[str] = []
     left = 0
@@ -131,7 +127,7 @@ def kills(run: Run) -> Outcome:
             continue
         shutil.rmtree(folder / "out")
         (folder / "out").mkdir()
-        for k in range(each):
+        for k in range(kills_of_each):
             total += killed(folder, words, chance, took, at_a_write=k % 2 == 0)
             halves = [file for file, path in results(folder / "out").items() if not is_whole(path)]
             wrong += [f"{name}: half of {file}" for file in halves]
@@ -141,8 +137,8 @@ def kills(run: Run) -> Outcome:
             wrong.append(f"{name}: other files than without a kill: {sorted(set(results(folder / 'out')) ^ whole)[:4]}")
         left += len(hidden(folder / "out"))
     number = f"kill -9 {total} times in {', '.join(COMMANDS)}: at random, and as a file is being written"
-    result = f"{len(wrong)} half files or commands that do not go on; {left} hidden temporary files left"
-    return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong)
+    result = f"no half file, and every command goes on; {left} hidden temporary files left"
+    return Outcome(number, with_wrong(result, wrong), not wrong)
 
 
 # --- no room ----------------------------------------------------------------------------------------------------------
@@ -189,61 +185,48 @@ def on_a_small_disk(options: str, then: str, words: list[str]) -> list[str]:
 
 
 def can_mount() -> bool:
-    return (
-        shutil.which("unshare") is not None
-        and not subprocess.run(
-            ["unshare", "-m", "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True
-        ).returncode
-    )
+    trial = ["unshare", "-m", "mount", "-t", "tmpfs", "tmpfs", "/mnt"]
+    return shutil.which("unshare") is not None and subprocess.run(trial, capture_output=True).returncode == 0
 
 
-def file_limit(size: int) -> Callable[[], None]:
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    return limit
+def limited(kind: int, size: int) -> Callable[[], None]:
+    return lambda: resource.setrlimit(kind, (size, size))
 
 
-def memory_limit(size: int) -> Callable[[], None]:
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (size, size))
-
-    return limit
+def trials(name: str, words: list[str]) -> list[tuple[str, list[str], Callable[[], None] | None]]:
+    """What a command is tried with: title, command, limit."""
+    plain = [*COMMAND, *words, "--quiet"]
+    found: list[tuple[str, list[str], Callable[[], None] | None]] = [
+        (f"{name}, files of at most {size} bytes", plain, limited(resource.RLIMIT_FSIZE, size))
+        for size in (0, 1, 4096, 65536)
+    ]
+    if can_mount():
+        sizes = ("4k", "16k", "64k")
+        found += [(f"{name}, disk of {size}", on_a_small_disk(f"size={size}", "", words), None) for size in sizes]
+        read_only = on_a_small_disk("size=1m", "mount -o remount,ro out &&", words)
+        found.append((f"{name}, read-only disk", read_only, None))
+    return found + [
+        (f"{name}, {size} MiB of memory", plain, limited(resource.RLIMIT_AS, size << 20))
+        for size in (250, 350, 500, 700)
+    ]
 
 
 def no_room(run: Run) -> Outcome:
     folder = run.work / "disk"
     tried = ended = lost = 0
     wrong: list[str] = []
-    mounts = can_mount()
     names = list(SMALL_COMMANDS)[: run.count(len(SMALL_COMMANDS), 2)]
     for name in names:
-        words = SMALL_COMMANDS[name]
-        plain = [*COMMAND, *words, "--quiet"]
-        trials: list[tuple[str, list[str], Callable[[], None] | None]] = [
-            (f"{name}, files of at most {size} bytes", plain, file_limit(size)) for size in (0, 1, 4096, 65536)
-        ]
-        if mounts:
-            trials += [
-                (f"{name}, disk of {size}", on_a_small_disk(f"size={size}", "", words), None)
-                for size in ("4k", "16k", "64k")
-            ]
-            trials += [
-                (f"{name}, read-only disk", on_a_small_disk("size=1m", "mount -o remount,ro out &&", words), None)
-            ]
-        trials += [(f"{name}, {size} MiB of memory", plain, memory_limit(size << 20)) for size in (250, 350, 500, 700)]
-        for title, command, limit in trials:
+        for title, command, limit in trials(name, SMALL_COMMANDS[name]):
             inputs(folder)
-            said = refused(folder, title, command, limit)
+            answer = refused(folder, title, command, limit)
             tried += 1
-            ended += said == "ended"
-            lost += said == "lost"
-            wrong += [said] if said not in ("", "ended", "lost") else []
-    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
-    allocations, refusals, words_said, leaked = map(int, called(program, "hungry", *small(run).words(), "0").split())
+            ended += answer == "ended"
+            lost += answer == "lost"
+            wrong += [answer] if answer not in ("", "ended", "lost") else []
+    allocations, refusals, messages, leaked = map(int, answers(run, "hungry", small(run), 0))
     (run.work / "wrong.txt").write_text("\n".join(wrong))
-    fmu_sound = leaked == 0
-    disks = "full and read-only disks, " if mounts else ""
+    disks = "full and read-only disks, " if can_mount() else ""
     number = (
         f"{tried} runs of {', '.join(names)} with {disks}short files, little memory; "
         f"an FMU in which each of {allocations} allocations fails"
@@ -251,10 +234,10 @@ def no_room(run: Run) -> Outcome:
     result = (
         f"{tried - ended - lost - len(wrong)} refused in one line, {ended} had room enough, {lost} with little memory "
         f"ended, or waiting for ever, in a library or in Python itself, no half file; FMU: {refusals} of the "
-        f"allocations refuse a call, {words_said} with a word about memory, with the other {allocations - refusals} "
-        f"every call succeeds, {leaked} leaks; {len(wrong)} wrong"
+        f"allocations refuse a call, {messages} with a word about memory, with the other {allocations - refusals} "
+        f"every call succeeds, {leaked} leaks"
     )
-    return Outcome(number, "; ".join([result, *wrong[:4]]), not wrong and fmu_sound)
+    return Outcome(number, with_wrong(result, wrong), not wrong and leaked == 0)
 
 
 ROWS = [

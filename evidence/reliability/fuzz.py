@@ -14,8 +14,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from .programs import CALIBRATED
-from .row import ROOT, Outcome, Row, Run, Unavailable, called, spoken
+from evidence.recordings.log_cases import FORMATS, sound, write
+from evidence.reliability.programs import CALIBRATED
+from evidence.reliability.row import Outcome, Row, Run, Unavailable, called, spoken
+from evidence.runner import ROOT
+from tendonfmu.errors import InputError
+from tendonfmu.model import read_finger
+from tendonfmu.recordings import read_recording
+from tendonfmu.recordings.converters.table import convert_table
 
 BUILD = ROOT / "build" / "fuzz"
 OF_THE_PLANT = ("fuzz_rig", "fuzz_plant_fmi2")
@@ -25,12 +31,8 @@ def fuzzer(name: str) -> Path:
     """Built as runtime/fuzz/run_fuzzers.sh builds it; clang only, and for rigs and simulated fingers SUNDIALS."""
     if shutil.which("clang++") is None:
         raise Unavailable("clang++ is not installed; libFuzzer comes with it")
-    settings = [
-        "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
-        "-DTENDONFMU_BUILD_FUZZERS=ON",
-        "-DTENDONFMU_SANITIZE=ON",
-        "-DTENDONFMU_BUILD_TESTS=OFF",
-    ]
+    settings = ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DTENDONFMU_BUILD_TESTS=OFF"]
+    settings += ["-DTENDONFMU_BUILD_FUZZERS=ON", "-DTENDONFMU_SANITIZE=ON"]
     tools = ["-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++", f"-DPython_EXECUTABLE={sys.executable}"]
     if not (BUILD / "CMakeCache.txt").is_file():
         called("cmake", "-S", ROOT, "-B", BUILD, *settings, *tools)
@@ -74,29 +76,13 @@ def calls(run: Run) -> Outcome:
 
 # --- parsers ----------------------------------------------------------------------------------------------------------
 
+WORDS = (b"nan", b"-inf", b"1e999", b'"', b"{", b"]", b",", b"\n", b"\r", b"\0", b"\xff\xfe", b"null", b"-0", b"1e-400")
+WORDS += (b";", b"\t", b"[0]", b"\xc3")
+BAD_NUMBERS = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
+
 
 def spoilt(chance: random.Random, content: bytes) -> bytes:
     """Some bytes changed, cut out, doubled, or replaced by words that parsers stumble over."""
-    words = (
-        b"nan",
-        b"-inf",
-        b"1e999",
-        b'"',
-        b"{",
-        b"]",
-        b",",
-        b"\n",
-        b"\r",
-        b"\0",
-        b"\xff\xfe",
-        b"null",
-        b"-0",
-        b"1e-400",
-        b";",
-        b"\t",
-        b"[0]",
-        b"\xc3",
-    )
     made = bytearray(content)
     for _ in range(chance.randint(1, 6)):
         at, length = chance.randrange(len(made) + 1), chance.randint(0, 40)
@@ -108,38 +94,25 @@ def spoilt(chance: random.Random, content: bytes) -> bytes:
         elif kind == 2:
             made[at:at] = made[at : at + length]
         else:
-            made[at:at] = chance.choice(words)
+            made[at:at] = chance.choice(WORDS)
     return bytes(made)
 
 
-def readers(run: Run) -> dict[str, tuple[Path, bytes, Callable[[Path], Any]]]:
-    """Name -> file, its sound content, what reads it."""
-    from log_cases import FORMATS, sound, write
-    from tendonfmu.recordings import read_recording
-    from tendonfmu.recordings.converters.table import convert_table
-
+def spoil_and_read(run: Run) -> tuple[str, list[str]]:
+    """A recording and a map with wrong bytes: read, or refused in one line that names a file."""
     folder = run.work / "parsers"
     folder.mkdir(parents=True, exist_ok=True)
     form = FORMATS["CSV"]
     log = write(folder, form, {name: values[:30] for name, values in sound().items()})
     rows = ["time,tendon_force[1],tendon_position[1]", *(f"{0.01 * k},{5 + 0.1 * k},{1e-4 * k}" for k in range(40))]
-    return {
-        "recording.csv": (folder / "recording.csv", ("\n".join(rows) + "\n").encode(), read_recording),
-        "map.json": (
-            folder / "map.json",
-            json.dumps(form.map(), indent=1).encode(),
-            lambda file: convert_table(log, file),
-        ),
+    readers: dict[str, tuple[bytes, Callable[[Path], Any]]] = {
+        "recording.csv": (("\n".join(rows) + "\n").encode(), read_recording),
+        "map.json": (json.dumps(form.map(), indent=1).encode(), lambda file: convert_table(log, file)),
     }
-
-
-def spoil_and_read(run: Run) -> tuple[str, list[str]]:
-    from tendonfmu.errors import InputError
-
     wrong: list[str] = []
     counts = []
-    for name, (file, content, read) in readers(run).items():
-        refused = 0
+    for name, (content, read) in readers.items():
+        refused, file = 0, folder / name
         tried = run.count(20_000)
         for seed in range(tried):
             file.write_bytes(spoilt(random.Random(seed), content))
@@ -147,7 +120,7 @@ def spoil_and_read(run: Run) -> tuple[str, list[str]]:
                 read(file)
             except InputError as error:
                 refused += 1
-                if "\n" in str(error) or (file.name not in str(error) and "log.csv" not in str(error)):
+                if "\n" in str(error) or (name not in str(error) and log.name not in str(error)):
                     wrong.append(f"{name} {seed}: {error}")
             except Exception as error:
                 wrong.append(f"{name} {seed}: {type(error).__name__}: {error}")
@@ -166,55 +139,49 @@ def numbers_of(tree: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
             yield here, tree, key if isinstance(tree, dict) else key - 1
 
 
-BAD_NUMBERS = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
-
-
 def bad_descriptions(run: Run) -> tuple[int, list[str]]:
     """Each number replaced by what is none, and a misspelt key beside it: refused with its path."""
-    from tendonfmu.errors import InputError
-    from tendonfmu.model import read_finger
-
-    sound = json.loads(CALIBRATED.read_text())
+    description = json.loads(CALIBRATED.read_text())
     chance, file, tried = random.Random(1), run.work / "bad.json", 0
     wrong: list[str] = []
-    places = [path for path, _, _ in numbers_of(sound)]
+    places = [path for path, _, _ in numbers_of(description)]
     for path in chance.sample(places, min(len(places), run.count(60, 10))):
         for bad in (*BAD_NUMBERS, "misspelt"):
-            spoiled = copy.deepcopy(sound)
-            _, container, key = next(each for each in numbers_of(spoiled) if each[0] == path)
+            changed = copy.deepcopy(description)
+            container, key = next((tree, key) for place, tree, key in numbers_of(changed) if place == path)
+            named = [path, path.rpartition("[")[0] if bad in ([], {}) else path, str(bad)]
             if bad == "misspelt" and isinstance(container, dict):
                 container[f"{key}x"] = container.pop(key)
+                named = [f"{key}x"]
             else:
                 container[key] = bad
-            expected = f"{key}x" if bad == "misspelt" and isinstance(container, dict) else path
-            file.write_text(json.dumps(spoiled))
+            file.write_text(json.dumps(changed))
             tried += 1
             try:
                 read_finger(file)
                 wrong.append(f"{path} = {bad}: taken")
             except InputError as refused:
-                if "JSON, line" in str(refused) and "column" in str(refused):
-                    continue  # NaN and Infinity are no JSON: the place in the text
-                parent = path.rpartition("[")[0] if bad in ([], {}) else path
-                if (
-                    expected not in str(refused) and parent not in str(refused) and str(bad) not in str(refused)
-                ) or "\n" in str(refused):
-                    wrong.append(f"{path} = {bad}: {refused}")
+                message = str(refused)
+                # NaN and Infinity are no JSON: the place in the text
+                in_text = "JSON, line" in message and "column" in message
+                if not in_text and ("\n" in message or not any(name in message for name in named)):
+                    wrong.append(f"{path} = {bad}: {message}")
     return tried, wrong
 
 
 def parsers(run: Run) -> Outcome:
-    tried, found = fuzzed(run, "fuzz_json", 10_000_000, run.minutes / 2, f"-dict={BUILD}/runtime/fuzz/keys.dict")
-    rigs, found_in_rigs = fuzzed(run, "fuzz_rig", 1_000_000, run.minutes / 2, f"-dict={BUILD}/runtime/fuzz/keys.dict")
+    dictionary = f"-dict={BUILD}/runtime/fuzz/keys.dict"
+    tried, broken = fuzzed(run, "fuzz_json", 10_000_000, run.minutes / 2, dictionary)
+    rigs, broken_rigs = fuzzed(run, "fuzz_rig", 1_000_000, run.minutes / 2, dictionary)
     counts, wrong = spoil_and_read(run)
     bad, unnamed = bad_descriptions(run)
     number = (
         f"{spoken(tried)} descriptions and {spoken(rigs)} rigs (libFuzzer, ASan, UBSan), {counts}; "
         f"{bad} descriptions with one wrong number or key"
     )
-    findings = [each for each in (found, found_in_rigs, *wrong[:3], *unnamed[:3]) if each]
+    findings = [finding for finding in (broken, broken_rigs, *wrong[:3], *unnamed[:3]) if finding]
     result = "no crash, no error but a refusal in one line; each wrong number and key is named with its path"
-    return Outcome(number, "; ".join(findings) if findings else result, not findings)
+    return Outcome(number, "; ".join(findings) or result, not findings)
 
 
 ROWS = [
@@ -225,11 +192,5 @@ ROWS = [
         "sequences of more than some 25 calls",
         calls,
     ),
-    Row(
-        "R14",
-        "Inputs of the parsers",
-        "1e7 descriptions, 1e6 rigs",
-        "logs of the binary formats beyond R15",
-        parsers,
-    ),
+    Row("R14", "Inputs of the parsers", "1e7 descriptions, 1e6 rigs", "logs of the binary formats beyond R15", parsers),
 ]

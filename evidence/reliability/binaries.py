@@ -1,4 +1,4 @@
-"""R5 to R13: the compiled step, alone and behind FMI: bits, hours, instances, threads, real time, the host."""
+"""R5 to R12: the compiled step, alone and behind FMI: bits, hours, threads, real time, the host."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
-from .programs import (
+from evidence.reliability.programs import (
     CALIBRATED,
+    HERE,
+    Packed,
     calibrated,
     call_program,
     compiler,
@@ -20,26 +21,35 @@ from .programs import (
     library,
     small,
 )
-from .row import ROOT, Outcome, Row, Run, called, pytest, spoken
+from evidence.reliability.row import Outcome, Row, Run, called, spoken
+from evidence.runner import EXAMPLES, INDEX_FINGER
 
-INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
+FINGERS = (
+    INDEX_FINGER,
+    CALIBRATED,
+    HERE / "small_finger.json",
+    EXAMPLES / "demo_recording" / "two_joints_hidden.json",
+)
 LEVELS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 
 
 def models(run: Run) -> dict[str, Path]:
-    """Images: the paper's finger, all that calibrate writes, two fingers with random extensions."""
+    """Images: the paper's finger, all that calibrate writes, two small ones with extensions and without."""
+    return {finger.stem: image(run, finger) for finger in FINGERS}
 
-    from random_fingers import random_extended, random_finger
 
-    found = {"index": image(run, INDEX_FINGER, "index"), "calibrated": image(run, CALIBRATED, "calibrated")}
-    for seed in (1, 2):
-        description = random_extended(seed, random_finger(seed))
-        found[f"extended{seed}"] = image(run, description, f"extended{seed}")
-    return found
+def steps_program(run: Run) -> Path:
+    return core_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
+
+
+def answers(run: Run, what: str, finger: Packed, *words: object, **options: object) -> list[str]:
+    """What fmu_calls prints."""
+    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
+    return called(program, what, *finger.words(), *map(str, words), **options).split()
 
 
 def restored(run: Run) -> Outcome:
-    program = core_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
+    program = steps_program(run)
     tried = wrong = 0
     cuts = [1, 777, 4321, *range(6000, 6000 + run.count(20) * 97, 97)][: 3 + run.count(20, 0)]
     for name, model in models(run).items():
@@ -59,18 +69,15 @@ def restored(run: Run) -> Outcome:
 
 
 def damaged(run: Run) -> Outcome:
-    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
-    mine, other = small(run), calibrated(run)
-    foreign = run.work / "other.state"
-    called(program, "save", *other.words(), "500", foreign)
-    older = run.work / "older.state"
-    called(program, "save", *mine.words(), "700", older)
+    finger, foreign, older = small(run), run.work / "other.state", run.work / "older.state"
+    answers(run, "save", calibrated(run), 500, foreign)
+    answers(run, "save", finger, 700, older)
     content = bytearray(older.read_bytes())
     content[8] -= 1  # the version of a state of an FMU before this one; the checksum does not cover it
     older.write_bytes(content)
     flips = run.count(100_000)
-    lines = called(program, "states", *mine.words(), "700", str(flips), foreign, older).splitlines()
-    (lengths, by_length), (_, plain), (_, repaired), (files, others) = (map(int, line.split()) for line in lines)
+    counts = map(int, answers(run, "states", finger, 700, flips, foreign, older))
+    lengths, by_length, _, plain, _, repaired, files, others = counts
     number = (
         f"{lengths} lengths, {flips:,} flipped bits, {flips:,} more under checksums made to fit, "
         f"{files} states of another finger and of an older version"
@@ -84,11 +91,10 @@ def damaged(run: Run) -> Outcome:
 
 
 def day(run: Run) -> Outcome:
-    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
     samples = run.count(86_400_000, 150_000)
-    answer = called(program, "day", *small(run).words(), str(samples), "24").split()
-    different, drift, largest = int(answer[0]), float(answer[1]), float(answer[2])
-    heap, resident = int(answer[3]), int(answer[4])
+    answer = answers(run, "day", small(run), samples, 24)
+    different, heap, resident = int(answer[0]), int(answer[3]), int(answer[4])
+    drift, largest = float(answer[1]), float(answer[2])
     number = (
         f"{spoken(samples)} samples at 1 kHz ({samples / 3.6e6:.3g} h), beside an instance saved, freed and made anew "
         "24 times"
@@ -99,22 +105,6 @@ def day(run: Run) -> Outcome:
         f"in the second half the heap grows by {heap} bytes, the resident memory by {resident} KiB"
     )
     return Outcome(number, result, different == 0 and drift < 1e-6 * largest and heap <= 0 and resident < 256)
-
-
-def instances(run: Run) -> Outcome:
-    from leak_count import ROUNDS, least_growth
-
-    made = run.count(100_000 // ROUNDS)
-    loads = run.count(10_000 // ROUNDS)
-    fmu = small(run).fmu
-    used, opened = least_growth(fmu, "bare", made)
-    lost, left = least_growth(fmu, "unloaded", loads)
-    number = f"{ROUNDS * made:,} instances, {ROUNDS * loads:,} loads and unloads, each in {ROUNDS} equal rounds"
-    result = (
-        f"in the round that left least (a leak shows in each): after {made:,} instances {used} bytes and {opened} "
-        f"handles, after {loads:,} loads {lost} bytes and {left} handles"
-    )
-    return Outcome(number, result, used < made and opened == 0 and lost < loads and left == 0)
 
 
 def threads(run: Run) -> Outcome:
@@ -139,17 +129,14 @@ LOCKS = re.compile(r"pthread_|sem_|mtx_|cnd_|futex|call_once|__cxa_guard")
 
 
 def real_time(run: Run) -> Outcome:
-    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
-    steps = core_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
     finger = calibrated(run)
     samples = run.count(1_000_000, 20_000)
-    allocated, wrong, status, noticed = map(int, called(program, "quiet", *finger.words(), str(samples)).split())
-    imported = {line.split()[-1] for line in called("nm", "-D", "--undefined-only", finger.fmu.binary).splitlines()}
+    allocated, wrong, status, noticed = map(int, answers(run, "quiet", finger, samples))
+    imported = {line.split()[-1] for line in called("nm", "-D", "--undefined-only", finger.binary).splitlines()}
     locks = sorted(name for name in imported if LOCKS.search(name))
     timed = run.count(100_000_000, 60_000)
-    kernel, median, worst, longest, slow = called(
-        steps, "times", image(run, CALIBRATED, "calibrated"), str(timed)
-    ).split()
+    times = called(steps_program(run), "times", image(run, CALIBRATED), str(timed)).split()
+    kernel, median, worst, longest, slow = times
     number = f"{spoken(samples)} × set, step, get under seccomp; {spoken(timed)} steps timed"
     result = (
         f"{allocated} allocations, {'no' if status == 0 else 'a'} system call, {len(locks)} functions of locks among "
@@ -171,8 +158,8 @@ def same_bits(run: Run) -> Outcome:
             for finger, model in fingers.items():
                 for line in called(program, "trace", model, samples).splitlines():
                     hashes.setdefault(finger, set()).add(line.split()[1])
-    kernels = [line.split()[0] for line in called(program, "trace", fingers["index"], "10").splitlines()]
-    apart = sum(len(each) - 1 for each in hashes.values())
+    kernels = [line.split()[0] for line in called(program, "trace", fingers[INDEX_FINGER.stem], "10").splitlines()]
+    apart = sum(len(different) - 1 for different in hashes.values())
     number = (
         f"{', '.join(compilers())} × {', '.join(levels)} × kernels {', '.join(kernels)}: {builds * len(kernels)} ways, "
         f"{samples} samples of {len(fingers)} fingers"
@@ -191,10 +178,9 @@ def comma_locale(run: Run) -> tuple[str | None, dict[str, str]]:
 
 
 def host(run: Run) -> Outcome:
-    program = call_program(run, "O2", ["-O2"], compiler("gcc", "clang"))
     locale, environment = comma_locale(run)
     samples = run.count(20_000, 500)
-    answer = called(program, "host", *calibrated(run).words(), str(samples), env={**os.environ, **environment}).split()
+    answer = answers(run, "host", calibrated(run), samples, env={**os.environ, **environment})
     modes, calls, changed = map(int, answer[:3])
     number = f"{spoken(calls)} calls in {modes} floating-point modes (rounding × flush to zero), locale {locale or 'C'}"
     result = (
@@ -203,27 +189,6 @@ def host(run: Run) -> Outcome:
         "(N·m, rad or rad/s)"
     )
     return Outcome(number, result, changed == 0)
-
-
-def exports(run: Run) -> Outcome:
-    files = ("python_tests/fmu/test_fmu_library.py", "python_tests/simulate/test_plant_fmu_host.py")
-    passed, failed, note = pytest(run, *files, "-k", "export or needs or stack")
-    return Outcome(
-        f"{passed + failed} tests of both libraries{note}",
-        f"{passed} pass: fmi2* alone, libc and libm alone, no executable stack",
-        failed == 0,
-    )
-
-
-def emulated(run: Run) -> Outcome:
-    ready = run.work / "portable" / "binaries"
-    if not ready.is_dir():
-        called(sys.executable, ROOT / "tools" / "portable_binaries.py", ready.parent)
-    words = ("python_tests/fmu/test_portable_binaries.py", "-m", "long or not long", "-k", "bits_of_the_native_one")
-    passed, failed, note = pytest(run, *words, environment={"TENDONFMU_PORTABLE_BINARIES": str(ready)})
-    systems = "Linux x86-64 (zig), aarch64 under qemu, Windows under wine"
-    number = f"{passed + failed} libraries: {systems}; the reference trace{note}"
-    return Outcome(number, f"{passed} give the bits of the native one", failed == 0 and "skipped" not in note)
 
 
 ROWS = [
@@ -242,7 +207,6 @@ ROWS = [
         damaged,
     ),
     Row("R7", "A day of samples", "8.64e7 samples", "a motion that repeats; months", day),
-    Row("R8", "Instances and loads", "1e5 and 1e4", "the simulated finger's library", instances),
     Row(
         "R9",
         "Instances on threads",
@@ -265,6 +229,4 @@ ROWS = [
         same_bits,
     ),
     Row("R12", "The host's modes", "20,000 samples", "traps that the host unmasks", host),
-    Row("R13", "Exports", "all", "macOS libraries are read, not loaded", exports),
-    Row("R20", "Windows and aarch64", "all", "real Windows and real ARM; macOS", emulated),
 ]

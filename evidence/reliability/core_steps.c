@@ -1,4 +1,4 @@
-/* Steps of a finger through tendonfmu.h, for rows of bench/reliability.py.
+/* Steps of a finger through tendonfmu.h, for rows of python -m evidence.reliability.
  *
  *   core_steps trace IMAGE SAMPLES                       a line for each kernel: its name, a hash of all outputs and of
  *                                                        the saved state at the end

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import importlib.util
-import json
+import itertools
 import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from .row import ROOT, SUPPORT, Run, Unavailable, called
+import fmpy
 
-sys.path[:0] = [str(SUPPORT), str(ROOT / "tools")]
+from evidence.reliability.row import Run, Unavailable, called
+from evidence.runner import EXAMPLES, ROOT
+from tendonfmu.fmu import build_fmu
+from tendonfmu.model import read_finger
 
-import portable_binaries as portable  # noqa: E402
+sys.path.append(str(ROOT / "tools"))
 
-from fmu_binary import FINGER, UnpackedFmu, unpack  # noqa: E402
+import portable_binaries as portable
 
 HERE = Path(__file__).resolve().parent
-CALIBRATED = ROOT / "examples" / "demo_recording" / "index_finger_calibrated.json"
+CALIBRATED = EXAMPLES / "demo_recording" / "index_finger_calibrated.json"
 BASE = ("-std=c11", "-ffp-contract=off")
 
 
@@ -53,23 +55,11 @@ def library(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -> Pat
     folder = run.work / name
     folder.mkdir(parents=True, exist_ok=True)
     portable.generate_table(folder)
-    sources = [str(each) for each in portable.core_sources() + portable.fmu_sources()]
-    out = folder / "tendonfmu.so"
+    sources = [*portable.core_sources(), *portable.fmu_sources()]
     exports = f"-Wl,--version-script={ROOT / 'fmu_src' / 'exports.map'}"
-    called(
-        *by,
-        *BASE,
-        *flags,
-        "-shared",
-        "-fPIC",
-        "-fvisibility=hidden",
-        exports,
-        *includes(folder),
-        *sources,
-        "-lm",
-        "-o",
-        out,
-    )
+    shared = ["-shared", "-fPIC", "-fvisibility=hidden", exports]
+    out = folder / "tendonfmu.so"
+    called(*by, *BASE, *flags, *shared, *includes(folder), *sources, "-lm", "-o", out)
     return out
 
 
@@ -84,10 +74,9 @@ def core_program(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -
     """core_steps.c with the core, compiled and linked in one call."""
     run.work.mkdir(parents=True, exist_ok=True)
     out = run.work / f"core_steps-{name}"
-    sources = [str(each) for each in portable.core_sources()]
-    if is_current(out):
-        return out
-    called(*by, *BASE, *flags, *includes(run.work), HERE / "core_steps.c", *sources, "-lm", "-o", out)
+    if not is_current(out):
+        sources = [HERE / "core_steps.c", *portable.core_sources()]
+        called(*by, *BASE, *flags, *includes(run.work), *sources, "-lm", "-o", out)
     return out
 
 
@@ -95,21 +84,9 @@ def call_program(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -
     """fmu_calls.c, which loads a library."""
     run.work.mkdir(parents=True, exist_ok=True)
     out = run.work / f"fmu_calls-{name}"
-    called(
-        *by,
-        "-std=c11",
-        *flags,
-        "-frounding-math",
-        "-rdynamic",
-        *includes(run.work),
-        HERE / "fmu_calls.c",
-        ROOT / "runtime" / "core" / "bytes.c",
-        "-ldl",
-        "-lm",
-        "-lpthread",
-        "-o",
-        out,
-    )
+    sources = [HERE / "fmu_calls.c", ROOT / "runtime" / "core" / "bytes.c"]
+    words = ["-std=c11", *flags, "-frounding-math", "-rdynamic", *includes(run.work)]
+    called(*by, *words, *sources, "-ldl", "-lm", "-lpthread", "-o", out)
     return out
 
 
@@ -117,54 +94,49 @@ def call_program(run: Run, name: str, flags: Sequence[str], by: Sequence[str]) -
 class Packed:
     """An FMU unpacked, and the file of references that fmu_calls reads."""
 
-    fmu: UnpackedFmu
-    path: Path
+    guid: str
+    folder: Path
     table: Path
+
+    @property
+    def binary(self) -> Path:
+        return next((self.folder / "binaries" / "linux64").glob("*.so"))
 
     def words(self, library: Path | None = None) -> list[str]:
         """Arguments of fmu_calls."""
-        return [str(library or self.fmu.binary), self.fmu.guid, self.fmu.location.decode(), str(self.table)]
+        return [str(library or self.binary), self.guid, (self.folder / "resources").as_uri(), str(self.table)]
 
 
-def packed(run: Run, description: dict[str, Any] | Path, name: str) -> Packed:
-    from tendonfmu.fmu.packaging import build_fmu
-
-    folder = run.work / "fmus" / name
+def packed(run: Run, description: Path) -> Packed:
+    folder = run.work / "fmus" / description.stem
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    if isinstance(description, Path):
-        shutil.copy(description, folder / "finger.json")
-    else:
-        (folder / "finger.json").write_text(json.dumps(description))
-    path = build_fmu(folder / "finger.json", folder / f"{name}.fmu")
-    fmu = unpack(path, folder / "unpacked")
-    return Packed(fmu, path, table_of(fmu, folder / "references.txt"))
-
-
-def table_of(fmu: UnpackedFmu, file: Path) -> Path:
+    unpacked = Path(fmpy.extract(str(build_fmu(description, folder / "finger.fmu")), str(folder / "unpacked")))
+    model = fmpy.read_model_description(unpacked)
+    references = {variable.name: variable.valueReference for variable in model.modelVariables}
+    inputs = [variable.name for variable in model.modelVariables if variable.causality == "input"]
+    outputs = [v.valueReference for v in model.modelVariables if v.causality == "output" and v.type == "Real"]
     groups = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
-    by_group = [[n for n in fmu.names("input") if n.startswith(f"{group}[")] for group in groups]
-    inputs = [fmu.variables[name].vr for names in by_group for name in names]
-    outputs = [fmu.variables[name].vr for name in fmu.names("output")]
-    lines = [[len(by_group[0]), len(by_group[2])], inputs, [len(outputs)], outputs]
-    file.write_text("\n".join(" ".join(map(str, line)) for line in lines) + "\n")
-    return file
+    by_group = [[references[name] for name in inputs if name.startswith(f"{group}[")] for group in groups]
+    lines = [[len(by_group[0]), len(by_group[2])], list(itertools.chain(*by_group)), [len(outputs)], outputs]
+    table = folder / "references.txt"
+    table.write_text("\n".join(" ".join(map(str, line)) for line in lines) + "\n")
+    return Packed(model.guid, unpacked, table)
 
 
 def small(run: Run) -> Packed:
-    return packed(run, FINGER, "small_finger")
+    """Small, with something of everything: an asymmetric law, working points, a cable loop, a pulley."""
+    return packed(run, HERE / "small_finger.json")
 
 
 def calibrated(run: Run) -> Packed:
     """Four joints, eight tendons, all that `calibrate` writes."""
-    return packed(run, CALIBRATED, "calibrated")
+    return packed(run, CALIBRATED)
 
 
-def image(run: Run, description: Path | dict[str, Any], name: str) -> Path:
+def image(run: Run, description: Path) -> Path:
     """The model image of a description, as a file."""
-    from tendonfmu.model import read_finger
-
-    file = run.work / f"{name}.image"
+    file = run.work / f"{description.stem}.image"
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(read_finger(description).image)
     return file

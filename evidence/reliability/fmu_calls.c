@@ -1,4 +1,4 @@
-/* The library of an FMU, loaded as an importer loads it, for rows of bench/reliability.py.
+/* The library of an FMU, loaded as an importer loads it, for rows of python -m evidence.reliability.
  *
  *   fmu_calls day LIBRARY GUID LOCATION TABLE SAMPLES PIECES    two instances side by side, one of them saved, freed,
  *                                                               made anew and restored at each of PIECES
