@@ -33,7 +33,7 @@ UNKNOWN_STRENGTHS = (0.3, 1.0)
 ABSORBABLE = ("force_gain", "moment_arm", "gravity", "force_offset")
 # The gain is measured on a test recording (s), and the true one on several of the same length: friction drifts anew in
 # each of them.
-MEASURED = {"test": 60.0, "gain_recordings": 4}
+MEASURED_SECONDS, GAIN_RECORDINGS = 60.0, 4
 LEAST_MEASURED = 0.1  # strength of single effects; weaker ones seldom have a cause, and so no gain
 # Four joints take five times as long as two: few of them keep the whole within some hours of processor time.
 JOINTS, SHARES = (1, 2, 4), (0.52, 0.42, 0.06)
@@ -90,7 +90,7 @@ def planned(seed: int, counts: Counts = Counts(), options: Options = Options()) 
     kinds = [
         _nulls(counts.null, seed, options),
         _singles(counts, seed, options),
-        _doubles(counts.double, seed, replace(options, **MEASURED)),
+        _doubles(counts.double, seed, measured(options)),
         _absorbed(counts.absorbed, seed, options),
         _unknown(counts.unknown, seed, options),
         _contacts(counts.contact, seed, options),
@@ -102,6 +102,11 @@ def planned(seed: int, counts: Counts = Counts(), options: Options = Options()) 
     random = np.random.default_rng([seed, 68])
     lists = [list(kind) for kind in kinds]
     return makers.in_turn([[cases[k] for k in random.permutation(len(cases))] for cases in lists])
+
+
+def measured(options: Options) -> Options:
+    """With the recordings on which the gain is measured."""
+    return replace(options, test=MEASURED_SECONDS, gain_recordings=GAIN_RECORDINGS)
 
 
 def _matched(
@@ -125,10 +130,10 @@ def _singles(counts: Counts, seed: int, options: Options) -> Iterator[Case]:
     effects = [effect for effect in BUILDERS if effect != "force_offset"]  # refitting always absorbs it
     for k in range(counts.per_effect):
         for rank, strength in enumerate(counts.strengths):
-            measured = options if strength < LEAST_MEASURED else replace(options, **MEASURED)
+            own_options = options if strength < LEAST_MEASURED else measured(options)
             for number, effect in enumerate(effects):
                 own, name = seed + 100_000 + 1000 * k + 100 * rank + number, f"{effect}_{strength:g}_{k}"
-                yield _matched(name, "single", makers.single, own, measured, effect=effect, strength=strength)
+                yield _matched(name, "single", makers.single, own, own_options, effect=effect, strength=strength)
 
 
 def _doubles(count: int, seed: int, options: Options) -> Iterator[Case]:
@@ -188,7 +193,7 @@ def _mujoco(group: str, number: int, k: int, seed: int) -> Case:
 # --- one case ---------------------------------------------------------------------------------------------------------
 
 
-def run_case(case: Case) -> Row:
+def run_case(case: Case) -> dict[str, Any]:
     """Make the recordings, diagnose them without the truth, and judge the answer."""
     with tempfile.TemporaryDirectory() as folder:
         made = case.make(Path(folder))

@@ -11,7 +11,8 @@ import json
 from pathlib import Path
 
 from evidence.diagnosis.change_measured import fitted
-from evidence.diagnosis.change_simulated import NONE, How, described, numpy_maxwell, record, scaled
+from evidence.diagnosis.change_simulated import NONE, How, described, record, scaled
+from evidence.fingers import numpy_maxwell
 from tendonfmu.files.tables import write_table
 
 DAYS = ("2026-03-01", "2026-03-08", "2026-03-15", "2026-03-22", "2026-04-05", "2026-04-12")

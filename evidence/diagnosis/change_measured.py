@@ -116,7 +116,7 @@ def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
 
 def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> dict[str, Columns]:
     """Recordings at 1 kHz, by the words of their stretches. known_load: with the column `external_torque`."""
-    parts = {}
+    parts: dict[str, Columns] = {}
     for stretch in stretches:
         columns = part_of(recording(machine, stretch.run), stretch.begin, stretch.end)
         parts[str(stretch)] = {name: values for name, values in columns.items() if known_load or name != LOAD}
@@ -324,7 +324,7 @@ def hide(now: Machine, effect: Effect, strength: float, physics: Machine | None 
     noise = less(before, constants)
     loudness = float(noise @ noise)
 
-    def altered(magnitude: float) -> Mapping[str, Columns]:
+    def altered(magnitude: float) -> dict[str, dict[str, Array]]:
         return put(physics, effect, effect.sign * magnitude).recordings
 
     def added(magnitude: float) -> Array:

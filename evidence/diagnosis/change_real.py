@@ -39,15 +39,15 @@ def plans() -> Iterator[tuple[int, str, str, str, str]]:
 
 def make(conditions: str, model: str, then: str, now: str) -> Change:
     with_load = conditions == "speed"
-    recordings = [cut(MACHINE, (Stretch(run),), with_load) for run in (then, now)]
     return Change(
-        MACHINE,
-        model,
-        UNCHANGED if with_load else "other_load",
-        conditions,
-        KINEMATICS[MACHINE],
-        model_of(MACHINE, model, (Stretch(then),), with_load),
-        *([thinned(columns) for columns in stretches.values()] for stretches in recordings),
+        machine=MACHINE,
+        model=model,
+        hidden=UNCHANGED if with_load else "other_load",
+        conditions=conditions,
+        kinematics=KINEMATICS[MACHINE],
+        finger=model_of(MACHINE, model, (Stretch(then),), with_load),
+        then=[thinned(columns) for columns in cut(MACHINE, (Stretch(then),), with_load).values()],
+        now=[thinned(columns) for columns in cut(MACHINE, (Stretch(now),), with_load).values()],
         truth=Truth(allowed=BY_SPEED) if with_load else Truth(LOAD),
     )
 

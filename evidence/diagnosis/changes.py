@@ -69,7 +69,7 @@ def makers(bed: str) -> Makers:
 # --- one case ---------------------------------------------------------------------------------------------------------
 
 
-def run_case(bed: str, number: int) -> Row:
+def run_case(bed: str, number: int) -> dict[str, Any]:
     try:
         change = makers(bed)[number]()
     except ValueError as impossible:

@@ -77,7 +77,7 @@ def truth_of(truth: foreign.Truth, neutral: tuple[str, ...] = ("presliding", "un
 # --- one case ---------------------------------------------------------------------------------------------------------
 
 
-def run_case(family: str, number: int) -> Row:
+def run_case(family: str, number: int) -> dict[str, Any]:
     case = module_of(family).make(number)
     with tempfile.TemporaryDirectory() as folder:
         foreign_files(Path(folder), case)
@@ -85,7 +85,7 @@ def run_case(family: str, number: int) -> Row:
     return row_of(case, run)
 
 
-def row_of(case: foreign.Case, run: Run) -> Row:
+def row_of(case: foreign.Case, run: Run) -> dict[str, Any]:
     truth = case.truth
     row: dict[str, Any] = {
         "family": case.family,
@@ -127,7 +127,7 @@ def module_of(family: str) -> ModuleType:
 
 def cases_of(half: str) -> dict[str, tuple[str, int]]:
     """All cases of a half that can be made here."""
-    cases = {}
+    cases: dict[str, tuple[str, int]] = {}
     for family in FAMILIES:
         try:
             module = module_of(family)

@@ -403,6 +403,7 @@ def scaled(
         best = (miss, size, reached, share) if best is None or miss < best[0] else best
         if miss < CLOSE:
             break
+        assert strength is not None  # without one the first size is taken
         size *= float(np.clip(np.sqrt(strength / max(reached, 1e-300)), 0.05, 20.0))
         if not hidden.magnitude / 300.0 < size < hidden.magnitude * 300.0:
             break

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -220,10 +221,10 @@ def machine_of(name: str, part: int) -> Machine:
 # --- cases and tables -------------------------------------------------------------------------------------------------
 
 
-def run_case(name: str, effect: str, strength: float, part: int) -> Row:
+def run_case(name: str, effect: str, strength: float, part: int) -> dict[str, Any]:
     """part: of the recordings; it also gives the sign of an effect that has two."""
     machine = machine_of(name, part)
-    row = {"machine": name, "effect": effect, "strength": strength}
+    row: dict[str, Any] = {"machine": name, "effect": effect, "strength": strength}
     names: tuple[str, ...] = ()
     if effect != NOTHING:
         names = EFFECTS[effect].names

@@ -105,7 +105,7 @@ class Answer:
     names: bool = True  # whether it names anything at all
 
 
-def run_case(case: Case) -> Row:
+def run_case(case: Case) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         made = case.make(Path(folder))
         diagnosis = diagnosed(case, made)

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -34,7 +35,7 @@ def searching(way: str) -> Iterator[None]:
         yield
 
 
-def of_sticking_finger(hidden: str, way: str, seed: int) -> Row:
+def of_sticking_finger(hidden: str, way: str, seed: int) -> dict[str, Any]:
     """Names, and errors of the friction as shares."""
     with tempfile.TemporaryDirectory() as folder, searching(way):
         weight = WEIGHT if hidden == "gravity" else 0.0
@@ -57,7 +58,7 @@ def of_sticking_finger(hidden: str, way: str, seed: int) -> Row:
     }
 
 
-def of_mujoco(way: str, number: int, seed: int, joints: int) -> Row:
+def of_mujoco(way: str, number: int, seed: int, joints: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder, searching(way):
         made = mujoco_finger(Path(folder), seed, number, joints, 45.0, 500.0)
         diagnosis = diagnose(made.finger, list(made.recordings), kinematics=2, seed=seed)

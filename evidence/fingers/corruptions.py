@@ -1,6 +1,6 @@
 """What goes wrong with recordings, done to sound ones: signs, order, units, clocks, sensors.
 
-A corruption changes a frame of columns as `foreign_case.frame` makes it, and says what a check should answer.
+A corruption changes a frame of columns as `foreign.frame` makes it, and says what a check should answer.
 """
 
 from __future__ import annotations
@@ -61,21 +61,8 @@ def multiplied(factor: float) -> Change:
     return change
 
 
-def exchanged(*groups: str) -> Change:
-    """Two columns in each other's place, in each of the groups."""
-
-    def change(frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
-        indices = [column.split("[")[1] for column in columns]
-        for group in groups:
-            one, other = (f"{group}[{index}" for index in indices)
-            frame[one], frame[other] = frame[other].copy(), frame[one].copy()
-        return frame
-
-    return change
-
-
 def turned(*groups: str) -> Change:
-    """Each of the columns where the next one belongs, in each of the groups."""
+    """Each of the columns where the next one belongs, in each of the groups; two of them are exchanged."""
 
     def change(frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
         indices = [column.split("[")[1] for column in columns]
@@ -198,8 +185,8 @@ def _signs() -> Iterator[Corruption]:
 
 def _orders() -> Iterator[Corruption]:
     for group in ("tendon_force", "tendon_position", "joint_position"):
-        yield Corruption("exchange", f"{group}, 2", group, 2, exchanged(group), ("exchange",))
-    both = exchanged("tendon_force", "tendon_position")
+        yield Corruption("exchange", f"{group}, 2", group, 2, turned(group), ("exchange",))
+    both = turned("tendon_force", "tendon_position")
     yield Corruption("exchange", "tendons, 2", "tendon_force", 2, both, ("exchange",))
     circle = turned("tendon_force", "tendon_position")
     yield Corruption("exchange", "tendons, 3 in a circle", "tendon_force", 3, circle, ("exchange",))

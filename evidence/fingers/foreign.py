@@ -22,45 +22,31 @@ TEST_SECONDS = 30.0
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """What a case hides, and where.
+    """What a case hides, and where."""
 
-    hidden: one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list.
-    joint, tendon: its place, counted from 1; None: the whole finger, or it has no such place.
-    joints: number of joints of the finger.
-    also: effects that the simulator has as well although the description lacks them: naming them is not false.
-    rms: of the hidden term over the training recording [N·m], largest over the joints; None where it is not known.
-    survives: variance of what refitting leaves of the hidden term over that of the residual, where it is little
-    (visibility.py); None: not known, or much.
-    """
-
-    hidden: str
-    joints: int
-    joint: int | None = None
+    hidden: str  # one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list
+    joints: int  # of the finger
+    joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
     tendon: int | None = None
-    also: tuple[str, ...] = ()
-    rms: float | None = None
+    also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them
+    rms: float | None = None  # of the hidden term [N·m], largest over the joints; None where it is not known
+    # variance of what refitting the description leaves of the hidden term over that of the residual, where it is little
     survives: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
 class Inside:
-    """What only the simulator knows about its training recording, for the tests of the beds.
+    """What only the simulator knows about its training recording; measured = described + hidden."""
 
-    angle: true joint angles [rad], (samples, joints).
-    measured: Rᵀ f0 of the true forces with the arms of the description [N·m], (samples, joints).
-    described: all that the description has a term for, and inertia [N·m].
-    hidden: what it lacks [N·m]; measured = described + hidden.
-    """
-
-    angle: Array
-    measured: Array
-    described: Array
-    hidden: Array
+    angle: Array  # true joint angles [rad], (samples, joints)
+    measured: Array  # Rᵀ f0 of the true forces with the arms of the description [N·m], (samples, joints)
+    described: Array  # all that the description has a term for, and inertia [N·m]
+    hidden: Array  # what it lacks [N·m]
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One test bed: `nominal` is a finger description whose structure is right but for the hidden effect."""
+    """A finger description whose structure is right but for the hidden effect, and its recordings."""
 
     family: str
     number: int

@@ -70,7 +70,7 @@ class Rests:
 
 
 def rests(number: int, seconds: float, pushed: bool, seed: int = 1, pretension: float = 20.0) -> Rests:
-    """The finger of a case of fingers_in_mujoco.py that hides nothing, at rest most of the time."""
+    """The finger of a case of mujoco_cases.py that hides nothing, at rest most of the time."""
     plan = PLANS[number - 1]
     if plan.hidden != "none":
         raise ValueError(f"case {number} hides {plan.hidden}; expected one that hides nothing")
@@ -122,7 +122,7 @@ class Record:
 
 
 def record(case: Rests, seed: int = 1) -> Record:
-    """The recording by the sensors of fingers_in_mujoco.py: 20 mN of noise, positions to 1 µm, angles to 0.1 mrad."""
+    """The recording by the sensors of mujoco_cases.py: 20 mN of noise, positions to 1 µm, angles to 0.1 mrad."""
     runner = PushedRunner(case)
     data = runner.data
     times = STEP * np.arange(-round(SETTLE / STEP), round(case.seconds / STEP))

@@ -14,7 +14,7 @@ from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, I
 FAMILY = "numpy"
 
 # What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
-# false, in any case (judgement.py).
+# false, in any case (diagnosis/foreign_cases.py).
 ALSO = {
     # Friction that fades in with tanh(v / vs) is the Stribeck effect of a negative amplitude.
     numpy_tanh: ("stribeck",),
