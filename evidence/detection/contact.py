@@ -171,11 +171,7 @@ def report(rms: Mapping[float, list[float]], pushes: Rows, rows: Rows, scores: R
 
 
 def _found(rows: Rows) -> str:
-    """Found of all and the interval of the share; of probabilities their mean."""
-    values = [row["found"] for row in rows]
-    if all(value in (0, 1) for value in values):
-        return tables.count(values, with_interval=True)
-    return f"{100 * np.mean(values):.0f} %"
+    return tables.count((row["found"] for row in rows), with_interval=True)
 
 
 def _cases(rms: Mapping[float, list[float]], pushes: Rows) -> str:

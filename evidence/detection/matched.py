@@ -5,22 +5,19 @@ the only question is whether it is there. The free residual is taken as a Gaussi
 each of three states: at rest, in motion, and while a joint sets off, which is where models of friction fail most. The
 covariances C are those of the free recordings of the same pretension, over windows of all joints at 100 Hz (means of
 10 ms), from 0.1 s before the onset to some time after it. The likelihood ratio is then linear in the
-residual x: wᵀ x with C w = s, s the known signal, and it passes a threshold u with probability Φ(d − u),
-d² = sᵀ C⁻¹ s (Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*, 1998, sect. 4.4).
+residual x: wᵀ x with C w = s, s the known signal (Kay, *Fundamentals of Statistical Signal Processing: Detection
+Theory*, 1998, sect. 4.4).
 
-It is given three ways (`KINDS`):
+It is given two ways (`KINDS`):
 
-- *theory*: u by the Gaussian tail for one false alarm in 10 min, 100 tests a second taken as independent; s is the true
-  external torque behind the bias filter. As optimistic as it gets: friction lets all of the torque through, and the
-  residual has no outliers.
-- *torque known*: the same s, but u is what wᵀ x exceeds once in 10 min of the free recordings themselves, and x is what
-  was left of the push in the residual.
+- *torque known*: s is the true external torque behind the bias filter, x what was left of the push in the residual.
+  The threshold is what wᵀ x exceeds once in 10 min of the free recordings themselves.
 - *effect known*: likewise, with s the difference of the residual with and without the push (the twin recording), after
   friction took its part. This is what is left to be found.
 
 A detector that must find out when, where and in which direction somebody pushes asks all these questions at once, at
 the same rate of false alarms. Where free residuals have outliers, as here, one that is not linear, or that knows more
-of the motion than these states, can still do better than the last two.
+of the motion than these states, can still do better.
 """
 
 from __future__ import annotations
@@ -33,7 +30,6 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import norm
 
 from evidence.detection.hand import PRETENSIONS, TWINS, Take, read_truth, recording, states, takes
 from evidence.detection.rivals import Detector, HighPass
@@ -44,7 +40,7 @@ STEP = 0.01  # s, of the means
 BEFORE = 0.1  # s of the window before the onset: what the noise did there says what it does next
 WINDOWS = (0.04, 0.3)  # s from the onset until it decides; every push is held for 0.3 s
 STATES = ("rest", "motion", "setting off")  # as `states` counts them
-KINDS = ("theory", "torque_known", "effect_known")
+KINDS = ("torque", "effect")  # that it knows
 APART = 10  # means; excesses closer than this are one false alarm
 SHRINKAGE = 0.01  # of the covariance towards its diagonal
 PER_SECOND = 1.0 / 600.0  # false alarms
@@ -54,11 +50,11 @@ Push = dict[str, Any]
 
 
 def name_of(kind: str, after: float) -> str:
-    return f"matched, {kind.replace('_', ' ')}, {1e3 * after:.0f} ms"
+    return f"matched, {kind} known, {1e3 * after:.0f} ms"
 
 
 def matched_findings(folder: Path, reference: Detector, pushes: Sequence[Push], parts: int) -> dict[str, list[float]]:
-    """Of every push whether it is found, or how probably, by window and kind of knowledge; kept in the folder."""
+    """Of every push whether it is found, by window and kind of knowledge; kept in the folder."""
     file = folder / f"matched_{reference.name}.json"
     if file.exists():
         return dict(json.loads(file.read_text(encoding="utf-8")))
@@ -79,11 +75,11 @@ def matched_findings(folder: Path, reference: Detector, pushes: Sequence[Push], 
                 in_state = [
                     Quiet(residual, own_state == state) for residual, own_state in zip(free, still, strict=True)
                 ]
-                answer = answer_of(in_state, [signals[k] for k in chosen], after)
+                passed, limit = findings(in_state, [signals[k] for k in chosen], after)
                 for kind in KINDS:
-                    results[name_of(kind, after)][of_pretension[chosen]] = getattr(answer, kind)
+                    results[name_of(kind, after)][of_pretension[chosen]] = passed[kind]
                 where = f"{pretension:g} N, {1e3 * after:.0f} ms, {words}, {len(chosen)} pushes"
-                say(f"matched detector, {where}: limit of {answer.limit:.1f} standard deviations")
+                say(f"matched detector, {where}: limit of {limit:.1f} standard deviations")
     write(file, results)
     return {name: values.tolist() for name, values in results.items()}
 
@@ -176,36 +172,24 @@ def _cut(signals: Numbers, time: Numbers, onset: float) -> Numbers:
 # --- the detector -----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Answer:
-    """By push [k]."""
-
-    theory: Numbers  # probability of detection
-    torque_known: Flags  # passed or not
-    effect_known: Flags
-    limit: float  # median of what statistics of known torques exceed once in 10 min, in deviations; Gaussian: 4.15
-
-
-def answer_of(free: Sequence[Quiet], asked: Sequence[Signals], after: float) -> Answer:
-    """What a window that ends `after` s after the onset tells of pushes whose onset is in the same state."""
-    # free: all free recordings of a pretension
+def findings(free: Sequence[Quiet], asked: Sequence[Signals], after: float) -> tuple[dict[str, Flags], float]:
+    """Which pushes a window that ends `after` s after the onset finds, by what is known; the limit of torques."""
+    # free: all free recordings of a pretension; asked: pushes whose onset is in the same state; limit: in deviations of
+    # the statistic, the median of what is exceeded once in 10 min: 4.15 where it is Gaussian
     length = round((BEFORE + after) / STEP)
     windows = [_windows(quiet.residual, length) for quiet in free]
     before = round(BEFORE / STEP)
     chosen = [quiet.chosen[before : before + len(part)] for quiet, part in zip(free, windows, strict=True)]
     factor = cho_factor(_covariance(windows, chosen))
     seen = np.array([push.residual[:length].ravel() for push in asked])
-    by_kind: dict[str, tuple[Flags, Numbers, Numbers]] = {}
-    for kind in ("torque", "effect"):
+    passed, limits = dict[str, Flags](), dict[str, Numbers]()
+    for kind in KINDS:
         templates = np.array([getattr(push, kind)[:length].ravel() for push in asked])
         weights = cho_solve(factor, templates.T).T
-        distances = np.sqrt(np.maximum(np.sum(weights * templates, axis=1), 1e-30))
-        weights /= distances[:, None]  # of unit deviation
-        limits = _limits(windows, chosen, weights)
-        by_kind[kind] = np.sum(weights * seen, axis=1) > limits, distances, limits
-    passed, distances, limits = by_kind["torque"]
-    theory = np.asarray(norm.sf(float(norm.isf(PER_SECOND * STEP)) - distances))
-    return Answer(theory, passed, by_kind["effect"][0], float(np.median(limits)))
+        weights /= np.sqrt(np.maximum(np.sum(weights * templates, axis=1), 1e-30))[:, None]  # of unit deviation
+        limits[kind] = _limits(windows, chosen, weights)
+        passed[kind] = np.sum(weights * seen, axis=1) > limits[kind]
+    return passed, float(np.median(limits["torque"]))
 
 
 def _windows(values: Numbers, length: int) -> Numbers:

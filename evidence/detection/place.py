@@ -30,7 +30,6 @@ CLASSES = ((0.1, 0.5), (0.5, 1.0), (1.0, 2.0))  # N
 NEAR_TIP = 0.8  # share of the last link's length from which a push is near the tip
 STANDS_OUT = 5.0  # standard deviations
 UNLIKELY = 3.84  # χ² of one degree of freedom, exceeded in 5 % of all cases
-PLACES = np.linspace(0.0, 1.0, 21)  # along the last link
 
 
 class Chain:
@@ -61,16 +60,6 @@ class Chain:
         levers = [np.cross(axis, place - origin) for _, origin, axis in parts[:link]]
         return np.array([*levers, *[np.zeros(3)] * (len(parts) - link)])
 
-    def excludes_last_link(self, angle: Numbers, torque: Numbers, std: Numbers) -> bool:
-        """Whether every force at every place of the last link leaves more of a torque than STANDS_OUT deviations."""
-        for share in PLACES:
-            levers = self.levers(angle, len(self.axes), share * self.ends[-1])
-            weighted = -levers / std[:, None]
-            force = np.linalg.lstsq(weighted, torque / std, rcond=1e-4)[0]
-            if np.all(np.abs(torque / std - weighted @ force) <= STANDS_OUT):
-                return False
-        return True
-
     def named(self, torque: Numbers, std: Numbers) -> int:
         """The link in contact by the product's rule; -1: none."""
         out = np.flatnonzero(np.abs(torque) > STANDS_OUT * std)
@@ -79,8 +68,7 @@ class Chain:
 
 def touches(folder: Path, take: Take, finger: dict[str, Any]) -> Row:
     """All pushes of a recording, each in the middle of its hold."""
-    # along: where on its link, as a share of its length; bare: the link that the same rule names of the true torques;
-    # excluded: that no force on the last link explains the torques, the product's and the true ones
+    # along: where on its link, as a share of its length; bare: the link that the same rule names of the true torques
     rig, chain = read_rig(write_rig(folder, take)), Chain(json.loads(INDEX_RIG.read_text(encoding="utf-8"))["physics"])
     signals, truth = recording(folder, take), read_truth(folder, take)
     outputs = Instance.from_description(json.dumps(finger), 1).run({"time": signals.time, **signals.groups})
@@ -90,7 +78,7 @@ def touches(folder: Path, take: Take, finger: dict[str, Any]) -> Row:
         end, point = chain.ends[push["link"] - 1], np.array(push["point"])
         angle, std = truth["joint_position"][k], outputs["compensated_torque_std"][k]
         frame = list(chain.frames(angle))[push["link"] - 1][0]
-        torque, true_torque = outputs["compensated_torque"][k], truth["external_torque"][k]
+        true_torque = truth["external_torque"][k]
         force = push["force"] * frame @ np.array(push["direction"])
         np.testing.assert_allclose(-chain.levers(angle, push["link"], point) @ force, true_torque, atol=1e-6)
         rows.append(
@@ -106,8 +94,6 @@ def touches(folder: Path, take: Take, finger: dict[str, Any]) -> Row:
                 "std": float(np.linalg.norm(outputs["fingertip_force_std"][k])),
                 "observable": bool(outputs["fingertip_force_observable"][k]),
                 "misfit": float(outputs["fingertip_force_misfit"][k]),
-                "excluded": chain.excludes_last_link(outputs["joint_angle"][k], torque, std),
-                "truly_excluded": chain.excludes_last_link(angle, true_torque, std),
             }
         )
     return {"rows": rows}
@@ -168,13 +154,9 @@ def report(rows: Sequence[Row]) -> str:
     on_links += ["the last link named: right", "true torques: a link %", "that very link %"]
     at_tip = ["pushes near the tip, in contact", "observable", "error rms N", "median N", "rms / rms push %"]
     at_tip += ["rms / rms of its std", "misfit > 3.84", "the same of pushes on other links"]
-    seen = sorted((row for row in rows if row["contact"]), key=lambda row: row["link"])
-    excluded = tables.by(seen, ["link"], lambda own: [of(own, "excluded"), of(own, "truly_excluded")])
     sections = [
         tables.table([*head, *on_links], tables.by(classed, keys, links), 2),
         tables.table([*head, *at_tip], tables.by(classed, keys, forces), 2),
-        "Excluded as a force on the last link:",
-        tables.table(["pushes on link", "by the product's torques", "by the true torques"], excluded),
     ]
     return "\n\n".join(sections) + "\n"
 
