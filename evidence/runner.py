@@ -27,8 +27,8 @@ import numpy as np
 
 from tendonfmu.files import whole_file
 from tendonfmu.model import read_finger
-from tendonfmu.tasks import Job, Row, rows_of, run_jobs, workers_of
-from tendonfmu.tasks.jobs import Function
+from tendonfmu.tasks import Job, rows_of, run_jobs, workers_of
+from tendonfmu.tasks.jobs import Function, Row
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"

@@ -456,7 +456,7 @@ def test_names_say_what_they_hold() -> None:
         "runtime/core/kernel/README.md",
         "runtime/description",
         "runtime/tests",
-        "bench",
+        "evidence",
         "python/tendonfmu",
         "python_tests/support/oracle.py",
         "examples/fingers/index_finger.json",

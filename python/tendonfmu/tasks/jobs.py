@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -262,8 +261,3 @@ def check_versions(client: Any, address: str) -> None:
     for place, version in found.items():
         if version != version_here():
             raise InputError(f"--scheduler {address}: {place} has tendonfmu {version}; expected {version_here()}")
-
-
-def worker_count() -> int:
-    """Return the default number of workers."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
