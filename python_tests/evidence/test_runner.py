@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import math
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 from evidence import tables
-from evidence.runner import digest, run_cases
+from evidence.runner import ROOT, digest, run_cases
 
 
 def measured(number: int, log: str) -> dict[str, Any]:
@@ -77,3 +78,12 @@ def test_a_table_has_a_line_for_each_group_and_a_cell_for_each_column() -> None:
     assert text.splitlines()[2:] == ["| a | 0/1 | 1/1 |", "| c | – | – |"]
     assert tables.table(["x", "y"], [["1", 2]], 1).splitlines()[1] == "| --- | ---: |"
     assert json.dumps(tables.values_of(rows, "finger")) == '["a", "b"]'
+
+
+def test_evidence_imports_nothing_of_the_tests() -> None:
+    tests = {"python_tests", *(file.stem for file in (ROOT / "python_tests").rglob("*.py"))}
+    for file in (ROOT / "evidence").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not tests & {name.split(".")[0] for name in names}, file
