@@ -155,8 +155,8 @@ def effects_of(cause: Cause) -> set[str]:
 
 def places(cause: Cause) -> list[Cause]:
     """Where a cause is: its `places`, else its own joint and tendon."""
-    own = {"effect": cause["effect"], "joint": cause.get("joint"), "tendon": cause.get("tendon")}
-    return [{**own, **place} for place in cause.get("places") or ()] or [own]
+    whole = {"effect": cause["effect"], "joint": cause.get("joint"), "tendon": cause.get("tendon")}
+    return [{**whole, **place} for place in cause.get("places") or ()] or [whole]
 
 
 def _sign_is_right(holding: Iterable[Cause], truth: Truth) -> bool | None:

@@ -130,18 +130,20 @@ def _singles(counts: Counts, seed: int, options: Options) -> Iterator[Case]:
     effects = [effect for effect in BUILDERS if effect != "force_offset"]  # refitting always absorbs it
     for k in range(counts.per_effect):
         for rank, strength in enumerate(counts.strengths):
-            own_options = options if strength < LEAST_MEASURED else measured(options)
+            case_options = options if strength < LEAST_MEASURED else measured(options)
             for number, effect in enumerate(effects):
-                own, name = seed + 100_000 + 1000 * k + 100 * rank + number, f"{effect}_{strength:g}_{k}"
-                yield _matched(name, "single", makers.single, own, own_options, effect=effect, strength=strength)
+                case_seed, name = seed + 100_000 + 1000 * k + 100 * rank + number, f"{effect}_{strength:g}_{k}"
+                yield _matched(name, "single", makers.single, case_seed, case_options, effect=effect, strength=strength)
 
 
 def _doubles(count: int, seed: int, options: Options) -> Iterator[Case]:
     rng = np.random.default_rng([seed, 65])
     for k in range(count):
         effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
-        static, own = "presliding" in effects, seed + 200_000 + k
-        yield _matched(f"double_{k}", "double", makers.double, own, options, static, effects=effects, strength=0.3)
+        static, case_seed = "presliding" in effects, seed + 200_000 + k
+        yield _matched(
+            f"double_{k}", "double", makers.double, case_seed, options, static, effects=effects, strength=0.3
+        )
 
 
 def _absorbed(count: int, seed: int, options: Options) -> Iterator[Case]:
@@ -155,8 +157,8 @@ def _unknown(count: int, seed: int, options: Options) -> Iterator[Case]:
     kinds = [(effect, strength) for strength in UNKNOWN_STRENGTHS for effect in UNKNOWN]
     for k in range(count):
         effect, strength = kinds[k % len(kinds)]
-        name, own = f"{effect}_{strength:g}_{k}", seed + 400_000 + k
-        yield _matched(name, "unknown", makers.single, own, options, effect=effect, strength=strength)
+        name, case_seed = f"{effect}_{strength:g}_{k}", seed + 400_000 + k
+        yield _matched(name, "unknown", makers.single, case_seed, options, effect=effect, strength=strength)
 
 
 def _contacts(count: int, seed: int, options: Options) -> Iterator[Case]:
@@ -168,10 +170,10 @@ def _foreign(
     group: str, in_numpy: Sequence[int], in_mujoco: Sequence[int], times_numpy: int, times_mujoco: int, seed: int
 ) -> Iterator[Case]:
     """Every plan so many times, numpy and MuJoCo in turn."""
-    own = seed + 600_000
+    first = seed + 600_000
     lists = [
-        [_numpy(group, number, k, own + k) for k in range(times_numpy) for number in in_numpy],
-        [_mujoco(group, number, k, own + 100 * number + k) for k in range(times_mujoco) for number in in_mujoco],
+        [_numpy(group, number, k, first + k) for k in range(times_numpy) for number in in_numpy],
+        [_mujoco(group, number, k, first + 100 * number + k) for k in range(times_mujoco) for number in in_mujoco],
     ]
     for rank in range(max(map(len, lists))):
         yield from (cases[rank] for cases in lists if rank < len(cases))
@@ -235,27 +237,27 @@ def judged(group: str, made: Made, diagnosis: Diagnosis) -> dict[str, Any]:
     """Columns of a row; None for questions that do not arise."""
     causes = causes_of(diagnosis)
     hidden = [effect for truth in made.truths for effect in truth.effects]
-    own = [cause for cause in causes if cause["effect"] not in made.also or cause["effect"] in hidden]
+    counted = [cause for cause in causes if cause["effect"] not in made.also or cause["effect"] in hidden]
     alarm = diagnosis.verdict in ALARMS
     unknown = alarm or any("unknown" in effects_of(cause) for cause in causes[:1])
     row = {
         "verdict": diagnosis.verdict,
         "causes": json.dumps(causes),
-        "cause_count": len(own),
+        "cause_count": len(counted),
         "named_count": len(causes),
-        "detected": bool(own) or alarm,
+        "detected": bool(counted) or alarm,
         "unknown": unknown,
-        "wrong_name": bool(own) and not unknown,
+        "wrong_name": bool(counted) and not unknown,
         "gain": diagnosis.gain.value,
         "gain_low": diagnosis.gain.low,
         "gain_high": diagnosis.gain.high,
         "events": len(diagnosis.events),
     }
     if group == "single":
-        row |= _judged_single(made, own)
+        row |= _judged_single(made, counted)
     if group == "double":
-        hits = [any(holds(cause, truth) for cause in own) for truth in made.truths]
-        row |= {"both": all(hits), "exactly": all(hits) and len(own) == len(hits)}
+        hits = [any(holds(cause, truth) for cause in counted) for truth in made.truths]
+        row |= {"both": all(hits), "exactly": all(hits) and len(counted) == len(hits)}
     if group == "absorbed":
         listed = [entry for entry in diagnosis.invisible if entry.where.effect in hidden]
         named = any(cause["effect"] in hidden for cause in causes)
@@ -401,10 +403,10 @@ def by_effect(rows: Sequence[Row]) -> list[Line]:
     single = [row for row in rows if row["group"] == "single"]
     lines = []
     for effect in sorted({row["true_effects"][0] for row in single}):
-        own = [row for row in single if row["true_effects"] == [effect]]
-        places = [row["place"] for row in own if row["place"] is not None]
-        counts = [sum(bool(row[key]) for row in own) for key in ("detected", "in_set", "first")]
-        lines.append([effect, str(len(own)), *map(str, counts), f"{sum(places)}/{len(places)}"])
+        of_effect = [row for row in single if row["true_effects"] == [effect]]
+        places = [row["place"] for row in of_effect if row["place"] is not None]
+        counts = [sum(bool(row[key]) for row in of_effect) for key in ("detected", "in_set", "first")]
+        lines.append([effect, str(len(of_effect)), *map(str, counts), f"{sum(places)}/{len(places)}"])
     return lines
 
 

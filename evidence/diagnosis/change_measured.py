@@ -162,9 +162,6 @@ class Pair:
     def reversed(self) -> Pair:
         return replace(self, then=self.now, now=self.then)
 
-    def __str__(self) -> str:
-        return " against ".join(", ".join(map(str, group)) for group in (self.now, self.then))
-
 
 def halves(machine: str, runs: Sequence[str], middle: float) -> Pair:
     """The second part of the runs against the first."""

@@ -323,8 +323,8 @@ def visible(finger: Mapping[str, Any], recording: Columns, added: Array) -> floa
     view = look(chosen.model.data, chosen.recordings, chosen.grid, chosen.least, candidates=())
     used = view.series.used
     # the recording may begin at another time after its signals are prepared, and has other samples then
-    own = chosen.recordings[0].time
-    there = np.column_stack([np.interp(own - own[0], recording["time"] - recording["time"][0], c) for c in added.T])
+    time = chosen.recordings[0].time
+    there = np.column_stack([np.interp(time - time[0], recording["time"] - recording["time"][0], c) for c in added.T])
     blocks = np.concatenate([segment.mean(there[segment.part]) for segment in chosen.grid.segments])
     torque = residual_of(replace(view.series, target=blocks), view.splines, view.columns.nominal[:, :, :0])
     return float(np.max(torque[used].var(axis=0) / view.residual[used].var(axis=0)))

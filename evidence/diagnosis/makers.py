@@ -195,7 +195,7 @@ def _files(
         _write(folder / f"{name}.parquet", record(hand, seed + number * OTHER_MOTION, options.test).columns)
         for number, name in enumerate(names, start=1)
     ]
-    own = {"joints": len(hand.truth["joints"]), "wander": options.wander, "presliding": options.presliding}
+    known = {"joints": len(hand.truth["joints"]), "wander": options.wander, "presliding": options.presliding}
     return Made(
         rig="matched",
         finger=nominal,
@@ -204,7 +204,7 @@ def _files(
         truths=truths,
         test=tuple(others[:1]),
         gain_recordings=tuple(others[1:]),
-        facts=own | dict(facts or {}),
+        facts=known | dict(facts or {}),
     )
 
 

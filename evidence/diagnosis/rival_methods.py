@@ -67,8 +67,8 @@ def plain(view: View) -> Plain:
     def bare(values: NDArray[Any]) -> Numbers:
         return np.stack([slow.without(values[used, j]) for j in range(values.shape[1])], axis=1)
 
-    own, columns = bare(view.columns.nominal), bare(view.columns.values)
-    span = basis(own.reshape(-1, own.shape[2]))
+    nominal, columns = bare(view.columns.nominal), bare(view.columns.values)
+    span = basis(nominal.reshape(-1, nominal.shape[2]))
     trials = tuple(
         Trial(Where(proposal.candidate.name, proposal.place.joint, proposal.place.tendon), shape.columns)
         for proposal in view.columns.proposals
@@ -105,7 +105,7 @@ def stepwise(data: Plain, choose: Choice) -> list[Trial]:
             break
         named.append(trial)
         span = basis(left.of(trial))
-        trials = tuple(each for each in left.trials if each.where != trial.where)
+        trials = tuple(other for other in left.trials if other.where != trial.where)
         left = Plain(without(left.target, span), without(left.columns, span), trials)
     return named
 
@@ -114,7 +114,7 @@ def by_correlation(data: Plain, power: Numbers) -> Trial | None:
     total = float(data.target @ data.target)
     product = data.target @ data.columns
     share = product**2 / np.maximum(power * total, 1e-300) * (power > least_power(power))
-    best = max(data.trials, key=lambda each: float(share[each.columns].max()), default=None)
+    best = max(data.trials, key=lambda trial: float(share[trial.columns].max()), default=None)
     if best is None:
         return None
     r2 = min(float(share[best.columns].max()), 1.0 - 1e-12)
@@ -142,9 +142,9 @@ def by_random_cv(data: Plain, power: Numbers) -> Trial | None:
     def gain(trial: Trial) -> float:
         if not shows(trial, power):
             return 0.0
-        own = data.of(trial)[order]
-        score = np.add.reduceat(own * data.target[order, None], starts, axis=0)
-        gram = np.add.reduceat(np.einsum("ri,rj->rij", own, own), starts, axis=0)
+        columns = data.of(trial)[order]
+        score = np.add.reduceat(columns * data.target[order, None], starts, axis=0)
+        gram = np.add.reduceat(np.einsum("ri,rj->rij", columns, columns), starts, axis=0)
         total = 0.0
         for k in range(FOLDS):
             a = np.linalg.pinv(gram.sum(axis=0) - gram[k], rcond=1e-9, hermitian=True) @ (score.sum(axis=0) - score[k])
@@ -215,14 +215,14 @@ def one_variable_each(data: Plain) -> tuple[list[Trial], Numbers]:
     owners: list[Trial] = []
     variables: list[Numbers] = []
     for where in dict.fromkeys(trial.where for trial in data.trials):
-        own = [trial for trial in data.trials if trial.where == where]
-        numbers = [number for trial in own for number in trial.numbers if shown[number]]
+        trials = [trial for trial in data.trials if trial.where == where]
+        numbers = [number for trial in trials for number in trial.numbers if shown[number]]
         if not numbers:
             continue
         scaled = data.columns[:, numbers] / np.sqrt(power[numbers])
         direction = np.linalg.eigh(scaled.T @ scaled)[1][:, -1]
         variable = scaled @ direction
-        owners.append(own[0])
+        owners.append(trials[0])
         variables.append(variable / np.sqrt(np.mean(variable**2)))
     return owners, np.column_stack(variables)
 
@@ -266,7 +266,7 @@ def parity_relations(arms: Numbers) -> list[Numbers]:
     joints = arms.shape[1]
     relations = [np.eye(joints)[:, [j]] for j in range(joints)]
     if joints > 1:
-        relations += [np.linalg.svd(own[None], full_matrices=True)[2][1:].T for own in arms]
+        relations += [np.linalg.svd(across[None], full_matrices=True)[2][1:].T for across in arms]
     return relations
 
 
@@ -334,8 +334,8 @@ def gain_of_discrepancy(data: Data, training: Sequence[FitRecording], tests: Seq
         seen = test.tracked & np.isfinite(inputs).all(axis=1)
         correction = np.zeros_like(test.target)
         correction[seen] = np.column_stack([process.predict(inputs[seen] / scale) for process in processes])
-        for k, own in enumerate((model, corrected(model, correction))):
-            sums[k] += float(np.nansum(residuals(data, test, own).residual[seen] ** 2))
+        for k, tried in enumerate((model, corrected(model, correction))):
+            sums[k] += float(np.nansum(residuals(data, test, tried).residual[seen] ** 2))
     return 1.0 - float(np.sqrt(sums[1] / sums[0]))
 
 

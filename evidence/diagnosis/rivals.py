@@ -231,9 +231,9 @@ def markdown(rows: Sequence[Row]) -> str:
     names = list(dict.fromkeys(who for row in good for who in row["answers"]))
     lines = []
     for family, is_matched in (("matched", True), ("foreign", False)):
-        own = [row for row in good if (row["rig"] == "matched") == is_matched]
+        of_family = [row for row in good if (row["rig"] == "matched") == is_matched]
         for what, (group, cell) in LINES.items():
-            asked = [row["answers"] for row in own if row["group"] == group]
+            asked = [row["answers"] for row in of_family if row["group"] == group]
             cells = [cell([answers[who] for answers in asked if who in answers]) for who in names]
             lines.append([f"{family}, {what}", *cells])
     failed = len(rows) - len(good)

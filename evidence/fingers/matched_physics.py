@@ -161,9 +161,9 @@ def read_finger(data: Mapping[str, Any]) -> Finger:
     for row in data.get("extensions") or []:
         assert row["effect"] == "presliding", f"no reader for {row['effect']}"
         kinds, place = (("edge", "pulley"), row["tendon"]) if "tendon" in row else (("joint", "load"), row["joint"])
-        for each in effects:
-            if each.kind in kinds and each.at[0] == place - 1:
-                each.memory = row["displacement"]
+        for effect in effects:
+            if effect.kind in kinds and effect.at[0] == place - 1:
+                effect.memory = row["displacement"]
     covers = [joint.get("cover") or {"stiffness": 0.0} for joint in joints]
     return Finger(
         arms=np.array([tendon["moment_arms"] for tendon in tendons]),

@@ -29,7 +29,7 @@ from evidence.fingers.matched_rig import Hand, Made, record
 
 Array = NDArray[Any]
 BLOCK = 0.01  # s, over which series are averaged
-KNOTS = 2.0  # s, of the slow bias that no effect is told from
+KNOTS = 2.0  # s, of the slow bias, which looks like a slow effect
 STEP = 1e-4  # relative, of the numeric derivative
 QUICK_TENSION = 0.7  # s in which the pretension changes: a slow bias does not follow
 LEVELS = (0.5, 2.0, 4.0)  # of the usual pretension

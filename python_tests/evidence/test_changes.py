@@ -212,7 +212,7 @@ def share_samples(one: Stretch, other: Stretch) -> bool:
     return same and one.begin < other.end and other.begin < one.end
 
 
-@pytest.mark.parametrize("pair", [pair for pairs in change_measured.PAIRS.values() for pair in pairs], ids=str)
+@pytest.mark.parametrize("pair", [pair for pairs in change_measured.PAIRS.values() for pair in pairs])
 def test_then_and_now_share_no_sample(pair: change_measured.Pair) -> None:
     assert not any(share_samples(one, other) for one, other in product(pair.then, pair.now))
 
