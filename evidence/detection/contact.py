@@ -131,7 +131,7 @@ def _answers(detector: str, pushes: Rows, scores: Rows) -> list[dict[str, Any]]:
     rows = []
     for score in tables.where(scores, detector=detector):
         own = tables.where(pushes, **{key: score[key] for key in ("kind", "pretension", "part")})
-        answers = zip(own, score["found"], score["delay"], strict=score["kind"] in TWINS)
+        answers = zip(own, score["found"], score["delay"], strict=True)
         rows += [{**push, "detector": detector, "found": found, "delay": delay} for push, found, delay in answers]
     return rows
 
