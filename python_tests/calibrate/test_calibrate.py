@@ -21,7 +21,7 @@ from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.files import write_calibration
 from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import errors_of, rms_of
+from tendonfmu.calibrate.report import errors_of
 from tendonfmu.calibrate.text import size_rows, verdict
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
@@ -32,6 +32,7 @@ from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
 from tendonfmu.recordings.smoothing import Signals
+from tendonfmu.report.numbers import together
 from tendonfmu.tasks.steps import Steps
 
 Numbers = NDArray[np.float64]
@@ -91,7 +92,7 @@ def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Ca
     report = calibrated[0].report
     assert report["structure"]["verdict"] == "explained"
     assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
-    rms = {name: rms_of(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
+    rms = {name: together(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
     assert rms["bias_only"] > rms["as_given"] > rms["fitted"] > 1.2 * rms["calibrated"]
 
 
@@ -104,7 +105,7 @@ def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Pat
     start = described(read_finger(calibrated[1] / "finger.json"), data)
     free = [prepare(start, read_recording(folder / FREE), 1, Held())]
     found = fit_all(start, free, Signals(30.0, 1), FitSettings(), given=data, seed=0)
-    wrong, right = (rms_of(errors_of(each, free, False)) for each in (data, found.data))
+    wrong, right = (together(errors_of(each, free, False)) for each in (data, found.data))
     assert right < 0.9 * wrong and "uncertainty" in found.data["contact"]
 
 
@@ -211,7 +212,7 @@ def test_an_earlier_calibration_is_the_prior_of_little_data(
     )
     write_calibration(again, tmp_path / "again")
     error = again.report["error"]
-    assert rms_of(error["calibrated"]) <= rms_of(error["previous"]) < rms_of(error["bias_only"])
+    assert together(error["calibrated"]) <= together(error["previous"]) < together(error["bias_only"])
     assert "gravity" in json.dumps(again.data["extensions"]) and again.report["structure"]["causes"] == []
     page = (tmp_path / "again" / "calibration.html").read_text(encoding="utf-8")
     assert "the earlier calibration" in page and "diagnosis.html" not in page
@@ -345,4 +346,4 @@ def test_pushes_are_told_by_size() -> None:
     found = size_rows({"pushes": {"sizes": rows}})
     assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
     assert found[2][1:] == ("4 of 4", "40 to 100 %")
-    assert size_rows({"pushes": None}) == [] and math.isclose(rms_of([3.0, 4.0]), math.sqrt(12.5))
+    assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))

@@ -46,7 +46,6 @@ CALLS = {
     "diagnose": ["{finger}", "{recording}", "-o", "diagnosis"],
     "tune": ["{finger}", "{recording}", "-o", "tuned.json"],
     "score": ["{finger}", "{recording}", "-o", "score.json"],
-    "campaign": ["{cases}", "-o", "campaign"],
     "demo": ["-o", "demo"],
 }
 # What each command calls first of the package, so that a test can make it fail.
@@ -65,7 +64,6 @@ FIRST = {
     "diagnose": "tendonfmu.interface.diagnose",
     "tune": "tendonfmu.interface.tune",
     "score": "tendonfmu.interface.score",
-    "campaign": "tendonfmu.diagnosis.read_cases",
     "demo": "tendonfmu.demo.Story",
 }
 QUICK = ("check", "build", "run", "simulate", "excite")  # the others are seen with --json where they are tested
@@ -82,15 +80,12 @@ def case(tmp_path: Path) -> dict[str, str]:
     (tmp_path / "finger.json").write_text(json.dumps(FINGER))
     (tmp_path / "rig.json").write_text(json.dumps(fmu_rig()))
     (tmp_path / "model.xml").write_text("<mujoco/>")
-    (tmp_path / "cases.json").write_text(
-        json.dumps({"format": "tendonfmu-campaign-1", "cases": [{"name": "a", "group": "null", "maker": "m.py:f"}]})
-    )
     tendons = range(1, len(FINGER["tendons"]) + 1)
     names = ["time", *(f"tendon_{key}[{i}]" for key in ("force", "position") for i in tendons)]
     rows = [[0.01 * k, *(5.0 for _ in tendons), *(1e-4 * k for _ in tendons)] for k in range(50)]
     lines = [",".join(names), *(",".join(map(repr, row)) for row in rows)]
     (tmp_path / "recording.csv").write_text("\n".join(lines) + "\n")
-    files = {"finger": "finger.json", "rig": "rig.json", "cases": "cases.json", "recording": "recording.csv"}
+    files = {"finger": "finger.json", "rig": "rig.json", "recording": "recording.csv"}
     return {**files, "model": "model.xml"}
 
 
@@ -157,7 +152,7 @@ def test_completion_knows_commands_and_options() -> None:
         done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **told})
         return done.stdout.split()
 
-    assert completed("tendonfmu ca") == ["calibrate", "campaign"]
+    assert completed("tendonfmu ca") == ["calibrate"]
     assert completed("tendonfmu diagnose --j") == ["--json", "--jobs"] or set(completed("tendonfmu diagnose --j")) == {
         "--jobs",
         "--json",
@@ -361,7 +356,7 @@ def test_a_table_goes_to_standard_output(call: Call, case: dict[str, str], tmp_p
     assert both.status == 2 and both.out == "" and "--output -: given with --json" in both.err
 
 
-@pytest.mark.parametrize("name", ["build", "fit", "tune", "score", "diagnose", "calibrate", "campaign", "demo"])
+@pytest.mark.parametrize("name", ["build", "fit", "tune", "score", "diagnose", "calibrate", "demo"])
 def test_other_outputs_do_not_go_to_standard_output(
     call: Call, case: dict[str, str], tmp_path: Path, name: str
 ) -> None:

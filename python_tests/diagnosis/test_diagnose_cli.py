@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from html import unescape
-from importlib import import_module
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,9 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 
 import diagnosis_examples as examples
 from command import Call
-from repository_paths import ROOT, TESTS
+from evidence.diagnosis.hidden_effects import hide
+from evidence.fingers.matched_rig import random_hand, record
+from repository_paths import ROOT
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.effects import CANDIDATES
 from tendonfmu.diagnosis.result import Diagnosis
@@ -227,15 +228,13 @@ def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_hidden_spring_is_found(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hidden_spring_is_found(call: Call, tmp_path: Path) -> None:
     """A spring hidden in recordings that code of its own has made: the command names it and writes a model with it."""
-    monkeypatch.syspath_prepend(str(TESTS / "hidden_effects"))
-    rig, hiding = import_module("matched_rig"), import_module("effects_hidden")
-    hand = rig.random_hand(21, joints=1, presliding=False, source=2, rate=250.0)
-    hand, label = hiding.hide(hand, "cover_stiffness", 3.0, seed=21, motion=3, seconds=40.0)
+    hand = random_hand(21, joints=1, presliding=False, source=2, rate=250.0)
+    hand, label = hide(hand, "cover_stiffness", 3.0, seed=21, motion=3, seconds=40.0)
     for name, seed in (("train", 3), ("test", 4)):
         (tmp_path / name).mkdir()
-        rig.record(hand, seed=seed, seconds=40.0).write(tmp_path / name)
+        record(hand, seed=seed, seconds=40.0).write(tmp_path / name)
     words = "diagnose train/nominal.json train/recording.parquet --test test/recording.parquet -o out --kinematics 2"
     answer = call(*words.split())
     assert answer.status == 0, answer.err

@@ -17,8 +17,6 @@ from repository_paths import ROOT
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 
-sys.path.insert(0, str(ROOT / "python_tests" / "hidden_effects"))
-
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.native import run_recording

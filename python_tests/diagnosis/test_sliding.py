@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
-import sticking_finger
+from evidence.fingers import sticking_finger
 from tendonfmu.calibrate.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings

@@ -233,16 +233,16 @@ DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 
 @pytest.mark.long
 @pytest.mark.skipif(not (DATA / "davinci_tool").is_dir(), reason=f"SKIPPED: no da Vinci recordings in {DATA}")
-def test_one_light_load_leaves_a_jaw_fit_for_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """bench/recalibration.py on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""
-    monkeypatch.syspath_prepend(str(ROOT / "bench"))
-    recalibration = pytest.importorskip("recalibration")
-    found = recalibration.campaign(
+def test_one_light_load_leaves_a_jaw_fit_for_the_others() -> None:
+    """The bench on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""
+    from evidence.fit import recalibration
+
+    rows = recalibration.campaign(
         [way for way in recalibration.ways([0.02]) if "description" not in way.name and "0.1" not in way.name],
         planted=(1.0, 1.3),
         only=("00", "09"),
     )
-    ratio = {(each.way.split(",")[0], each.planted, each.run): each.ratio for each in found}
+    ratio = {(row["way"].split(",")[0], row["planted"], row["run"]): row["ratio"] for row in rows}
     assert ratio["each sample counts", 1.0, "00"] > 2.0
     for run in ("00", "09"):
         assert ratio["from the report", 1.0, run] <= 1.06

@@ -1,4 +1,4 @@
-"""A fit finds the 472 numbers of a finger that made its recording itself (bench/recovery.py).
+"""A fit finds the 472 numbers of a finger that made its recording itself (evidence/fit/recovery.py).
 
 Here one seed, 400 s at 25 Hz: as much noise per second as in the campaign at 1 kHz, so nearly the same errors, at a
 fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes an hour on two cores: `./test -m campaign
@@ -8,17 +8,13 @@ python_tests/estimate/test_recovery.py`. docs/evidence/fit.md has its figures.
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from repository_paths import ROOT
 from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
-
-sys.path.insert(0, str(ROOT / "bench"))
 
 pytestmark = pytest.mark.skipif(not HAS_ESTIMATION, reason=ESTIMATION_MISSING)
 
@@ -27,7 +23,7 @@ SEED, DURATION, RATE = 1, 400.0, 25.0
 
 @pytest.fixture(scope="module")
 def case() -> Any:
-    from recovery_case import make_case
+    from evidence.fit.recovery_case import make_case
 
     return make_case(SEED, DURATION, RATE)
 
@@ -35,7 +31,7 @@ def case() -> Any:
 @pytest.fixture(scope="module")
 def row() -> dict[str, float]:
     """Of one seed, fitted both ways."""
-    from recovery import run_seed
+    from evidence.fit.recovery import run_seed
 
     return run_seed(SEED, DURATION, RATE)
 
@@ -43,7 +39,7 @@ def row() -> dict[str, float]:
 @pytest.mark.long
 def test_the_recording_is_the_models_own(case: Any) -> None:
     """At the truth nothing is left but the noise: ½ Σ e²/S has the mean and the spread of so many unit normals."""
-    from recovery_case import image
+    from evidence.fit.recovery_case import image
     from tendonfmu.estimate.estimation import Estimator
 
     known = Estimator(image(case.truth))
@@ -58,7 +54,7 @@ def test_the_recording_is_the_models_own(case: Any) -> None:
 
 @pytest.mark.long
 def test_the_fit_starts_off_the_truth(case: Any) -> None:
-    from recovery_case import START_SPREAD, image
+    from evidence.fit.recovery_case import START_SPREAD, image
     from tendonfmu.estimate.estimation import Estimator
 
     true, start = (Estimator(image(case.truth)).start, Estimator(image(case.start)).start)
@@ -88,35 +84,13 @@ def test_both_methods_agree(row: dict[str, float]) -> None:
     assert row["apart_rms"] < 1.0
 
 
-def test_a_campaign_goes_on_where_it_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import recovery
-
-    ran: list[int] = []
-
-    def short(seed: int, *_: object) -> dict[str, float]:
-        ran.append(seed)
-        counts = {f"identifiable_{kind}": 1.0 for kind in recovery.KINDS}
-        squares = {f"squares_{kind}": 1.0 for kind in recovery.KINDS}
-        plain = {"seed": seed, "numbers": 10, "identifiable": 6, "converged": 1, "batch_s": 2.0}
-        return {**plain, "batch_far": seed, "batch_variance": 1.0 + seed, **counts, **squares}
-
-    monkeypatch.setattr(recovery, "run_seed", short)
-    file = tmp_path / "rows.csv"
-    recovery.campaign(1, file, 1.0, 1.0, False)
-    rows = recovery.campaign(2, file, 1.0, 1.0, False)
-    assert ran == [0, 1] and recovery.read_rows(file) == rows
-    found = recovery.summary(rows)
-    assert found["identifiable"] == 0.6
-    assert found["batch: within 3 standard errors"] == pytest.approx(1 - 1 / 12)
-    assert found["batch: variance"] == pytest.approx(1.5)
-
-
 @pytest.mark.campaign
 def test_campaign(tmp_path: Path) -> None:
     """20 seeds of 400 s at 1 kHz."""
-    import recovery
+    from evidence.fit.recovery import run_seed, summary
+    from evidence.runner import run_cases
 
-    found = recovery.summary(recovery.campaign(20, tmp_path / "rows.csv"))
+    found = summary(run_cases(run_seed, {f"seed_{seed}": (seed,) for seed in range(20)}, tmp_path))
     assert found["least identifiable"] >= 0.7
     assert found["not converged"] == 0
     for method in ("batch", "ekf"):

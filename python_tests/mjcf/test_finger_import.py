@@ -16,7 +16,7 @@ pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirem
 import mujoco
 
 from command import Answer, Call
-from mjcf_models import ARMS, BOWSTRING, fixed_model
+from evidence.fingers.mjcf_models import ARMS, BOWSTRING, fixed_model
 from tendonfmu.mjcf.finger_import import ImportedFinger, ImportSettings, import_finger
 
 BOTH = ("mcp", "pip")

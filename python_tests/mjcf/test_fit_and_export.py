@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
 pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
 
-from mjcf_recovery import recover
+from evidence.fit.mujoco_friction import recover
 
 INTERVAL = 1.96  # standard errors; 95 %
 

@@ -15,9 +15,8 @@ from plant_rigs import needs_plant
 from repository_paths import ROOT
 
 PAGE = (ROOT / "docs" / "reference" / "paper.md").read_text(encoding="utf-8")
-sys.path.append(str(ROOT / "bench"))
 
-import paper_figures  # noqa: E402
+from evidence.fit import paper_figures  # noqa: E402
 
 
 def numbers_of(text: str) -> list[float]:
@@ -41,8 +40,8 @@ def test_figures_2b_and_5_are_those_of_the_formulas(tmp_path: Path, capsys: pyte
 def test_the_page_has_the_numbers_of_the_command(tmp_path: Path) -> None:
     """Rounded as on the page: within 3 %."""
     pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-    command = [sys.executable, str(ROOT / "bench" / "paper_figures.py"), "-o", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    command = [sys.executable, "-m", "evidence.fit.paper_figures", "-o", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     rows = [line.strip("| ").split(" | ") for line in done.stdout.splitlines()]
     found = [numbers_of(re.sub(r"\(.*?\)", "", row[2])) for row in rows if row[0] in ("6", "7")]
     shown = [

@@ -13,7 +13,19 @@ pytest.importorskip("h5py", reason="SKIPPED: tendonfmu is not installed with its
 pytest.importorskip("mcap_protobuf", reason="SKIPPED: tendonfmu is not installed with its extra logs")
 pytest.importorskip("rosbags", reason="SKIPPED: tendonfmu is not installed with its extra logs")
 
-from log_cases import FAULTS, FORMATS, ROWS, Format, content_of, converted, cut_at, going_back, sound, truth, write
+from evidence.recordings.log_cases import (
+    FAULTS,
+    FORMATS,
+    ROWS,
+    Format,
+    content_of,
+    converted,
+    cut_at,
+    going_back,
+    sound,
+    truth,
+    write,
+)
 from repetitions import repeated
 
 REFUSED = {

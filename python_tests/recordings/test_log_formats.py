@@ -18,7 +18,7 @@ pytest.importorskip("pint", reason="SKIPPED: tendonfmu is not installed with its
 pytest.importorskip("rosbags", reason="SKIPPED: tendonfmu is not installed with its extra logs")
 
 from command import Call
-from log_cases import FORMATS, START, TYPE, header, ros_store, sound, truth, write
+from evidence.recordings.log_cases import FORMATS, START, TYPE, header, ros_store, sound, truth, write
 from map_cases import LOG, SMALL, VALIDATOR, edited, written
 from repository_paths import ROOT
 from tendonfmu.errors import InputError

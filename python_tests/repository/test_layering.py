@@ -55,7 +55,6 @@ ONLY = {
 COMMANDS = {
     "cli/program.py",
     "cli/calibrate.py",
-    "cli/campaign.py",
     "cli/check.py",
     "cli/command.py",
     "cli/convert.py",

@@ -1,4 +1,4 @@
-"""Functions that the tests of tasks/jobs.py and bench/job_scaling.py have workers call."""
+"""Functions that the tests of tasks/jobs.py have workers call."""
 
 from __future__ import annotations
 
@@ -27,16 +27,3 @@ def end_its_worker(number: int) -> dict[str, Any]:
     if number == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return {"number": number}
-
-
-def compute(seconds: float) -> dict[str, Any]:
-    """Takes that processor time, whatever else runs on the machine."""
-    begin, turns = time.process_time(), 0
-    while time.process_time() - begin < seconds:
-        turns += sum(range(1000)) > 0
-    return {"turns": turns, "process": os.getpid()}
-
-
-def wait(seconds: float) -> dict[str, Any]:
-    time.sleep(seconds)
-    return {"process": os.getpid()}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import signal
-import sys
 import time
 from pathlib import Path
 from threading import Thread
@@ -13,12 +12,9 @@ import pytest
 
 import some_jobs
 from dask_on_loopback import dask_processes
-from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.tasks import jobs as engine
 from tendonfmu.tasks.jobs import Job, rows_of, run_jobs, waiting_jobs, workers_of
-
-sys.path.insert(0, str(ROOT / "bench"))
 
 
 def noting(count: int, seconds: float, log: Path) -> list[Job]:
@@ -171,13 +167,3 @@ def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Pat
     assert 1 <= left <= 6
     assert run_jobs(some_jobs.note, jobs, output) == left
     assert [row["number"] for row in rows_of(jobs, output)] == list(range(8))
-
-
-@pytest.mark.long
-def test_two_workers_take_half_the_time_of_one() -> None:
-    """Jobs that only wait, so that a busy machine does not matter much: what is left is what the engine costs."""
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
-    import job_scaling
-
-    one, two = (job_scaling.run(workers, 8, 1.0, some_jobs.wait) for workers in (1, 2))
-    assert one.wall / two.wall > 1.5

@@ -5,7 +5,6 @@
 - `extension_fit` fits the extended finger; `gain` measures on unseen data; `diagnosis` runs all of these steps.
 - `experiments` finds what to record next.
 - `changes` compares with reference recordings.
-- `campaign` runs many cases.
 """
 
 from typing import TYPE_CHECKING
@@ -13,9 +12,6 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .campaign.campaign import How, collect, run_campaign, still_to_do
-    from .campaign.cases import python_function, read_cases
-    from .campaign.rates import EFFECT_HEADINGS, HEADINGS, by_effect, campaign_report, markdown, rates, rates_by_part
     from .cause_search import predicted_of, series_of
     from .changes.history import History, Line, diagnose_history, share_of
     from .diagnosis import diagnose

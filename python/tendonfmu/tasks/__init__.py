@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .interruption import ended_by_signals, uninterrupted
-    from .jobs import ROWS, Job, Row, rows_of, run_jobs, waiting_jobs, worker_count, workers_of
+    from .jobs import Job, rows_of, run_jobs, workers_of
     from .phases import Phases, PhaseState, Step
     from .steps import FOLDER, Steps, digest_of, digest_of_file, forget_steps
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -215,7 +214,7 @@ def _library() -> Any:
 
 @contextmanager
 def _local_workers(library: Any, count: int) -> Iterator[Any]:
-    """Start workers with one thread of linear algebra each, on a free port, so that two campaigns do not conflict."""
+    """Start workers with one thread of linear algebra each, on a free port, so that two runs do not conflict."""
     import dask
 
     limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -252,8 +251,3 @@ def _check_versions(client: Any, address: str) -> None:
     for place, version in versions.items():
         if version != version_here():
             raise InputError(f"--scheduler {address}: {place} has tendonfmu {version}; expected {version_here()}")
-
-
-def worker_count() -> int:
-    """Return the default number of workers."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

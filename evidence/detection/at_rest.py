@@ -1,0 +1,108 @@
+"""Pushes of 0.02 to 1 N on a finger at rest: how many contact.rest finds with the bounds that `tune` learns for it.
+
+On the simulated index finger (the pushes in stiction of slots.py). Bounds come from rests without pushes, alarms are
+counted in others.
+
+    python -m evidence.detection.at_rest -o FOLDER
+
+Recordings are kept in the folder. Prints a table.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evidence import tables
+from evidence.detection.hand import PRETENSIONS, Arrays
+from evidence.detection.limits import PRESLIDING
+from evidence.detection.slots import Case, Slot, cut, made, slots
+from evidence.runner import INDEX_FINGER, parser, publish, say
+from tendonfmu.detect import free_parts
+from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
+from tendonfmu.model import Instance, read_finger
+from tendonfmu.recordings import Recording
+
+RATE, CONFIDENCE = 6.0, 0.9  # 1/h
+PARTS = range(1, 9)
+LEAST_FORCE = 0.05  # N
+HEAD = ["learned from, min", "rests", "other rests, min", "alarms", "before a push", "below break-away"]
+HEAD += ["of them ≥ 0.05 N", "all ≥ 0.05 N", "delay, ms", "after a push, %"]
+
+
+def inputs(arrays: Arrays) -> Arrays:
+    return {name: arrays[name] for name in ("time", "tendon_force", "tendon_position")}
+
+
+def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
+    """Learns from every second twin without pushes, counts alarms in the others and pushes found."""
+    finger = read_finger(INDEX_FINGER)
+
+    def rests_of(chosen: Sequence[int]) -> list[Any]:
+        found = []
+        for part in chosen:
+            for pretension in PRETENSIONS:
+                groups = inputs(made(folder, Case("stuck_twin", pretension, part)))
+                recording = Recording(Path("recording"), groups.pop("time"), groups)
+                found += free_parts(finger, recording, 1)[0]
+        return found
+
+    free, other = rests_of(parts[::2]), rests_of(parts[1::2])
+    rule, reasons = learn_rest(finger.data, free, 1, RATE, CONFIDENCE)
+    if rule is None:
+        raise RuntimeError(f"no rule: {reasons}")
+    say(json.dumps(dict(rule.keys)))
+    joints = len(finger.data["joints"])
+    never = {**rule.keys, "threshold": [1e9] * joints, "creep": None, "innovation": None}
+    minutes = sum(float(rest.time[-1]) for rest in find_rests(finger.data, other, 1, never)) / 60.0
+    alarms = count_alarms(finger.data, other, 1, rule.keys)
+    at_rest = {**finger.data, "contact": {"threshold": [1e9] * joints, "rest": dict(rule.keys)}}
+    rows = []
+    for part in parts:
+        for pretension in PRETENSIONS:
+            case = Case("stuck", pretension, part)
+            whole = made(folder, case)
+            for slot in slots(case):
+                rows.append(pushed(at_rest, cut(whole, slot.begin, slot.end), slot))
+    below, forced = ([row for row in rows if row[key]] for key in ("below", "forced"))
+    both = [row for row in below if row["forced"]]
+    counts = [tables.count(row["found"] for row in own) for own in (below, both, forced)]
+    delay = tables.median((row["delay"] for row in rows), ".0f", 1e3)
+    tail = np.nanmean(tables.column(rows, "tail"))
+    cells = [f"{60 * rule.hours:.1f}", rule.rests, f"{minutes:.1f}", alarms, sum(row["before"] for row in rows)]
+    return [*cells, *counts, delay, f"{100 * tail:.0f}"]
+
+
+def pushed(description: dict[str, Any], arrays: Arrays, slot: Slot) -> dict[str, Any]:
+    """What becomes of a push; tail: share of the time from 0.2 s after it on that is in contact."""
+    time, angle = arrays["time"], arrays["true_joint_position"]
+    alarm = Instance.from_description(json.dumps(description), 1).run(inputs(arrays))["contact_at_rest"].ravel()
+    during = (time >= slot.push) & (time <= slot.top)
+    before = angle[(time >= slot.push - 0.1) & (time < slot.push)].mean(axis=0)
+    row = {
+        "found": bool(alarm[during].any()),
+        "below": float(np.abs(angle[during] - before).max()) <= PRESLIDING,
+        "forced": abs(slot.force) >= LEAST_FORCE,
+        "before": bool(np.any(alarm[(time < slot.push) & (time > slot.push - 1.0)])),
+    }
+    if row["found"]:
+        row["delay"] = float(time[during][np.argmax(alarm[during])] - slot.push)
+        row["tail"] = float(alarm[time > slot.top + 0.3].mean())
+    return row
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--parts", type=int, default=len(PARTS), help="recordings of each pretension")
+    given = options.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
+    line = measure(given.output, range(1, given.parts + 1))
+    publish(given.output / "contact_at_rest.md", tables.table(HEAD, [line], 0) + "\n")
+
+
+if __name__ == "__main__":
+    main()

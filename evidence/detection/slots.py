@@ -1,0 +1,176 @@
+"""Recordings of the simulated index finger: slow pushes, pushes in stiction, a finger to be disturbed.
+
+The rig is examples/rigs/index_finger.json. Pushes come in slots, each of which a fresh finger is run over: what one
+push leaves in the bias is not counted against the next. At rest a slot begins with a move of 1 s to another posture.
+Everything is kept in a folder under its name, and what is there is not made again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evidence.detection.hand import LEAST_FORCE, Arrays, grouped
+from evidence.runner import INDEX_RIG, write
+from tendonfmu.files import read_table, write_table
+from tendonfmu.simulate import read_rig, simulate
+from tendonfmu.statistics.quintic import evaluate
+
+RATE = 500.0  # Hz, the rig's
+FORCES, RISES, HOLD, FALL = (0.25, 0.5, 1.0, 2.0), (0.1, 1.0, 10.0), 3.0, 0.1  # N, s
+PAD = [0.0, 0.0, 1.0]  # direction on the fingertip, frame of the last link
+CENTRE, SPREAD = np.array([0.0, 0.35, 0.45, 0.35]), np.array([0.15, 0.3, 0.3, 0.3])  # rad, postures at rest
+MOVE, LEAD, TAIL = 1.0, 2.5, 0.5  # s: the move at a slot's begin; from there to the push; after it
+STUCK_FORCE, STUCK_RISES, STUCK_HOLD, STUCK_COUNT = (0.02, 1.0), (0.05, 0.5), 0.5, 24
+WARM = 2.0  # s, cut off the start of recordings that are disturbed
+PUSH_TIME, AFTER = 5.0, 60.0  # s: a push at the start; the minute after a disturbance
+DISTURBED, LONGEST = 10.0, 10.0  # s: begin of the other disturbances, the longest of them
+RECOVERY_FORCE = 1.0  # N
+TRUE = ("external_torque", "joint_torque", "friction_torque", "joint_position", "joint_velocity")
+_KINDS = ("rest", "motion", "stuck", "still")
+WRIST = {
+    "amplitude": 0.5,
+    "period": 10.0,
+    "arms": [0.01] * 8,  # m
+    "friction": {"static": 0.03, "coulomb": 0.025, "stribeck_velocity": 0.005},
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recording."""
+
+    # "rest", "motion" (ramps), "stuck", "still" (to be disturbed), "pushed" (the same with a push at the start),
+    # "wrist" (the same over a wrist that turns); "rest_twin", "motion_twin": without the pushes
+    kind: str
+    pretension: float  # N
+    part: int  # from 1
+
+    @property
+    def name(self) -> str:
+        return f"{self.kind}_{self.pretension:g}_{self.part}"
+
+    @property
+    def pushes(self) -> str:
+        """The kind whose pushes and motion it has."""
+        return self.kind.removesuffix("_twin")
+
+    @property
+    def twin(self) -> Case:
+        return replace(self, kind=f"{self.kind}_twin")
+
+    @property
+    def seed(self) -> int:
+        """Of motion and noise, which twins and the recordings of recovery share."""
+        kind = _KINDS.index("still" if self.kind in ("pushed", "wrist") else self.pushes)
+        return 7_000_000 + 10_000 * kind + 100 * round(self.pretension) + self.part
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One push."""
+
+    begin: float  # s, of the slot, of the push's rise, of the slot's end
+    push: float
+    end: float
+    force: float  # N
+    rise: float  # s
+    hold: float
+
+    @property
+    def top(self) -> float:
+        """s, end of the hold."""
+        return self.push + self.rise + self.hold
+
+
+def slots(case: Case) -> list[Slot]:
+    random = np.random.default_rng([case.seed, 1])
+    if case.kind == "stuck":
+        forces = np.exp(random.uniform(*np.log(STUCK_FORCE), STUCK_COUNT))
+        wanted = [(float(force), STUCK_RISES[k % 2], STUCK_HOLD) for k, force in enumerate(forces)]
+    else:
+        wanted = [(force, rise, HOLD) for force in FORCES for rise in RISES]
+        random.shuffle(wanted)
+    planned, begin = [], MOVE
+    for force, rise, hold in wanted:
+        push = begin + LEAD + round(float(random.uniform(0.0, 0.5)), 3)
+        end = push + rise + hold + FALL + TAIL
+        planned.append(Slot(begin, push, end, force, rise, hold))
+        begin = end
+    return planned
+
+
+def write_rig(folder: Path, case: Case) -> Path:
+    rig: dict[str, Any] = {
+        "format": "tendonfmu-rig-1",
+        "base": str(INDEX_RIG),
+        "name": case.name,
+        "seed": case.seed,
+        "physics": {"contact_force": LEAST_FORCE},
+        "motion": {"pretension": case.pretension, "seed": case.seed, "duration": None},
+        "pushes": [],
+        "recording": {"columns": ["joint_position", "external_torque", "contact"]},
+    }
+    if case.pushes in ("still", "pushed", "wrist"):
+        duration = WARM + DISTURBED + LONGEST + AFTER + 1.0
+        if case.kind == "pushed":
+            rig["pushes"] = [_push(WARM - 1.0, 0.1, 0.9 + PUSH_TIME, RECOVERY_FORCE)]
+        if case.kind == "wrist":
+            rig["physics"]["wrist"] = WRIST
+    else:
+        planned = slots(case)
+        duration = planned[-1].end + 1.0
+        if case.kind == case.pushes:
+            rig["pushes"] = [_push(slot.push, slot.rise, slot.hold, slot.force) for slot in planned]
+        if case.pushes == "motion":
+            rig["motion"]["rest_share"] = 0.0
+        else:
+            file = folder / f"motion_{case.name}.parquet"
+            write_table(file, _postures(case, planned, duration))
+            rig["motion"] = {"kind": "file", "file": file.name, "pretension": case.pretension}
+    rig["recording"]["duration"] = duration
+    file = folder / f"{case.name}.json"
+    write(file, rig)
+    return file
+
+
+def _push(start: float, rise: float, hold: float, force: float) -> dict[str, Any]:
+    return {"start": start, "rise": rise, "hold": hold, "fall": FALL, "force": force, "direction": PAD}
+
+
+def _postures(case: Case, planned: list[Slot], duration: float) -> Arrays:
+    """A motion file: a move to another posture at the begin of each slot."""
+    random = np.random.default_rng([case.seed, 2])
+    time, posture = [0.0], [CENTRE]
+    for slot in planned:
+        time += [slot.begin, slot.begin + MOVE]
+        posture += [posture[-1], CENTRE + SPREAD * random.uniform(-1.0, 1.0, len(CENTRE))]
+    time, posture = [*time, duration], [*posture, posture[-1]]
+    table: Arrays = {"time": np.array(time)}
+    for j, angles in enumerate(np.array(posture).T, start=1):
+        knots = np.column_stack([time, angles, np.zeros((len(time), 2))])
+        for name, values in zip(("position", "velocity", "acceleration"), evaluate(knots, np.array(time)), strict=True):
+            table[f"joint_{name}[{j}]"] = values
+    return table
+
+
+def made(folder: Path, case: Case) -> Arrays:
+    """The recording, contact_force [N], and the groups of `TRUE` as true_NAME [N, n]."""
+    file = folder / f"{case.name}.parquet"
+    if not file.exists():
+        run = simulate(read_rig(write_rig(folder, case)), truth=True)
+        assert run.truth is not None
+        kept = {name: run.recording[name] for name in run.recording if name.startswith(("time", "tendon_"))}
+        kept |= {f"true_{name}": values for name, values in run.truth.items() if name.split("[")[0] in TRUE}
+        kept["contact_force"] = np.sqrt(sum(run.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)))
+        write_table(file, kept)
+    return grouped(read_table(file, lambda _path, _names: None))
+
+
+def cut(arrays: Arrays, begin: float, end: float) -> Arrays:
+    """The samples from begin to end, s."""
+    first, last = np.searchsorted(arrays["time"], (begin - 1e-9, end + 1e-9))
+    return {name: values[first:last] for name, values in arrays.items()}

@@ -1,0 +1,1 @@
+"""Hidden effects, changes and rivals: how often `diagnose` is right."""

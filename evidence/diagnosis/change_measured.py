@@ -1,0 +1,378 @@
+"""The bed `hidden`: known changes put on measured recordings of EMPS and the da Vinci jaw.
+
+`then` and `now` are different stretches of the recordings; `now` has a known effect on it (measured.py), or nothing.
+EMPS: two recordings of the same path, of which one has pulses of the drive's force on it; these may stand as motor
+force or as known load. da Vinci: 15 runs, ten loads at 0.1 Hz and five at 0.5 Hz.
+
+Strength: variance of the torque that the change adds over the variance of what the case's model leaves of the unaltered
+`now`, both in blocks of 10 ms and without a constant of each recording (the machines' biases are constants). The part
+that refitting the model's own numbers to `now` absorbs does not count. Where that is more than half of it, the change
+is one of numbers that the model has, `then` pins them, and the whole torque counts.
+
+Needs the recordings in ../shared/data or $TENDONFMU_DATA.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import io, signal
+
+from evidence.diagnosis.changes import BY_SPEED, UNCHANGED, Array, Change, Columns, Makers
+from evidence.diagnosis.measured import (
+    CLOSE,
+    EFFECTS,
+    FORCE,
+    LOAD,
+    Description,
+    Effect,
+    Machine,
+    bent,
+    diagnosed_model,
+    first_magnitude,
+    largest_force,
+    put,
+    residual,
+    residuals,
+)
+from evidence.judge import Truth
+from evidence.runner import DATA, EXAMPLES
+from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.converters.emps import CUTOFF
+
+THINNED = 2  # samples of 1 kHz to one: the remainder of the EMPS model grows by 1 %
+PRETENSION = 13.0  # N, da Vinci: the closing cable never goes slack
+JAMMED = {"07": 16.5}  # s; the instrument jams after that
+PULSE = 5.0695  # V, measured (README of the data); the drive's gain makes newtons of it
+MODELS = ("diagnosed", "plain")
+KINEMATICS = {"emps": 3, "davinci": 1}
+PLAIN = {"emps": EXAMPLES / "emps" / "emps.json", "davinci": EXAMPLES / "davinci" / "jaw_nominal.json"}
+
+STRENGTHS = (0.1, 0.3, 1.0)
+ROUNDS = 20  # of the search for a strength
+ABSORBED = 0.5  # share of the variance that refitting to `now` leaves, below which numbers of the model have changed
+LOUDEST = 0.5  # of the machine's largest torque: a change that adds more is no longer the same machine
+HALF_EMPS, HALF_JAW = 12.48, 10.0  # s: two of the four cycles; one of the two at 0.1 Hz, five of the ten at 0.5 Hz
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a run: plain, pulses or loaded of EMPS (loaded: its pulses are known load), else the run's name."""
+
+    run: str
+    begin: float = 0.0  # s
+    end: float = 1e6
+
+    def __str__(self) -> str:
+        return self.run if self.end > 1e5 else f"{self.run} {self.begin:g}-{self.end:g} s"
+
+
+@cache
+def recording(machine: str, run: str) -> Columns:
+    """All of a run, at 1 kHz."""
+    if machine == "davinci":
+        file = DATA / "davinci_tool" / "Tool_4_Maryland_L_4" / f"{run}.TXT"
+        return part_of(convert_file("davinci", file, {"pretension": PRETENSION}), 0.0, JAMMED.get(run, 1e6))
+    file = DATA / "emps" / ("DATA_EMPS.mat" if run == "plain" else "DATA_EMPS_PULSES.mat")
+    columns = convert_file("emps", file, {"decimation": 1})
+    return with_pulses_as_load(columns, file) if run == "loaded" else columns
+
+
+def with_pulses_as_load(columns: Columns, file: Path) -> Columns:
+    """The pulses taken off the drive's force, and off the torque that accelerates: a known push of the same size."""
+    raw = io.loadmat(file)
+    time, on = np.ravel(raw["t"]), np.ravel(raw["pulses_N"]) > 0
+    force = PULSE * float(np.ravel(raw["gtau"])[0]) * on
+    smooth = signal.filtfilt(*signal.butter(4, CUTOFF, fs=1.0 / float(np.median(np.diff(time)))), force)
+    pulse = np.interp(columns["time"], time, smooth)
+    return dict(columns) | {FORCE: columns[FORCE] - pulse, LOAD: columns[LOAD] - pulse}
+
+
+def part_of(columns: Columns, begin: float, end: float) -> Columns:
+    """From 0 s on again, as a recording of its own."""
+    rows = (columns["time"] >= begin) & (columns["time"] < end)
+    part = {name: values[rows] for name, values in columns.items()}
+    return part | {"time": part["time"] - part["time"][0]}
+
+
+def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
+    """Means of so many samples each."""
+    rows = len(columns["time"]) // to_one * to_one
+    return {name: values[:rows].reshape(-1, to_one).mean(axis=1) for name, values in columns.items()}
+
+
+def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> dict[str, Columns]:
+    """Recordings at 1 kHz, by the words of their stretches. known_load: with the column `external_torque`."""
+    parts: dict[str, Columns] = {}
+    for stretch in stretches:
+        columns = part_of(recording(machine, stretch.run), stretch.begin, stretch.end)
+        parts[str(stretch)] = {name: values for name, values in columns.items() if known_load or name != LOAD}
+    return parts
+
+
+@cache
+def plain_model(machine: str, stretches: tuple[Stretch, ...], known_load: bool) -> Mapping[str, Any]:
+    """Coulomb and viscous friction as in examples, fitted to the stretches: what most users have."""
+    start = json.loads(PLAIN[machine].read_text(encoding="utf-8"))
+    return fitted(start, [thinned(part) for part in cut(machine, stretches, known_load).values()], KINEMATICS[machine])
+
+
+def fitted(start: Mapping[str, Any], recordings: Sequence[Columns], kinematics: int = 1) -> Mapping[str, Any]:
+    with tempfile.TemporaryDirectory() as scratch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        files = [Path(scratch) / f"{k}.parquet" for k in range(len(recordings))]
+        for file, columns in zip(files, recordings, strict=True):
+            write_table(file, dict(columns))
+        fit = FrictionFit(start, kinematics=kinematics, threads=1, uncertainty=False).fit(files)
+    data: Mapping[str, Any] = fit.description_.data
+    return data
+
+
+def model_of(machine: str, model: str, stretches: tuple[Stretch, ...], known_load: bool = True) -> Description:
+    """stretches: of the machine as it was, which a plain model is fitted to."""
+    return diagnosed_model(machine) if model == "diagnosed" else dict(plain_model(machine, stretches, known_load))
+
+
+# --- which cases there are --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Pair:
+    """conditions: of `now` against `then`: part (of the same run), load, speed, excitation."""
+
+    machine: str
+    conditions: str
+    then: tuple[Stretch, ...]
+    now: tuple[Stretch, ...]
+
+    @property
+    def reversed(self) -> Pair:
+        return replace(self, then=self.now, now=self.then)
+
+
+def halves(machine: str, runs: Sequence[str], middle: float) -> Pair:
+    """The second part of the runs against the first."""
+    then = tuple(Stretch(run, 0.0, middle) for run in runs)
+    return Pair(machine, "part", then, tuple(Stretch(run, middle, 2 * middle) for run in runs))
+
+
+def whole(machine: str, conditions: str, then: Sequence[str], now: Sequence[str]) -> Pair:
+    return Pair(machine, conditions, tuple(map(Stretch, then)), tuple(map(Stretch, now)))
+
+
+FORWARD = {
+    "emps": [
+        *(halves("emps", [run], HALF_EMPS) for run in ("plain", "pulses", "loaded")),
+        whole("emps", "excitation", ["plain"], ["pulses"]),
+        whole("emps", "load", ["plain"], ["loaded"]),
+        # halves of different files: their samples differ in every way that whole files do
+        *(
+            Pair("emps", conditions, (Stretch("plain", *one),), (Stretch(run, *other),))
+            for conditions, run in (("excitation", "pulses"), ("load", "loaded"))
+            for one, other in (((0.0, HALF_EMPS), (HALF_EMPS, 25.0)), ((HALF_EMPS, 25.0), (0.0, HALF_EMPS)))
+        ),
+    ],
+    "davinci": [
+        halves("davinci", ["00", "04", "08"], HALF_JAW),
+        halves("davinci", ["01", "05", "09"], HALF_JAW),
+        halves("davinci", ["02", "06"], HALF_JAW),
+        halves("davinci", ["40", "44", "48"], HALF_JAW),
+        halves("davinci", ["42", "46"], HALF_JAW),
+        whole("davinci", "load", ["00", "04", "08"], ["02", "06"]),
+        whole("davinci", "load", ["01", "05", "09"], ["03", "07"]),
+        whole("davinci", "load", ["02", "06"], ["01", "05"]),
+        whole("davinci", "load", ["40", "44", "48"], ["42", "46"]),
+        whole("davinci", "speed", ["00", "04", "08"], ["40", "44", "48"]),
+        whole("davinci", "speed", ["02", "06"], ["42", "46"]),
+        whole("davinci", "speed", ["00", "02", "04"], ["40", "42", "44"]),
+    ],
+}
+PAIRS = {machine: [*pairs, *(pair.reversed for pair in pairs)] for machine, pairs in FORWARD.items()}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One case to be made. number: its parity is the half. pairs: the first one with which the strength can be had."""
+
+    number: int
+    hidden: str  # a name of EFFECTS, or UNCHANGED
+    strength: float
+    model: str
+    pairs: tuple[Pair, ...]
+
+
+def numbered(plans: Sequence[Plan], after: int = 0) -> list[Plan]:
+    """With numbers in place of the halves 1 (odd) and 0 (even), each half counted on."""
+    following = {1: after + 1, 0: after + 2}
+    result = []
+    for plan in plans:
+        result.append(replace(plan, number=following[plan.number]))
+        following[plan.number] += 2
+    return result
+
+
+def unchanged_plans() -> list[Plan]:
+    """Every pair of stretches, by both models, which lie in different halves."""
+    return numbered(
+        [
+            Plan((k + m) % 2, UNCHANGED, 0.0, model, (pair,))
+            for machine in PAIRS
+            for k, pair in enumerate(PAIRS[machine])
+            for m, model in enumerate(MODELS)
+        ]
+    )
+
+
+def changed_plans(after: int) -> list[Plan]:
+    """Every change at every strength once in each half, by the one model in one and by the other in the other; the
+    order of the pairs is drawn."""
+    plans = []
+    for m, machine in enumerate(PAIRS):
+        for k, name in enumerate(name for name, effect in EFFECTS.items() if machine in effect.machines):
+            for s, strength in enumerate(STRENGTHS):
+                for half in (1, 0):
+                    order = np.random.default_rng([14, m, k, s, half]).permutation(len(PAIRS[machine]))
+                    pairs = tuple(PAIRS[machine][place] for place in order)
+                    plans.append(Plan(half, name, strength, MODELS[(k + s + half) % 2], pairs))
+    return numbered(plans, after)
+
+
+def plans() -> list[Plan]:
+    """All cases of the bed: those without a change first."""
+    unchanged = unchanged_plans()
+    last = max(plan.number for plan in unchanged)
+    return [*unchanged, *changed_plans(last + last % 2)]
+
+
+def makers() -> Makers:
+    return {plan.number: partial(make, plan) for plan in plans()}
+
+
+def make(plan: Plan) -> Change:
+    """Raises ValueError where no sound magnitude of the change has the strength, with any of its pairs."""
+    for pair in plan.pairs:
+        try:
+            return made_of(plan, pair)
+        except ValueError as impossible:
+            reason = impossible
+    raise reason
+
+
+def made_of(plan: Plan, pair: Pair) -> Change:
+    model = model_of(pair.machine, plan.model, pair.then)
+    then, now = cut(pair.machine, pair.then), cut(pair.machine, pair.now)
+    allowed = BY_SPEED if pair.conditions == "speed" else ()
+    truth = Truth(joint=1, tendon=1, allowed=allowed)
+    if plan.hidden != UNCHANGED:
+        effect = EFFECTS[plan.hidden]
+        seen = Machine(pair.machine, model, {name: dict(part) for name, part in now.items()}, KINEMATICS[pair.machine])
+        now = dict(hide(seen, effect, plan.strength).now)
+        signs = {name: effect.sign * sign for name, sign in effect.signs.items() if name in effect.names}
+        truth = replace(truth, effects=effect.names, allowed=(*allowed, *effect.also), signs=signs)
+    return Change(
+        machine=pair.machine,
+        model=plan.model,
+        hidden=plan.hidden,
+        conditions=pair.conditions,
+        kinematics=KINEMATICS[pair.machine],
+        finger=model,
+        then=[thinned(columns) for columns in then.values()],
+        now=[thinned(columns) for columns in now.values()],
+        truth=truth,
+        strength=plan.strength,
+    )
+
+
+# --- changes at a strength --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Recordings with a change, and variances of its torque over that of what the model leaves."""
+
+    now: Mapping[str, Columns]
+    magnitude: float
+    by: str  # which of the variances was set to the strength
+    survives_now: float  # less what refitting the model's numbers to `now` alone absorbs
+    whole: float  # less a constant of each recording
+
+
+def hide(now: Machine, effect: Effect, strength: float, physics: Machine | None = None) -> Hidden:
+    """The change at a strength. now: seen through the case's model. physics: `now` through the diagnosed one.
+
+    Raises ValueError where no sound magnitude has the strength.
+    """
+    physics = physics or replace(now, model=diagnosed_model(now.name))
+    before, absorbed = residuals(now), bent(now)
+    constants = spans([len(residual(now, columns)) for columns in now.recordings.values()])
+    noise = less(before, constants)
+    loudness = float(noise @ noise)
+
+    def altered(magnitude: float) -> dict[str, dict[str, Array]]:
+        return put(physics, effect, effect.sign * magnitude).recordings
+
+    def added(magnitude: float) -> Array:
+        return np.asarray(residuals(replace(now, recordings=altered(magnitude))) - before)
+
+    def measured(torque: Array) -> dict[str, float]:
+        kept = {"whole": less(torque, constants), "survives_now": less(torque, absorbed)}
+        return {name: float(left @ left) / loudness for name, left in kept.items()}
+
+    magnitude = first_magnitude(effect, physics)
+    start = measured(added(magnitude))
+    # decided once, at the first magnitude, so that the search does not jump
+    by = "whole" if start["survives_now"] < ABSORBED * start["whole"] else "survives_now"
+    magnitude = magnitude_of(strength, lambda tried: measured(added(tried))[by], magnitude, effect.most)
+    torque = added(magnitude)
+    check_sound(torque, physics)
+    return Hidden(altered(magnitude), effect.sign * magnitude, by, **measured(torque))
+
+
+def spans(lengths: Sequence[int]) -> Array:
+    """[B, R] orthonormal: a constant of each recording."""
+    total = np.repeat(np.eye(len(lengths)), lengths, axis=1).T
+    return np.asarray(total / np.sqrt(np.array(lengths, dtype=float)))
+
+
+def less(values: Array, columns: Array) -> Array:
+    return np.asarray(values - columns @ (columns.T @ values))
+
+
+def check_sound(torque: Array, machine: Machine) -> None:
+    """Raises ValueError where the torque is too large for the machine to be the same still."""
+    most = LOUDEST * largest_force(machine) * machine.arm
+    swing = float(np.percentile(np.abs(torque - torque.mean()), 95))
+    if swing > most:
+        raise ValueError(f"it takes {swing:.3g} N.m, more than the {most:.3g} N.m that are sound")
+
+
+def magnitude_of(strength: float, strength_at: Callable[[float], float], first: float, most: float) -> float:
+    """The magnitude that has the strength: by proportion until it lies between two, then between them.
+
+    Raises ValueError where none up to `most` has it.
+    """
+    low, high, magnitude = 0.0, np.inf, min(first, most)
+    for _ in range(ROUNDS):
+        reached = strength_at(magnitude)
+        if abs(reached / strength - 1.0) < CLOSE:
+            return magnitude
+        low, high = (magnitude, high) if reached < strength else (low, magnitude)
+        if low >= most:
+            break
+        wanted = min(magnitude * float(np.sqrt(strength / reached)), most)
+        between = low < wanted < high and not (low > 0.0 and high < np.inf)
+        magnitude = wanted if between or high == np.inf else float(np.sqrt(max(low, 0.01 * high) * high))
+    raise ValueError(f"strength {strength:g}: no sound magnitude of this change has it; tried up to {magnitude:g}")

@@ -1,0 +1,313 @@
+"""How often effects hidden in the EMPS and da Vinci recordings are found: python -m evidence.diagnosis.measured_cases
+
+What is to be hidden is first taken off recording and model where they have it already, so that on the unaltered
+recording there is nothing to name: that is the null. Strength: variance of the torque that the effect adds and that
+refitting the model's own numbers cannot absorb, over the variance of what the model leaves of the unaltered recording,
+both in blocks of 10 ms. Needs the recordings in ../shared/data or $TENDONFMU_DATA. Writes FOLDER/measured.md.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evidence.diagnosis.campaign import causes_of
+from evidence.diagnosis.measured import (
+    CLOSE,
+    EFFECTS,
+    FORCE,
+    Array,
+    Columns,
+    Description,
+    Effect,
+    Machine,
+    add_torque,
+    angle_of,
+    bent,
+    built_up,
+    diagnosed_model,
+    first_magnitude,
+    put,
+    residuals,
+    rows_of,
+    side_of,
+    speed_of,
+)
+from evidence.judge import Truth, judge
+from evidence.runner import DATA, parser, publish, run_cases
+from evidence.tables import Row, count, number, table, where
+from tendonfmu.diagnosis import diagnose
+from tendonfmu.files.tables import write_table
+from tendonfmu.recordings.converters import convert_file
+
+MACHINES = ("emps", "davinci")
+STRENGTHS = (0.03, 0.1, 0.3, 1.0)
+NOTHING = "nothing"  # the unaltered recording
+SECONDS = 16.5  # da Vinci: before run 07 jams
+RUNS, CHOSEN = ("00", "02", "04", "06", "08"), 3  # da Vinci: even loads, which the model was diagnosed with; of a case
+WINDOWS = ((0.0, 24.9), (0.0, 18.7), (6.2, 24.9), (3.1, 21.8))  # s, EMPS: cycles of 6.24 s
+ROUNDS = 8  # of scaling to a strength
+
+
+# --- machines without an effect: recordings less what the model says of it, and the model without it ------------------
+
+
+def without_rows(model: Description, *effects: str) -> Description:
+    model = copy.deepcopy(model)
+    model["extensions"] = [row for row in model.get("extensions") or [] if row["effect"] not in effects]
+    return model
+
+
+def law_torque(law: Description, speed: Array, side: Array) -> Array:
+    """A law's F(v), the side given (docs/reference/semantics.md#friction-laws)."""
+
+    def one(half: Description) -> Array:
+        drop, slow = half["static"] - half["coulomb"], half["stribeck_velocity"]
+        return half["coulomb"] + drop * np.exp(-np.abs(speed) / slow) + half.get("viscous", 0.0) * np.abs(speed)
+
+    forward, back = law.get("positive", law), law.get("negative", law)
+    return np.where(side > 0, one(forward), -one(back))
+
+
+def free_of_friction(machine: Machine) -> Machine:
+    """Recordings less the joint's own friction by the model, which then has none."""
+    law = machine.model["joints"][0]["friction"]
+    near = rows_of(machine.model, "stribeck")
+    sliding = rows_of(machine.model, "presliding")
+    constant = sum(row["coulomb"] for row in rows_of(machine.model, "preload_friction")) * machine.arm
+
+    def taken(columns: Columns) -> Columns:
+        speed = speed_of(machine, columns)
+        side = np.where(speed < 0, -1.0, 1.0)
+        torque = law_torque(law, speed, side)
+        for row in near:
+            torque = torque * (1.0 + row["amplitude"] * np.exp(-np.abs(speed) / row["stribeck_velocity"]))
+        for row in sliding:
+            step = np.diff(angle_of(machine, columns), prepend=angle_of(machine, columns)[0])
+            torque = np.abs(torque) * built_up(side, step, row["displacement"])
+        return add_torque(machine, columns, -torque - constant * side)
+
+    # presliding stays where the joint has friction that grows with the load, which it acts on too
+    kept = machine.model["joints"][0].get("load_friction") is not None
+    model = without_rows(machine.model, "stribeck", "preload_friction", *([] if kept else ["presliding"]))
+    model["joints"][0]["friction"] = None
+    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
+
+
+def free_of_delay(machine: Machine) -> Machine:
+    """Forces moved to the time of the positions by the model's own delay, which it then has not."""
+    rows = rows_of(machine.model, "time_delay")
+    if not rows:
+        return machine
+    late = rows[0]["delay"]  # negative: the force of t answers to the motion of t − late
+
+    def moved(columns: Columns) -> Columns:
+        return columns | {FORCE: np.interp(columns["time"] + late, columns["time"], columns[FORCE])}
+
+    model = without_rows(machine.model, "time_delay")
+    return replace(machine, model=model, recordings={k: moved(v) for k, v in machine.recordings.items()})
+
+
+def free_of_spring(machine: Machine) -> Machine:
+    """Recordings less all torques that follow the angle alone, as the model has them: cover and weight."""
+    cover = machine.model["joints"][0].get("cover") or {"stiffness": 0.0, "rest_angle": 0.0}
+    weights, cubes = rows_of(machine.model, "gravity"), rows_of(machine.model, "cover_hardening")
+
+    def taken(columns: Columns) -> Columns:
+        angle = angle_of(machine, columns)
+        bent = angle - cover.get("rest_angle", 0.0)
+        torque = cover["stiffness"] * bent
+        for row in weights:
+            torque = torque + row.get("sine", 0.0) * np.sin(angle) + row.get("cosine", 0.0) * np.cos(angle)
+        for row in cubes:
+            torque = torque + row["stiffness"] * bent**3
+        return add_torque(machine, columns, -torque)
+
+    model = without_rows(machine.model, "gravity", "cover_hardening")
+    model["joints"][0].pop("cover", None)
+    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
+
+
+def free_of_growth(machine: Machine) -> Machine:
+    """Recordings less the friction that grows with the force, as the model's rows have it; a law of the joint that does
+    so stays, and takes its share of what is hidden."""
+    rows = rows_of(machine.model, "load_friction")
+    if not rows:
+        return machine
+    lost = sum(row["coulomb"] for row in rows)
+
+    def taken(columns: Columns) -> Columns:
+        return add_torque(machine, columns, -lost * np.abs(columns[FORCE]) * side_of(machine, columns))
+
+    model = without_rows(machine.model, "load_friction")
+    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
+
+
+def free_of_coulomb(machine: Machine) -> Machine:
+    """Friction is taken off at the time at which it acts, so the forces are moved there first."""
+    return free_of_friction(free_of_delay(machine))
+
+
+FREE: Mapping[str, Callable[[Machine], Machine]] = {
+    "coulomb": free_of_coulomb,
+    "gain": lambda machine: machine,
+    "delay": free_of_delay,
+    "spring": free_of_spring,
+    "growing": free_of_growth,
+}
+
+
+# --- hiding -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A machine with an effect in its recordings."""
+
+    machine: Machine
+    magnitude: float
+    strength: float  # variance of what survives refitting, over that of what the model leaves
+    share: float  # and over the effect's own variance
+
+
+def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -> Hidden:
+    """The effect at a strength. machine: freed of it. Raises ValueError where no magnitude has the strength."""
+    before, nuisance = residuals(machine), bent(machine)
+    noise = before - nuisance @ (nuisance.T @ before)
+    magnitude = first_magnitude(effect, machine)
+    for _ in range(ROUNDS):
+        if not magnitude <= effect.most:
+            break
+        made = put(machine, effect, sign * magnitude)
+        added = residuals(made) - before
+        left = added - nuisance @ (nuisance.T @ added)
+        reached = float(left @ left) / float(noise @ noise)
+        if abs(reached / strength - 1.0) < CLOSE:
+            share = float(left @ left) / max(float((added - added.mean()) @ (added - added.mean())), 1e-300)
+            return Hidden(made, sign * magnitude, reached, share)
+        magnitude *= float(np.sqrt(strength / reached))
+    raise ValueError(f"strength {strength}: no sound magnitude of this effect has it; tried up to {magnitude:g}")
+
+
+def part_of(columns: Columns, begin: float, end: float) -> Columns:
+    rows = (columns["time"] >= begin) & (columns["time"] <= end)
+    return {name: values[rows] for name, values in columns.items()}
+
+
+@cache
+def machine_of(name: str, part: int) -> Machine:
+    """A part of the recordings, with the diagnosed model."""
+    model = diagnosed_model(name)
+    if name == "emps":
+        columns = convert_file("emps", DATA / "emps" / "DATA_EMPS.mat", {"decimation": 1})
+        return Machine(name, model, {"emps": part_of(columns, *WINDOWS[part % len(WINDOWS)])}, 3)
+    drawn = np.random.default_rng([part, 26]).permutation(RUNS)[:CHOSEN]
+    folder = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
+    runs = {
+        run: convert_file("davinci", folder / f"{run}.TXT", {"pretension": 13.0}) for run in sorted(map(str, drawn))
+    }
+    return Machine(name, model, {run: part_of(columns, 0.0, SECONDS) for run, columns in runs.items()}, 1)
+
+
+# --- cases and tables -------------------------------------------------------------------------------------------------
+
+
+def run_case(name: str, effect: str, strength: float, part: int) -> dict[str, Any]:
+    """part: of the recordings; it also gives the sign of an effect that has two."""
+    machine = machine_of(name, part)
+    row: dict[str, Any] = {"machine": name, "effect": effect, "strength": strength}
+    names: tuple[str, ...] = ()
+    if effect != NOTHING:
+        names = EFFECTS[effect].names
+        try:
+            hidden = hide(
+                FREE[effect](machine), EFFECTS[effect], strength, -1.0 if effect == "gain" and part % 2 else 1.0
+            )
+        except ValueError as impossible:
+            return row | {"impossible": str(impossible)}
+        machine = hidden.machine
+        row |= {"magnitude": hidden.magnitude, "share": hidden.share}
+    with tempfile.TemporaryDirectory() as scratch:
+        finger = Path(scratch) / "nominal.json"
+        finger.write_text(json.dumps(machine.model), encoding="utf-8")
+        files = [Path(scratch) / f"{recording}.parquet" for recording in machine.recordings]
+        for file, columns in zip(files, machine.recordings.values(), strict=True):
+            write_table(file, columns)
+        diagnosis = diagnose(finger, files, [], kinematics=machine.kinematics, seed=part)
+    judgement = judge(causes_of(diagnosis), Truth(names))
+    return row | {
+        "verdict": diagnosis.verdict,
+        "causes": " ".join(cause.effect for cause in diagnosis.causes),
+        "detected": bool(diagnosis.causes),
+        "in_set": judgement.in_set,
+        "first": judgement.first,
+        "set_size": judgement.set_size,
+        "invisible": any(entry.where.effect in names for entry in diagnosis.invisible),
+    }
+
+
+def cases_of(parts: int) -> dict[str, tuple[str, str, float, int]]:
+    """The null first, then from the strongest on: what can be run in the time is the more telling part."""
+    cases = [(machine, NOTHING, 0.0, part) for machine in MACHINES for part in range(parts)]
+    cases += [
+        (machine, effect, strength, part)
+        for part in range(parts)
+        for strength in reversed(STRENGTHS)
+        for effect in FREE
+        for machine in MACHINES
+    ]
+    return {
+        "_".join(f"{value:g}" if isinstance(value, float) else str(value) for value in case): case for case in cases
+    }
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    rows = [row for row in rows if "impossible" not in row]
+    by_strength, by_effect = [], []
+    for machine in MACHINES:
+        for strength in (0.0, *STRENGTHS):
+            some = where(rows, machine=machine, strength=strength)
+            if some:
+                by_strength.append(
+                    [machine, f"{strength:g}" if strength else "nothing hidden", len(some), *cells(some)]
+                )
+        for effect in FREE:
+            for strength in STRENGTHS:
+                some = where(rows, machine=machine, effect=effect, strength=strength)
+                if some:
+                    survives = number(float(np.mean([row["share"] for row in some])), ".0f", 100.0)
+                    sizes = [row["set_size"] for row in some if row["in_set"]]
+                    size = number(float(np.mean(sizes)) if sizes else None, ".1f")
+                    unseen = count((row["invisible"] for row in some), with_interval=True)
+                    by_effect.append([machine, effect, f"{strength:g}", f"{survives} %", *cells(some), size, unseen])
+    first = ("machine", "strength", "cases", "detected", "true cause in the set", "first")
+    second = ("machine", "hidden", "strength", "survives", "detected", "in the set", "first", "set", "not visible")
+    return table(first, by_strength) + "\n\n" + table(second, by_effect, 2) + "\n"
+
+
+def cells(rows: Sequence[Row]) -> list[str]:
+    answers = [[row[key] for row in rows if row[key] is not None] for key in ("detected", "in_set", "first")]
+    return [count(hits, with_interval=True) if hits else "" for hits in answers]
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--cases", type=int, default=4, help="parts of the recordings, at each effect and strength")
+    options.add_argument("--minutes", type=float, default=math.inf, help="begin no case after these")
+    given = options.parse_args()
+    cases = cases_of(given.cases)
+    rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler, stop_after=60.0 * given.minutes)
+    publish(given.output / "measured.md", markdown(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,254 @@
+"""`diagnose` and its rivals on the same cases, in one table: python -m evidence.diagnosis.rivals -o FOLDER
+
+Every case has a training recording of 30 s and a test recording of 15 s. Matched: 12 with nothing hidden, each effect
+of the list once at a strength of 0.3, each effect that is not on it at 0.3 and at 1. Foreign: the even cases in numpy
+and MuJoCo, without what refitting absorbs; their sizes are their own. Writes FOLDER/rivals.md. The rivals (see
+rival_methods.py) work on the very residual and columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without
+them sindy and knockoffs are left out) and requirements-foreign.lock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import statistics
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from evidence.diagnosis import makers, rival_methods
+from evidence.diagnosis.campaign import ALARMS, causes_of, diagnosed, row_of
+from evidence.diagnosis.foreign_cases import is_absorbed, is_outside, module_of
+from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
+from evidence.diagnosis.makers import Case, Made, Options
+from evidence.fingers import foreign
+from evidence.judge import SYNONYMS, Cause, Truth, effects_of, judge
+from evidence.runner import parser, publish, run_cases
+from evidence.tables import NOTHING, Row, table
+from tendonfmu.diagnosis.cause_search import View, look
+from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.result import Where
+from tendonfmu.diagnosis.signal_choice import choose
+from tendonfmu.model import read_finger
+from tendonfmu.model.balance import moment_arms
+from tendonfmu.recordings import Held, prepare, read_recording
+
+TRAIN, TEST = 30.0, 15.0  # s
+NULLS = 12
+STRENGTH = 0.3
+OWN = "diagnose"
+
+
+# --- cases ------------------------------------------------------------------------------------------------------------
+
+
+def all_cases(seed: int) -> list[Case]:
+    """Both kinds alternate, so that an interrupted run has some of each. seed: of the matched rigs."""
+    matched = makers.in_turn([list(_nulls(seed)), list(_singles(seed)), list(_unlisted(seed))])
+    return makers.in_turn([matched, list(_foreign())])
+
+
+def _matched(name: str, group: str, maker: Callable[..., Made], seed: int, options: Options, **given: Any) -> Case:
+    options = replace(options, seconds=TRAIN, test=TEST)
+    return Case(name, group, seed, maker, {"options": options, **given})
+
+
+def _nulls(seed: int) -> Iterator[Case]:
+    """Half with presliding, half with a bias that wanders three times as much, two thirds of one joint."""
+    for k in range(NULLS):
+        options = Options(wander=3.0 if k % 4 >= 2 else 1.0, joints=2 if k % 3 == 0 else 1, presliding=k % 2 == 1)
+        yield _matched(f"null_{k}", "null", makers.null, seed + k, options)
+
+
+def _singles(seed: int) -> Iterator[Case]:
+    for number, effect in enumerate(BUILDERS):
+        if effect != "force_offset":  # refitting always absorbs it
+            name, options = f"{effect}_{STRENGTH:g}_0", Options(presliding=number % 2 == 1)
+            given = {"effect": effect, "strength": STRENGTH}
+            yield _matched(name, "single", makers.single, seed + 1000 + number, options, **given)
+
+
+def _unlisted(seed: int) -> Iterator[Case]:
+    for effect in UNKNOWN:
+        for strength in (STRENGTH, 1.0):
+            given = {"effect": effect, "strength": strength}
+            yield _matched(f"{effect}_{strength:g}_0", "unknown", makers.single, seed + 400_000, Options(), **given)
+
+
+def _foreign() -> Iterator[Case]:
+    for family in ("numpy", "mujoco"):
+        for number, plan in enumerate(module_of(family).PLANS, 1):
+            truth = foreign.Truth(plan.hidden, joints=0, survives=getattr(plan, "survives", None))
+            if number % 2 or is_absorbed(truth) or truth.hidden == "contact":
+                continue
+            group = "null" if truth.hidden == "none" else "unknown" if is_outside(truth) else "single"
+            yield Case(f"{family}_{number:02d}", group, 0, foreign_case, {"family": family, "number": number})
+
+
+def foreign_case(folder: Path, seed: int, family: str, number: int) -> Made:
+    """The case of that number, whose seed is its own; joint angles are left unused."""
+    return replace(makers.foreign_files(folder, module_of(family).make(number, TRAIN, TEST)), kinematics=1)
+
+
+# --- one case ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one way of explaining says of a case."""
+
+    causes: Sequence[Cause] = ()  # the first one first
+    one_of: bool = False  # whether it says only that one of them is present; none of several is then first
+    unnamed: bool | None = None  # whether something is missing that it cannot name; None if it never says so
+    gain: float | None = None  # 1 − rms ratio of its model and the nominal one on the tests; None if it has no model
+    names: bool = True  # whether it names anything at all
+
+
+def run_case(case: Case) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        made = case.make(Path(folder))
+        diagnosis = diagnosed(case, made)
+        causes = causes_of(diagnosis)
+        unnamed = diagnosis.verdict in ALARMS or any("unknown" in effects_of(cause) for cause in causes[:1])
+        answers = {OWN: Answer(causes, unnamed=unnamed, gain=diagnosis.gain.value), **rival_answers(made)}
+    return row_of(case, made) | {"answers": {who: judged(made, answer) for who, answer in answers.items()}}
+
+
+def rival_answers(made: Made) -> dict[str, Answer]:
+    """The rivals on a case, from the signals that `diagnose` chooses."""
+    finger = read_finger(made.finger)
+    recordings, tests = (
+        [prepare(finger, read_recording(path), made.kinematics, Held()) for path in paths]
+        for paths in (made.recordings, made.test)
+    )
+    chosen = choose(finger, recordings, FitSettings(threads=1))
+    answers = answers_of(look(chosen.nominal.data, chosen.recordings, chosen.grid, chosen.least))
+    nominal = chosen.online(chosen.nominal.data)
+    gain = rival_methods.gain_of_discrepancy(nominal, recordings, tests)
+    return answers | {"discrepancy": Answer(gain=gain, names=False)}
+
+
+def answers_of(view: View) -> dict[str, Answer]:
+    """What each rival says of the residual. sindy and knockoffs only where they are installed."""
+    data = rival_methods.plain(view)
+    choices = {
+        "correlation": rival_methods.by_correlation,
+        "bic": rival_methods.by_bic,
+        "random_cv": rival_methods.by_random_cv,
+    }
+    trials = {name: rival_methods.stepwise(data, choose) for name, choose in choices.items()}
+    for name, rival in (("sindy", rival_methods.by_sindy), ("knockoffs", rival_methods.by_knockoffs)):
+        with contextlib.suppress(ModuleNotFoundError):
+            trials[name] = rival(data)
+    answers = {name: Answer(_causes(trial.where for trial in named)) for name, named in trials.items()}
+    parity = rival_methods.by_parity(data, moment_arms(view.data), view.series.step)
+    unnamed = bool(parity.fired.any()) and not parity.causes
+    return answers | {"parity": Answer(_causes(parity.causes), one_of=True, unnamed=unnamed)}
+
+
+def _causes(places: Iterator[Where] | Sequence[Where]) -> list[Cause]:
+    return [{"effect": where.effect, "joint": where.joint, "tendon": where.tendon} for where in places]
+
+
+def judged(made: Made, answer: Answer) -> dict[str, Any]:
+    """The same questions for everybody; on foreign fingers presliding is never false. None: it does not arise."""
+    truth = replace(
+        made.truths[0] if made.truths else Truth(),
+        allowed=made.also,
+        neutral=("unknown",) if made.rig == "matched" else ("presliding", "unknown"),
+        synonyms=SYNONYMS,
+    )
+    causes = [cause for cause in answer.causes if cause["effect"] not in truth.neutral]
+    if answer.one_of and causes:
+        causes = [{**causes[0], "confusable_with": causes[1:]}]
+    judgement = judge(causes, truth)
+    alone = not answer.one_of or judgement.set_size == 1
+    return {
+        "names": answer.names,
+        "false": len(judgement.false if made.truths else judgement.named),
+        "in_set": judgement.in_set,
+        "first": judgement.first and alone,
+        "at_place": judgement.at_place if judgement.in_set else None,
+        "set_size": judgement.set_size,
+        "unnamed": answer.unnamed,
+        "gain": answer.gain,
+    }
+
+
+# --- the table --------------------------------------------------------------------------------------------------------
+
+Verdict = dict[str, Any]
+Cell = Callable[[Sequence[Verdict]], str]
+
+
+def _share(holds: Callable[[Verdict], bool | None]) -> Cell:
+    def cell(verdicts: Sequence[Verdict]) -> str:
+        answers = [holds(verdict) for verdict in verdicts]
+        asked = [answer for answer in answers if answer is not None]
+        return f"{sum(asked)} of {len(asked)}" if asked else NOTHING
+
+    return cell
+
+
+def _naming(holds: Callable[[Verdict], bool | None]) -> Cell:
+    return lambda verdicts: _share(holds)(verdicts) if all(it["names"] for it in verdicts) else "names nothing"
+
+
+def _mean(key: str) -> Cell:
+    def cell(verdicts: Sequence[Verdict]) -> str:
+        known = [verdict[key] for verdict in verdicts if verdict["names"] and verdict[key] is not None]
+        return f"{statistics.fmean(known):.2f}" if known else NOTHING
+
+    return cell
+
+
+def _gain(verdicts: Sequence[Verdict]) -> str:
+    values = [verdict["gain"] for verdict in verdicts if verdict["gain"] is not None]
+    if not values:
+        return NOTHING
+    return f"{100 * statistics.median(values):.1f} % ({100 * min(values):.1f} to {100 * max(values):.1f})"
+
+
+LINES: dict[str, tuple[str, Cell]] = {
+    "nothing hidden: names something": ("null", _naming(lambda it: it["false"] > 0)),
+    "one effect: in the set": ("single", _naming(lambda it: it["in_set"])),
+    "one effect: first": ("single", _naming(lambda it: it["first"])),
+    "one effect: at its place, where in the set": ("single", _naming(lambda it: it["at_place"])),
+    "one effect: false causes per case": ("single", _mean("false")),
+    "one effect: effects in the set": ("single", _mean("set_size")),
+    "not on the list: names something": ("unknown", _naming(lambda it: it["false"] > 0)),
+    "not on the list: says there is something, unnamed": ("unknown", _share(lambda it: it["unnamed"])),
+    "nothing hidden: gain, median and range": ("null", _gain),
+    "one effect: gain": ("single", _gain),
+    "not on the list: gain": ("unknown", _gain),
+}
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """Rows that ended in an error are left out."""
+    good = [row for row in rows if not row["error"]]
+    names = list(dict.fromkeys(who for row in good for who in row["answers"]))
+    lines = []
+    for family, is_matched in (("matched", True), ("foreign", False)):
+        of_family = [row for row in good if (row["rig"] == "matched") == is_matched]
+        for what, (group, cell) in LINES.items():
+            asked = [row["answers"] for row in of_family if row["group"] == group]
+            cells = [cell([answers[who] for answers in asked if who in answers]) for who in names]
+            lines.append([f"{family}, {what}", *cells])
+    failed = len(rows) - len(good)
+    note = f"\n{failed} of {len(rows)} cases ended in an error and are left out.\n" if failed else ""
+    return table(("", *names), lines) + "\n" + note
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--seed", type=int, default=88100, help="of the matched rigs")
+    given = options.parse_args()
+    cases = {case.name: (case,) for case in all_cases(given.seed)}
+    rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler, keep_errors=True)
+    publish(given.output / "rivals.md", markdown(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""What a foreign case is: a rough description of a finger, two recordings, and what the description hides.
+
+The folder shares no code and no assumption with the product: numpy, scipy, pandas and mujoco make its fingers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+Array = npt.NDArray[np.float64]
+Nominal = dict[str, Any]
+
+TRAIN_SECONDS = 60.0
+TEST_SECONDS = 30.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Truth:
+    """What a case hides, and where."""
+
+    hidden: str  # one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list
+    joints: int  # of the finger
+    joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
+    tendon: int | None = None
+    also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them
+    rms: float | None = None  # of the hidden term [N·m], largest over the joints; None where it is not known
+    # variance of what refitting the description leaves of the hidden term over that of the residual, where it is little
+    survives: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Inside:
+    """What only the simulator knows about its training recording; measured = described + hidden."""
+
+    angle: Array  # true joint angles [rad], (samples, joints)
+    measured: Array  # Rᵀ f0 of the true forces with the arms of the description [N·m], (samples, joints)
+    described: Array  # all that the description has a term for, and inertia [N·m]
+    hidden: Array  # what it lacks [N·m]
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A finger description whose structure is right but for the hidden effect, and its recordings."""
+
+    family: str
+    number: int
+    nominal: Nominal
+    train: pd.DataFrame
+    test: pd.DataFrame
+    truth: Truth
+    inside: Inside | None = None
+
+    @property
+    def name(self) -> str:
+        return f"{self.family}_{self.number:02d}"
+
+
+def rms(values: Array) -> float:
+    """Largest root mean square over the columns, each without its mean: a slow bias takes the mean anyway."""
+    return float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2, axis=0)).max())
+
+
+def frame(time: Array, force: Array, position: Array, angle: Array | None) -> pd.DataFrame:
+    """The recording's columns from arrays (samples, tendons) [N], [m] and (samples, joints) [rad]."""
+    columns: dict[str, Array] = {"time": time}
+    columns |= {f"tendon_force[{i + 1}]": force[:, i] for i in range(force.shape[1])}
+    columns |= {f"tendon_position[{i + 1}]": position[:, i] for i in range(position.shape[1])}
+    if angle is not None:
+        columns |= {f"joint_position[{j + 1}]": angle[:, j] for j in range(angle.shape[1])}
+    return pd.DataFrame(columns)
+
+
+def noisy(values: Array, std: float, rng: np.random.Generator) -> Array:
+    return values + std * rng.standard_normal(values.shape)
+
+
+def quantised(values: Array, resolution: float) -> Array:
+    return np.round(values / resolution) * resolution
+
+
+def rough(value: float, rng: np.random.Generator) -> float:
+    """A starting number: the true one times a factor of 0.6 to 1.6, even in its logarithm."""
+    return float(f"{value * np.exp(rng.uniform(np.log(0.6), np.log(1.6))):.3g}")
+
+
+def law(magnitude: float, speed: float, rng: np.random.Generator, viscous: float = 0.0, peak: float = 1.0) -> Nominal:
+    """A rough symmetric law; `peak` is static over coulomb, and 1 leaves the Stribeck effect out."""
+    coulomb = rough(magnitude, rng)
+    return {
+        "static": coulomb * peak,
+        "coulomb": coulomb,
+        "stribeck_velocity": speed,
+        "viscous": rough(viscous, rng) if viscous > 0.0 else 0.0,
+    }
+
+
+def description(
+    name: str, joints: Sequence[Mapping[str, Any]], tendons: Sequence[Mapping[str, Any]], threshold: float = 0.03
+) -> Nominal:
+    """A finger description of joints and tendons with names, usual thresholds and a slow bias."""
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": name,
+        "joints": [{"name": f"joint_{j + 1}", **joint} for j, joint in enumerate(joints)],
+        "tendons": [{"name": f"tendon_{i + 1}", **tendon} for i, tendon in enumerate(tendons)],
+        "velocity_threshold": {"tendon": 0.0005, "joint": 0.01},
+        "velocity_filter_cutoff": 20.0,
+        "bias": {"drift_variance": 1e-6, "noise_std": 0.01, "forget_rate": 5.0},
+        "contact": {"threshold": [threshold] * len(joints)},
+    }

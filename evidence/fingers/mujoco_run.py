@@ -1,0 +1,199 @@
+"""Runs a finger of mujoco_model.py along a motion; keeps what sensors see and what only the simulator knows."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import mujoco
+import numpy as np
+
+from evidence.fingers.foreign import Array, Truth
+from evidence.fingers.mujoco_model import Physics, compiled
+
+STEP = 0.001  # s
+SETTLE = 1.5  # s before the recording begins
+TINY = 1e-9  # N; MuJoCo would leave out the row of a frictionloss of 0
+
+
+@dataclasses.dataclass
+class Trace:
+    """True signals of a run, a row a sample. Rᵀ f0 = described + hidden, as torques that the tendons have to bear."""
+
+    time: Array  # s, from 0
+    angle: Array  # rad
+    force: Array  # N
+    position: Array  # m, x0
+    described: Array  # N·m, all that the description has a term for, and inertia
+    hidden: Array  # N·m, the rest
+
+
+@dataclasses.dataclass
+class Motion:
+    """Random multi-sines of the joints and a pretension that breathes, and the motors' positions for both."""
+
+    amplitude: Array  # rad, (joints, sines)
+    frequency: Array  # Hz
+    phase: Array  # rad
+    pretension: float  # N
+    breathing: tuple[float, float]  # share of the pretension, Hz
+
+    def angles(self, time: Array) -> Array:
+        """Angles that are aimed at [rad], (times, joints)."""
+        turn = 2 * np.pi * self.frequency * time[:, None, None] + self.phase
+        return np.asarray((self.amplitude * np.sin(turn)).sum(axis=2))
+
+    def motors(self, time: Array, physics: Physics) -> Array:
+        """x0 of every tendon [m] that would hold the angles if nothing rubbed, (times, tendons)."""
+        share, frequency = self.breathing
+        force = self.pretension * (1 + share * np.sin(2 * np.pi * frequency * time))
+        return np.asarray(self.angles(time) @ physics.arms.T + force[:, None] / physics.stiffness)
+
+
+def random_motion(joints: int, rng: np.random.Generator, speed: float = 1.0) -> Motion:
+    """Four sines a joint of 0.08 to 0.6 Hz times `speed`, 0.36 rad rms; 20 N of pretension, give or take 30 %."""
+    frequency = speed * rng.uniform(0.08, 0.6, (joints, 4))
+    amplitude = rng.uniform(0.6, 1.4, (joints, 4)) / np.sqrt(frequency)
+    amplitude *= 0.36 / np.sqrt((amplitude**2 / 2).sum(axis=1, keepdims=True))
+    phase = rng.uniform(0, 2 * np.pi, (joints, 4))
+    return Motion(amplitude, frequency, phase, 20.0, (0.3, float(rng.uniform(0.04, 0.09))))
+
+
+class Runner:
+    """One finger in MuJoCo: sets friction and extra torques before every step, reads the balance after it."""
+
+    def __init__(self, physics: Physics, truth: Truth) -> None:
+        self.physics = physics
+        self.truth = truth
+        self.model = compiled(physics, STEP)
+        self.data = mujoco.MjData(self.model)
+        m, n = physics.tendons, physics.joints
+        self.motors = slice(0, m)
+        self.hinges = slice(m, m + n)
+        self.drags = physics.drags()
+        self.rubbing = physics.rubbing()
+        # per drag: share of the force, N of constant friction, and how drift and speed scale both
+        self.shares = [float(physics.edge[i, j] + (physics.pulley[i, j - 1] if j else 0.0)) for i, j in self.drags]
+        self.constants = [physics.preload_at(i, j) for i, j in self.drags]
+        self.factors = [1.0] * len(self.drags)
+        self.losses = [TINY] * len(self.drags)  # N
+        self.crept = np.zeros(n)
+        mujoco.mj_forward(self.model, self.data)
+
+    def tension(self) -> Array:
+        """Force of every spring [N] at the state of the last forward pass."""
+        m = self.physics.tendons
+        stretch = self.data.ten_length[:m] - self.model.tendon_lengthspring[:m, 1]
+        return np.asarray(self.physics.stiffness * np.maximum(0.0, stretch))
+
+    def drift(self, t: float) -> float:
+        p = self.physics
+        return 1.0 + p.drift[0] * (1 - math.exp(-max(t, 0.0) / p.drift[1])) if p.drift else 1.0
+
+    def set_friction(self, t: float) -> None:
+        """Frictionloss of tendons and joints in proportion to the force there, from proximal to distal."""
+        p, m = self.physics, self.physics.tendons
+        drift = self.drift(t)
+        force = self.tension().tolist()  # falls (or grows) along the tendon by what rubbed in the step before
+        rubbed = self.data.efc_force[len(self.rubbing) : len(self.rubbing) + len(self.drags)].tolist()
+        speed = self.data.ten_velocity[m : m + len(self.drags)].tolist()
+        load = [0.0] * p.joints
+        for k, (i, j) in enumerate(self.drags):
+            factor = drift * (1 + p.stribeck[0] * math.exp(-abs(speed[k]) / p.stribeck[1]) if p.stribeck else 1.0)
+            self.factors[k] = factor
+            self.losses[k] = factor * (self.shares[k] * force[i] + self.constants[k]) + TINY
+            force[i] = max(force[i] - rubbed[k], 0.0)  # lengths count against x1
+            load[j] += force[i]
+        self.model.tendon_frictionloss[m : m + len(self.drags)] = self.losses
+        self.model.dof_frictionloss[self.hinges] = drift * (p.joint_friction + p.load_friction * load)
+
+    def lacking(self, t: float) -> Array:
+        """Share of each friction row that the description lacks; MuJoCo has the joints' rows before the tendons'."""
+        truth, drift = self.truth, self.drift(t)
+        joints = [
+            float(truth.joint == j + 1) if truth.hidden == "joint_friction" else 1 - 1 / drift for j in self.rubbing
+        ]
+        tendons = [1 - 1 / factor for factor in self.factors]
+        if truth.hidden == "edge_friction":
+            tendons = [float((truth.tendon, truth.joint) == (i + 1, j + 1)) for i, j in self.drags]
+        elif truth.hidden == "preload_friction":
+            tendons = [constant / loss for constant, loss in zip(self.constants, self.losses, strict=True)]
+        return np.array(joints + tendons)
+
+    def disturbance(self, t: float) -> Array:
+        """Torques on the joints that MuJoCo has no element for [N·m], as they act."""
+        p = self.physics
+        q, v = self.data.qpos[self.hinges], self.data.qvel[self.hinges]
+        torque = np.zeros(p.joints)
+        if p.hardening:
+            torque[p.hardening[0] - 1] -= p.hardening[1] * q[p.hardening[0] - 1] ** 3
+        if p.hum:
+            torque[p.hum[0] - 1] += p.hum[1] * np.sin(2 * np.pi * p.hum[2] * t)
+        if p.catch and v[p.catch[0] - 1] > 0.0:
+            torque[p.catch[0] - 1] -= p.catch[1] * np.exp(-(((q[p.catch[0] - 1] - p.catch[2]) / 0.06) ** 2))
+        if p.creep:
+            j, stiffness, memory = p.creep[0] - 1, p.creep[1], p.creep[2]
+            torque[j] -= stiffness * (q[j] - self.crept[j])
+            self.crept[j] += STEP * (q[j] - self.crept[j]) / memory
+        return torque
+
+    def push(self, t: float) -> float:
+        """Force on the probe [N]; it goes back up when nobody pushes."""
+        return next((force for begin, end, force in self.physics.pushes if begin <= t < end), -0.5)
+
+    def advance(self, t: float, motors: Array) -> Array:
+        """One step from time t; returns the extra torques that act in it."""
+        self.set_friction(t)
+        self.data.ctrl[self.motors] = motors
+        if self.physics.pushes:
+            self.data.ctrl[self.physics.tendons] = self.push(t)
+        extra = self.disturbance(t)
+        self.data.qfrc_applied[self.hinges] = extra
+        mujoco.mj_step(self.model, self.data)
+        return extra
+
+    def balance(self, t: float, q: Array, v: Array, extra: Array) -> tuple[Array, Array]:
+        """What is described and what is hidden [N·m] at the start (t, q, v) of the step just made."""
+        d, h, p, truth = self.data, self.hinges, self.physics, self.truth
+        rows = len(self.rubbing) + len(self.drags)
+        rubbed = d.efc_J.reshape(-1, self.model.nv)[:rows, h] * d.efc_force[:rows, None]
+        inertia = np.zeros(self.model.nv)
+        mujoco.mj_mulM(self.model, d, inertia, d.qacc)
+        weight = d.qfrc_bias[h] - d.qfrc_gravcomp[h]  # with what spins, which is small
+        touching = d.qfrc_constraint[h] - rubbed.sum(axis=0)
+        cover, damping = p.cover * (q - p.rest_angle), p.damping * v
+        coupled = self.coupled(q)
+        bent = self.tension() @ p.arms - (d.qfrc_spring[h] + cover + coupled)  # by arms that are not the described ones
+        here = np.array([truth.joint in (None, j + 1) for j in range(p.joints)], float)
+        hidden = -self.lacking(t) @ rubbed + coupled - extra - touching + bent
+        hidden += weight * bool(p.heavy) + cover * here * (truth.hidden == "cover_stiffness")
+        hidden += damping * here * (truth.hidden == "viscous_friction")
+        total = -rubbed.sum(axis=0) + coupled - extra - touching + bent + weight + cover + damping + inertia[h]
+        return total - hidden, hidden
+
+    def coupled(self, q: Array) -> Array:
+        torque = np.zeros(self.physics.joints)
+        if self.physics.coupling:
+            j, stiffness = self.physics.coupling
+            torque[j - 1 : j + 1] = stiffness * (q[j - 1] - q[j]) * np.array([1.0, -1.0])
+        return torque
+
+
+def run(physics: Physics, truth: Truth, motion: Motion, seconds: float, rate: float) -> Trace:
+    """Simulates and samples; the first SETTLE seconds are left out."""
+    runner = Runner(physics, truth)
+    data = runner.data
+    times = STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP))
+    motors = motion.motors(times, physics)
+    data.qpos[runner.hinges] = motion.angles(times[:1])[0]
+    data.qpos[runner.motors] = motors[0]
+    mujoco.mj_forward(runner.model, data)
+    every = round(1 / (rate * STEP))
+    rows: list[tuple[Array, ...]] = []
+    for k, t in enumerate(times.tolist(), start=-round(SETTLE / STEP)):
+        q, v, x0 = data.qpos[runner.hinges].copy(), data.qvel[runner.hinges].copy(), data.qpos[runner.motors].copy()
+        extra = runner.advance(t, motors[k + round(SETTLE / STEP)])
+        if k >= 0 and k % every == 0:
+            rows.append((np.array([t]), q, runner.tension(), x0, *runner.balance(t, q, v, extra)))
+    time, *others = (np.array(column) for column in zip(*rows, strict=True))
+    return Trace(time[:, 0], *others)

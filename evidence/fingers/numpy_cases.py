@@ -1,0 +1,91 @@
+"""Cases of five simulators as users write them, a screen of numpy each; only noise and quantisation are shared."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import ModuleType
+
+import numpy as np
+import pandas as pd
+
+from evidence.fingers import numpy_boucwen, numpy_capstan, numpy_karnopp, numpy_maxwell, numpy_tanh
+from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
+
+FAMILY = "numpy"
+
+# What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
+# false, in any case (diagnosis/foreign_cases.py).
+ALSO = {
+    # Friction that fades in with tanh(v / vs) is the Stribeck effect of a negative amplitude.
+    numpy_tanh: ("stribeck",),
+    # Links have mass, 1 to 2 mN·m rms at a joint.
+    numpy_karnopp: ("inertia",),
+    # exp(−μφ) and exp(μφ) lose and gain different shares.
+    numpy_capstan: ("asymmetric_friction",),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """One case: a simulator, what it hides, and where (from 1)."""
+
+    simulator: ModuleType
+    hidden: str
+    joint: int | None = None
+    tendon: int | None = None
+    survives: float | None = None
+
+
+PLANS = (
+    Plan(numpy_tanh, "none"),
+    Plan(numpy_karnopp, "none"),
+    Plan(numpy_maxwell, "none"),
+    Plan(numpy_boucwen, "none"),
+    Plan(numpy_capstan, "none"),
+    Plan(numpy_tanh, "gravity", joint=1),
+    Plan(numpy_karnopp, "gravity", joint=2, survives=0.00),
+    Plan(numpy_maxwell, "edge_friction", joint=2, tendon=5),
+    Plan(numpy_boucwen, "cover_stiffness", joint=1),
+    Plan(numpy_capstan, "viscous_friction"),
+    Plan(numpy_tanh, "cover_hardening", joint=2),
+    Plan(numpy_karnopp, "joint_friction", joint=2),
+    Plan(numpy_maxwell, "friction_drift"),
+    Plan(numpy_boucwen, "pulley_eccentricity", joint=1, tendon=2),
+    Plan(numpy_capstan, "force_gain", tendon=2),
+    Plan(numpy_tanh, "time_delay"),
+    Plan(numpy_karnopp, "unknown_hum", joint=1),
+    Plan(numpy_maxwell, "joint_coupling", joint=2),
+    Plan(numpy_boucwen, "unknown_creep", joint=2),
+    Plan(numpy_capstan, "joint_load_friction", joint=1, survives=0.07),
+    Plan(numpy_tanh, "none"),
+    Plan(numpy_capstan, "unknown_catch", joint=2),
+)
+NUMBERS = range(1, len(PLANS) + 1)
+
+
+SEED = 4200
+
+
+def make(
+    number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS, seed: int = SEED
+) -> Case:
+    """The case of a number (from 1). seed: of motion and noise; the finger is that of its simulator."""
+    plan = PLANS[number - 1]
+    simulator = plan.simulator
+    train = simulator.simulate(plan.hidden, train_seconds, np.random.default_rng((seed, number, 1)))
+    test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((seed, number, 2)))
+    inside = Inside(train["true_angle"], train["measured"], train["described"], train["hidden"])
+    truth = Truth(
+        plan.hidden,
+        joints=train["true_angle"].shape[1],
+        joint=plan.joint,
+        tendon=plan.tendon,
+        also=ALSO.get(simulator, ()),
+        rms=rms(train["hidden"]),
+        survives=plan.survives,
+    )
+    return Case(FAMILY, number, simulator.describe(plan.hidden), recording(train), recording(test), truth, inside)
+
+
+def recording(made: dict[str, Array]) -> pd.DataFrame:
+    return frame(made["time"] - made["time"][0], made["force"], made["position"], made.get("angle"))

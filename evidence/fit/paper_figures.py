@@ -1,0 +1,252 @@
+"""Draws figures 2b, 5, 6, 7 and 8 of the paper again, on data whose truth is known, and prints the numbers beside them.
+
+    python -m evidence.fit.paper_figures [-o docs/figures]        # 2 min of one core
+
+2b and 5: a finger with one joint, by the C core, beside the formula. 6 and 7: the friction of the simulated index
+finger, fitted at 10 N of pretension and predicted at 10 and 40 N. 8: pushes on that finger. The simulated finger knows
+its true friction and external torques, which the paper's hand could not measure. Writes paper_2b.png ... paper_8.png.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from evidence.runner import EXAMPLES, INDEX_FINGER, parser
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.estimate import FrictionFit
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings import Recording, read_recording
+
+CALIBRATED = EXAMPLES / "demo_recording" / "index_finger_calibrated.json"
+JOINTS = (0, 1)  # the paper shows the first two
+SHOWN = (20.0, 36.0)  # s
+MEASURED, PREDICTED, SENSED, FOUND = "#222222", "#56b4e9", "#009e73", "#e69f00"
+
+LAW = {"static": 0.020, "coulomb": 0.014, "stribeck_velocity": 0.1, "viscous": 0.006}  # N·m, rad/s, N·m·s/rad
+THRESHOLD = 0.05  # rad/s; wide enough to be seen
+FORGET = 5.0  # 1/s, α of the paper's fig. 5
+RATE = 1000  # Hz
+
+
+# --- figures 2b and 5: one joint, by the core and by the formula ------------------------------------------------------
+
+
+def one_joint() -> dict[str, Any]:
+    """A joint with friction and a bias that learns nothing, so that fig. 5 stands alone."""
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": "one_joint",
+        "joints": [{"friction": LAW}],
+        "tendons": [{"stiffness": 1e6, "moment_arms": [0.01], "bidirectional": True}],
+        "velocity_threshold": {"joint": THRESHOLD},
+        "bias": {"drift_variance": 0.0, "initial_variance": 0.0, "forget_rate": FORGET, "noise_std": 0.01},
+        "contact": {"threshold": [1e6]},
+    }
+
+
+def law(speed: Numbers) -> Numbers:
+    """Eq. (1), N·m."""
+    rest = LAW["static"] - LAW["coulomb"]
+    drop = rest * np.exp(-np.abs(speed) / LAW["stribeck_velocity"])
+    return np.asarray(np.sign(speed) * (LAW["coulomb"] + drop + LAW["viscous"] * np.abs(speed)))
+
+
+def run_joint(speed: Numbers) -> dict[str, Numbers]:
+    """The core's outputs for a joint that moves with these velocities, no tendon pulling."""
+    time = np.arange(len(speed)) / RATE
+    position = np.cumsum(speed)[:, None] / RATE
+    nothing = np.zeros((len(speed), 1))
+    signals = {"time": time, "tendon_force": nothing, "tendon_position": nothing.copy()}
+    joint = {"joint_position": position, "joint_velocity": speed[:, None]}
+    return run_recording(one_joint(), signals | joint, 3)
+
+
+def figure_2b(folder: Path) -> None:
+    """T = T_eff − b_eff over the velocity: 0 up to v_min, eq. (1) beyond."""
+    speed = np.linspace(-0.6, 0.6, 1201)
+    outputs = run_joint(speed)
+    friction = (outputs["friction_torque"] - outputs["bias_torque"])[:, 0]
+    expected = np.where(np.abs(speed) > THRESHOLD, law(speed), 0.0)
+    figure, axis = plt.subplots(figsize=(6, 3.2), layout="constrained")
+    axis.plot(speed, 1e3 * law(speed), color="#bbbbbb", linestyle="--", label="eq. (1)")
+    axis.plot(speed, 1e3 * friction, color=PREDICTED, label="the core")
+    axis.axvspan(-THRESHOLD, THRESHOLD, color="#f0e6d0", label="|v| ≤ v_min: the bias holds the friction")
+    axis.set(xlabel="joint velocity (rad/s)", ylabel="friction (mN·m)")
+    finish(figure, [axis], folder / "paper_2b.png")
+    row("2b", "largest difference from eq. (1), N·m", f"{np.abs(friction - expected).max():.1e}")
+
+
+def figure_5(folder: Path) -> None:
+    """A fast reversal, and one with a rest of 0.5 s: the first is undone, the second forgotten by e^(−αt)."""
+    fast = np.concatenate([np.full(200, 0.3), np.linspace(0.3, -0.3, 20), np.full(280, -0.3)])
+    rest = np.concatenate([np.linspace(-0.3, 0.0, 20), np.zeros(500), np.linspace(0.0, 0.3, 20), np.full(260, 0.3)])
+    speed = np.concatenate([fast, rest])
+    outputs = run_joint(speed)
+    total, bias = outputs["friction_torque"][:, 0], outputs["bias_torque"][:, 0]
+    time = np.arange(len(speed)) / RATE
+    figure, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
+    axes[0].plot(time, speed, color=MEASURED)
+    axes[0].axhspan(-THRESHOLD, THRESHOLD, color="#f0e6d0")
+    axes[0].set(ylabel="velocity (rad/s)")
+    axes[1].plot(time, 1e3 * bias, color=FOUND, label="bias b_eff")
+    axes[1].plot(time, 1e3 * (total - bias), color=MEASURED, linewidth=1, label="friction T by eq. (1)")
+    axes[1].plot(time, 1e3 * total, color=PREDICTED, label="both, T_eff")
+    axes[1].set(xlabel="time (s)", ylabel="torque (mN·m)")
+    finish(figure, axes, folder / "paper_5.png")
+    slow = np.abs(speed) <= THRESHOLD
+    steps = np.abs(np.diff(total))
+    enters, leaves = np.flatnonzero(~slow[:-1] & slow[1:]), np.flatnonzero(slow[:-1] & ~slow[1:])
+    row("5", "steps of T_eff on coming to rest, N·m", ", ".join(f"{step:.1e}" for step in steps[enters]))
+    twice = 2.0 * float(law(np.array([THRESHOLD]))[0])
+    for name, enter, leave, change in (
+        ("fast reversal", enters[0], leaves[0], bias[450] - bias[150]),
+        ("reversal with a rest", enters[1], leaves[1], bias[-1] - bias[450]),
+    ):
+        span = (leave - enter - 1) / RATE  # s between the first and the last sample at rest
+        forgotten = 1.0 - np.exp(-FORGET * span)
+        row(
+            "5",
+            f"{name}, {span:.3f} s: |change of the bias|, N·m",
+            f"{abs(change):.6f}; by eq. {twice * forgotten:.6f}",
+        )
+
+
+# --- figures 6 to 8: the simulated index finger -----------------------------------------------------------------------
+
+
+def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
+    """The recording's file, itself, and the truth at the same times."""
+    recording, truth = folder / f"{rig}.parquet", folder / f"{rig}_truth.parquet"
+    words = ["simulate", str(EXAMPLES / "rigs" / f"{rig}.json"), "-o", str(recording), "--truth", str(truth)]
+    subprocess.run([sys.executable, "-m", "tendonfmu.cli", *words], check=True)
+    return recording, read_recording(recording), pd.read_parquet(truth)
+
+
+def joints_of(truth: pd.DataFrame, name: str) -> Numbers:
+    """[N, n] of a signal of the truth."""
+    return truth[[column for column in truth.columns if column.startswith(f"{name}[")]].to_numpy()
+
+
+def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:
+    """Joint torques and predicted friction of the first two joints, as figs. 6 and 7."""
+    file, recording, truth = case
+    predicted = fit.predict(file)
+    torque = joints_of(truth, "joint_torque")
+    friction = joints_of(truth, "friction_torque")
+    time = recording.time
+    show = (time >= SHOWN[0]) & (time <= SHOWN[1])
+    figure, axes = plt.subplots(2, 1, figsize=(8, 4.6), sharex=True, layout="constrained")
+    for axis, joint in zip(axes, JOINTS, strict=True):
+        axis.plot(time[show], 1e3 * torque[show, joint], color=MEASURED, label=f"τ{joint + 1} of the tendons")
+        axis.plot(time[show], 1e3 * friction[show, joint], color=SENSED, linewidth=1, label="true friction")
+        axis.plot(time[show], 1e3 * predicted[show, joint], color=PREDICTED, label=f"T{joint + 1} predicted")
+        axis.set(ylabel="torque (mN·m)")
+    axes[-1].set(xlabel="time (s)")
+    finish(figure, axes, folder / f"paper_{number}.png")
+    known = ~np.isnan(predicted).any(axis=1)
+    for joint in JOINTS:
+        error = rms(predicted[known, joint] - friction[known, joint])
+        missed = rms(predicted[known, joint] - torque[known, joint])
+        moved = rms(torque[known, joint])
+        numbers = f"{1e3 * moved:.1f}, {1e3 * missed:.2f} ({missed / moved:.0%}), {1e3 * error:.2f}"
+        row(number, f"joint {joint + 1}: torque, residual, error against the true friction, mN·m rms", numbers)
+
+
+def figure_8(fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:
+    """Joint torques, compensated torques, sensed force and detected contact during motion with pushes."""
+    _, recording, truth = case
+    external, force = joints_of(truth, "external_torque"), np.linalg.norm(joints_of(truth, "contact_force"), axis=1)
+    pushed = truth["contact"].to_numpy() > 0
+    fitted = {"fitted, the paper's rule": fit.description_.data}
+    described = fitted | {"calibrated": json.loads(CALIBRATED.read_text(encoding="utf-8"))}
+    runs = {name: run_recording(data, recording.arrays()) for name, data in described.items()}
+    draw_8(recording.time, joints_of(truth, "joint_torque"), runs["calibrated"], external, force, folder)
+    for name, outputs in runs.items():
+        error = [rms(outputs["compensated_torque"][pushed, j] - external[pushed, j]) for j in range(external.shape[1])]
+        numbers = ", ".join(f"{1e3 * value:.1f}" for value in error)
+        row("8", f"{name}: error of the external torque in contact by joint, mN·m rms", numbers)
+        alarm = outputs["contact"].astype(bool).reshape(-1)
+        row(
+            "8", f"{name}: pushes with contact reported, of all", f"{events(pushed, alarm)} of {events(pushed, pushed)}"
+        )
+        row("8", f"{name}: time in alarm without a push", f"{np.mean(alarm[~pushed]):.1%}")
+
+
+def draw_8(
+    time: Numbers, torque: Numbers, outputs: dict[str, Numbers], external: Numbers, force: Numbers, folder: Path
+) -> None:
+    show = (time >= SHOWN[0]) & (time <= SHOWN[1])
+    figure, axes = plt.subplots(4, 1, figsize=(8, 7), sharex=True, layout="constrained", height_ratios=[3, 3, 2, 1])
+    for joint, colour in zip(JOINTS, (MEASURED, PREDICTED), strict=True):
+        axes[0].plot(time[show], 1e3 * torque[show, joint], color=colour, label=f"τ{joint + 1}")
+        compensated = 1e3 * outputs["compensated_torque"][show, joint]
+        axes[1].plot(time[show], compensated, color=colour, label=f"τ{joint + 1} − T{joint + 1}")
+        axes[1].plot(time[show], 1e3 * external[show, joint], color=SENSED, linestyle="--", linewidth=1)
+    axes[1].plot([], [], color=SENSED, linestyle="--", linewidth=1, label="true external torque")
+    axes[2].plot(time[show], force[show], color=SENSED, label="|F| of the push")
+    axes[3].fill_between(time[show], outputs["contact"].reshape(-1)[show], color=FOUND, step="post", label="contact")
+    for axis, unit in zip(axes, ("torque (mN·m)", "compensated (mN·m)", "force (N)", ""), strict=True):
+        axis.set(ylabel=unit)
+    axes[3].set(xlabel="time (s)", yticks=[])
+    finish(figure, axes, folder / "paper_8.png")
+
+
+def events(label: Flags, alarm: Flags) -> int:
+    """Stretches of the label with at least one sample in alarm."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], label, [False]]).astype(int)))
+    return sum(bool(alarm[start:end].any()) for start, end in edges.reshape(-1, 2))
+
+
+# --- both -------------------------------------------------------------------------------------------------------------
+
+
+def rms(values: Numbers) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def row(figure: str, what: str, value: str) -> None:
+    print(f"| {figure} | {what} | {value} |", flush=True)
+
+
+def finish(figure: Any, axes: Any, file: Path) -> None:
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(axis="y", color="#e5e5e5")
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=3, frameon=False)
+    figure.savefig(file, dpi=110)
+    plt.close(figure)
+
+
+def main() -> None:
+    options = parser(__doc__, output=None)
+    options.add_argument("-o", "--output", type=Path, default=Path("."), help="folder")
+    output = options.parse_args().output
+    output.mkdir(parents=True, exist_ok=True)
+    print("| figure | number | value |\n| --- | --- | --- |")
+    figure_2b(output)
+    figure_5(output)
+    with tempfile.TemporaryDirectory() as folder:
+        low, high, pushes = (
+            simulated(rig, Path(folder)) for rig in ("index_finger", "index_finger_x4", "index_finger_pushes")
+        )
+        fit = FrictionFit(INDEX_FINGER, uncertainty=False).fit([low[0]])
+        prediction("6", fit, low, output)
+        prediction("7", fit, high, output)
+        figure_8(fit, pushes, output)
+
+
+if __name__ == "__main__":
+    main()

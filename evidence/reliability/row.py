@@ -1,0 +1,90 @@
+"""What a row of the table is, and what came of it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evidence.runner import ROOT
+
+
+class Unavailable(Exception):
+    """One line: what the row needs and is not here."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    number: str  # what was tried, with its count
+    result: str  # one sentence
+    sound: bool  # nothing was found
+
+
+@dataclass(frozen=True)
+class Run:
+    scale: float  # of the row's full number
+    minutes: float  # most time of a row that stops when it is over
+    work: Path  # folder for what is built and made
+
+    def count(self, full: int, least: int = 1) -> int:
+        return max(least, round(full * self.scale))
+
+
+@dataclass(frozen=True)
+class Row:
+    name: str  # R1 to R20
+    title: str  # what is tried
+    full: str  # the full number
+    leaves: str  # what stays open after it
+    measure: Callable[[Run], Outcome]
+
+
+def spoken(count: float) -> str:
+    """86,400,000 as 8.64e7, small ones with commas."""
+    if count < 1e6:
+        return f"{count:,.0f}"
+    mantissa, exponent = f"{count:.2e}".split("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
+
+
+def called(*command: str | Path, **options: Any) -> str:
+    """Standard output of a program that has to end well."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
+    if done.returncode:
+        message = (done.stderr or done.stdout).strip()
+        raise RuntimeError(f"{Path(str(command[0])).name} ended with {done.returncode}: {message[-600:]}")
+    return str(done.stdout)
+
+
+def with_wrong(result: str, wrong: Sequence[str]) -> str:
+    """The result, and the first things that were wrong."""
+    return "; ".join([f"{result}; {len(wrong)} wrong", *wrong[:4]])
+
+
+def by_pytest(
+    what: str, result: str, *selected: str, environment: dict[str, str] | None = None
+) -> Callable[[Run], Outcome]:
+    """Measures a row by tests of the repository; selected: arguments of pytest."""
+
+    def measure(run: Run) -> Outcome:
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not campaign", *selected]
+        settings = {**os.environ, **(environment or {})}
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=settings)
+        (run.work / "pytest.log").write_text(done.stdout + done.stderr, encoding="utf-8")
+        last = next((line for line in reversed(done.stdout.splitlines()) if re.search(r"\d+ \w+", line)), "no test ran")
+
+        def count(word: str) -> int:
+            match = re.search(rf"(\d+) {word}", last)
+            return int(match[1]) if match else 0
+
+        passed, skipped = count("passed"), count("skipped")
+        failed = count("failed") + count("error") + (not passed)
+        number = f"{passed + failed} {what}" + (f"; {skipped} skipped" if skipped else "")
+        return Outcome(number, f"{passed} {result}", failed == 0)
+
+    return measure

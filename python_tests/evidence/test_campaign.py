@@ -1,0 +1,176 @@
+"""The campaign: which cases it has, what a row says, and what the table counts."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from evidence.diagnosis import makers
+from evidence.diagnosis.campaign import STRENGTHS, Counts, judged, markdown, mean, planned, rate, rates, rates_by_part
+from evidence.diagnosis.makers import Case, Made
+from evidence.judge import Truth
+from tendonfmu.diagnosis.result import FoundPlace, Where
+
+
+def cause(effect: str, joint: int | None = 1, *others: Where, places: tuple[FoundPlace, ...] = ()) -> Any:
+    places = places or (FoundPlace(joint, None, {}),)
+    return SimpleNamespace(effect=effect, joint=joint, tendon=None, places=places, confusable_with=others)
+
+
+def row(group: str, *truths: Truth, causes: tuple[Any, ...] = (), also: tuple[str, ...] = (), **more: Any) -> Any:
+    """A row of a diagnosis that names these causes."""
+    gain = SimpleNamespace(value=0.1, low=0.05, high=0.15)
+    given = {"verdict": "explained", "events": (), "invisible": (), "gain": gain, "causes": causes}
+    diagnosis: Any = SimpleNamespace(**(given | {key: more.pop(key) for key in tuple(more) if key in given}))
+    made = Made("matched", Path(), (), 1, truths, also)
+    known = {"name": "a", "group": group, "rig": "matched", "joints": 1, "error": ""}
+    known["true_effects"] = [effect for truth in truths for effect in truth.effects]
+    return known | judged(group, made, diagnosis) | more
+
+
+GRAVITY, INERTIA, OFFSET = Truth(("gravity",), 1), Truth(("inertia",), 1), Truth(("force_offset",), None, 2)
+
+
+def counted(rows: list[Any]) -> dict[str, str]:
+    return {line[0]: line[3] for line in rates(rows)}
+
+
+# --- cases ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_campaign_that_is_cut_has_some_of_everything() -> None:
+    cases = planned(7)
+    assert len({case.name for case in cases}) == len(cases) == 1028
+    begun = cases[: len(cases) // 10]
+    groups = Counter(case.group for case in begun)
+    assert all(groups[name] >= least for name, least in {"null": 40, "single": 25, "double": 5, "absorbed": 7}.items())
+    assert {*STRENGTHS, None} <= {case.arguments.get("strength") for case in begun}  # None: foreign
+    assert sum(case.maker in (makers.numpy_finger, makers.mujoco_finger) for case in begun) >= 7
+
+
+def test_the_seed_gives_the_cases() -> None:
+    counts = Counts(null=3, per_effect=1, double=3, absorbed=2, unknown=2, contact=1)
+    assert planned(7, counts) == planned(7, counts)
+    other = planned(8, counts)
+    assert {case.name for case in other} == {case.name for case in planned(7, counts)} and other != planned(7, counts)
+
+
+def test_foreign_fingers_of_numpy_follow_the_seed(tmp_path: Path) -> None:
+    made = []
+    for k, seed in enumerate((5, 5, 6)):
+        (tmp_path / str(k)).mkdir()
+        arguments = {"number": 8, "seconds": 4.0, "gain_recordings": 2}
+        made.append(Case("a", "single", seed, makers.numpy_finger, arguments).make(tmp_path / str(k)))
+    for files in ([each.recordings[0] for each in made], [each.finger for each in made]):
+        same, again, other = (file.read_bytes() for file in files)
+        assert same == again != other
+    assert made[0].truths == (Truth(("edge_friction",), 2, 5),) and "presliding" in made[0].also
+    assert len(made[0].gain_recordings) == 2 and len(made[0].test) == 1
+
+
+def test_foreign_fingers_of_mujoco_have_the_joints_asked_for(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed")
+    made = makers.mujoco_finger(tmp_path, 9, 24, 4, 2.0, 250.0)
+    assert len(json.loads(made.finger.read_text(encoding="utf-8"))["joints"]) == made.facts["joints"] == 4
+    assert "inertia" in made.also and made.test == ()
+
+
+# --- rows -------------------------------------------------------------------------------------------------------------
+
+
+def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
+    def answer(*causes: Any, **more: Any) -> tuple[Any, ...]:
+        found = row("single", GRAVITY, causes=causes, **more)
+        return tuple(found[key] for key in ("detected", "in_set", "first", "set_size", "place", "unknown"))
+
+    assert answer(cause("gravity")) == (True, True, True, 1, True, False)
+    assert answer(cause("gravity", 2)) == (True, True, True, 1, False, False)
+    others = (Where("gravity", 1), Where("cover_stiffness", 1), Where("gravity", 2))
+    assert answer(cause("joint_coupling", 1, *others)) == (True, True, False, 3, True, False)
+    assert answer(cause("inertia")) == (True, False, False, 1, None, False)
+    assert answer(verdict="unexplained") == (True, False, False, None, None, True)
+    places = (FoundPlace(2, None, {}), FoundPlace(1, None, {}))
+    assert answer(cause("gravity", None, places=places)) == (True, True, True, 1, True, False)
+
+
+def test_what_the_rig_has_anyway_is_neither_right_nor_false() -> None:
+    anyway = ("presliding", "inertia")
+    null = row("null", causes=(cause("presliding"), cause("inertia")), also=anyway)
+    assert (null["cause_count"], null["named_count"]) == (0, 2)
+    single = row("single", GRAVITY, causes=(cause("presliding"), cause("gravity")), also=anyway)
+    assert (single["in_set"], single["first"], single["cause_count"]) == (True, True, 1)
+    assert row("single", INERTIA, causes=(cause("inertia"),), also=anyway)["in_set"]
+
+
+def test_two_effects_found_and_nothing_else() -> None:
+    both = (cause("inertia"), cause("gravity"))
+    assert row("double", GRAVITY, INERTIA, causes=both)["exactly"]
+    three = row("double", GRAVITY, INERTIA, causes=(*both, cause("stribeck")))
+    assert three["both"] and not three["exactly"]
+    assert not row("double", GRAVITY, INERTIA, causes=both[:1])["both"]
+
+
+def invisible(experiment: str) -> tuple[Any, ...]:
+    return (SimpleNamespace(where=Where("force_offset", None, 2), experiment=experiment, motion={}),)
+
+
+def test_absorbed_is_not_visible_with_an_experiment() -> None:
+    listed = row("absorbed", OFFSET, invisible=invisible("change the pretension"))
+    assert listed["not_visible"] and listed["experiment"]
+    assert not row("absorbed", OFFSET)["not_visible"]
+    assert not row("absorbed", OFFSET, invisible=invisible(""))["experiment"]
+
+
+def test_unknown_is_said_or_a_name_is_wrong() -> None:
+    def answer(*causes: Any, **more: Any) -> tuple[bool, bool]:
+        found = row("unknown", causes=causes, **more)
+        return found["wrong_name"], found["unknown"]
+
+    assert answer(cause("gravity")) == (True, False)
+    assert answer(cause("gravity"), verdict="partly explained") == (False, True)
+    assert answer(cause("gravity", 1, Where("unknown"))) == (False, True)
+
+
+# --- the table --------------------------------------------------------------------------------------------------------
+
+
+def test_rates_have_exact_intervals() -> None:
+    line = rate("x", "", [{"a": k < 3} for k in range(10)] + [{"a": None}], lambda row: row["a"])
+    assert line == ["x", "", "30.0 %", "3/10", "6.7 to 65.2 %"]
+    assert rate("x", "", [], lambda row: True)[3] == "0"
+    assert mean("x", "", [1.0, 2.0, 3.0])[2:] == ["2.00", "3", "0.87 to 3.13"]
+
+
+def test_the_gain_is_covered_where_the_interval_has_the_true_one() -> None:
+    base = row("single", GRAVITY, causes=(cause("gravity"),), strength=0.1)
+    known = counted([base | {"true_gain": true} for true in (0.1, 0.149, 0.2)])
+    assert known["the gain's interval covers the true gain"] == "2/3"
+    assert known["one effect at 0.1: true cause first"] == "3/3"
+
+
+def test_an_absorbed_effect_that_no_motion_shows_is_not_asked_for() -> None:
+    base = row("absorbed", OFFSET, invisible=invisible("change the pretension"), named_after_experiment=False)
+    known = counted([base | {"shown_strength": strength} for strength in (1e-6, 0.29, 0.31)])
+    assert known["absorbed by refitting: “not visible”, with an experiment"] == "3/3"
+    assert known["the same where a motion shows it: named after the experiment"] == "0/1"
+
+
+def test_rates_by_rig_and_joints_where_there_are_several() -> None:
+    rows = [row("null"), row("null", joints=2), row("null", joints=2, rig="numpy", causes=(cause("gravity"),))]
+    by_part = {line[0]: line[3] for line in rates_by_part(rows)}
+    assert by_part["nothing hidden: a false cause; matched"] == "0/2"
+    assert by_part["nothing hidden: a false cause; numpy"] == "1/1"
+    assert by_part["nothing hidden: a false cause; 1 joint"] == "0/1"
+    assert by_part["nothing hidden: a false cause; 2 joints"] == "1/2"
+    assert not rates_by_part(rows[:1])
+
+
+def test_a_case_that_failed_is_in_no_rate() -> None:
+    text = markdown([row("null"), row("single", GRAVITY, causes=(cause("gravity"),)), {"name": "b", "error": "x"}])
+    assert "| nothing hidden: a false cause | ≤ 1.5 % | 0.0 % | 0/1 |" in text
+    assert "| gravity | 1 | 1 | 1 | 1 | 1/1 |" in text and "1 of 3 cases" in text

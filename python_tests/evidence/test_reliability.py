@@ -1,0 +1,71 @@
+"""The rows of docs/evidence/reliability.md: what is kept, and that a row that fails is said."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from repository_paths import ROOT
+
+pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
+
+from evidence.reliability import __main__ as reliability
+from evidence.reliability.row import Outcome, Run, Unavailable, spoken
+
+PAGE = ROOT / "docs" / "evidence" / "reliability.md"
+
+
+def use(monkeypatch: pytest.MonkeyPatch, measure: Callable[[Run], Outcome], work: Path, *words: str) -> int:
+    monkeypatch.setattr(reliability, "ROWS", {"R2": replace(reliability.ROWS["R2"], measure=measure)})
+    monkeypatch.setattr(sys, "argv", ["reliability", "--work", str(work), *words])
+    return reliability.main()
+
+
+def test_rows_full_numbers_and_what_is_left_open_are_those_of_the_page() -> None:
+    lines = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    rows = {cells[0]: (cells[1], cells[3], cells[6]) for cells in lines if len(cells) == 7 and cells[0].startswith("R")}
+    assert rows == {name: (row.title, row.full, row.leaves) for name, row in reliability.ROWS.items()}
+    assert list(rows) == [f"R{k}" for k in range(1, 21)]
+
+
+def test_a_result_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scales: list[float] = []
+
+    def measure(run: Run) -> Outcome:
+        scales.append(run.scale)
+        return Outcome(f"{run.count(1000)} things", "all well", True)
+
+    assert use(monkeypatch, measure, tmp_path, "--scale", "0.1") == 0
+    assert use(monkeypatch, measure, tmp_path) == 0 and scales == [0.1]
+    assert "| R2 | Time and step length | 100 things | 420 pairs | all well |" in capsys.readouterr().out
+    assert use(monkeypatch, measure, tmp_path, "R2") == 0 and scales == [0.1, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status", "text"),
+    [
+        (Outcome("1", "half a file", False), 1, "**found:** half a file"),
+        (ValueError("lost\ncount"), 1, "**found:** NOT MEASURED: ValueError: lost count"),
+        (Unavailable("no clang++"), 0, "SKIPPED: no clang++"),
+    ],
+)
+def test_a_finding_an_error_and_what_is_missing_are_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, outcome: Outcome | Exception, status: int, text: str
+) -> None:
+    def measure(run: Run) -> Outcome:
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
+
+    assert use(monkeypatch, measure, tmp_path, "-o", str(tmp_path / "table.md")) == status
+    assert text in (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "R2.json").read_text(encoding="utf-8"))["sound"] == (status == 0)
+
+
+def test_large_counts_are_spoken() -> None:
+    assert [spoken(x) for x in (7, 20_000, 86_400_000, 1e7)] == ["7", "20,000", "8.64e7", "1e7"]
