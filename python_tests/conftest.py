@@ -19,8 +19,8 @@ from command import Answer, Call, DemoRun, run_script
 from fmi3_binary import UnpackedFmu3, unpack3
 from fmu_binary import FINGER, UnpackedFmu, unpack
 from made_once import made_once
+from optional_parts import require
 from plant_fmu_rig import fmu_rig
-from real_browser import BROWSERS, find_browser
 
 if TYPE_CHECKING:
     from runners import Runner
@@ -98,10 +98,7 @@ def demo_run(tmp_path_factory: pytest.TempPathFactory) -> DemoRun:
 @pytest.fixture(scope="session")
 def browser() -> str:
     """The program of a browser that is installed."""
-    found = find_browser()
-    if found is None:
-        pytest.skip(f"SKIPPED: no browser to read the page in (looked for {', '.join(BROWSERS)})")
-    return found
+    return str(require("browser"))
 
 
 @pytest.fixture(params=["oracle", "native"])

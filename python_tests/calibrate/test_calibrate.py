@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from command import Call, DemoRun
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate

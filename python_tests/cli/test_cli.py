@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import oracle
 import random_fingers
 from agreement import agree_with_oracle, few_left_out

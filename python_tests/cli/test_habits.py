@@ -16,8 +16,6 @@ from typing import Any
 import pytest
 import typer
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import map_cases
 from command import Answer, Call
 from fmu_binary import FINGER

@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-
 from command import DemoRun
-from real_browser import Elements, find_browser, measure, needs_nothing_else
+from optional_parts import require
+from real_browser import Elements, measure, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.demo import demo
 from tendonfmu.demo.page import story_report
@@ -135,9 +134,7 @@ def tells_the_same(page: str, out: str) -> None:
 
 def fits_screens(folder: Path, page: str) -> None:
     """Where a browser is installed: nothing sticks out, no picture is broken."""
-    browser = find_browser()
-    if browser is None:
-        pytest.skip("SKIPPED: no browser: all but how the page looks was tested")
+    browser = require("browser")
     for width in (1280, 390):
         found = measure(browser, folder, page, width)
         assert found["scroll"] <= found["width"] and not found["out"], found["out"]

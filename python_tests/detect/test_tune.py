@@ -16,9 +16,6 @@ import jsonschema
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from scipy.special import chdtri, pdtr
 
 from command import Call

@@ -14,8 +14,6 @@ import jsonschema
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from random_free_motion import random_free_case
 from tendonfmu.detect.free_motion import closed_loop, free_parts
 from tendonfmu.detect.tune_report import build_report

@@ -8,8 +8,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from fit_cases import small_finger
 from tendonfmu.diagnosis import cause_gains, gain
 from tendonfmu.diagnosis import diagnosis as whole

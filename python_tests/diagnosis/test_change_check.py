@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from command import Call
 from tendonfmu.diagnosis.diagnosis import change_case
 from tendonfmu.errors import InputError

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from repetitions import repeated
 from synthetic_series import make_series
 from tendonfmu.diagnosis.changes.load import steady_load

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
 from tendonfmu.diagnosis.changes.numbers import Number, changed, estimator_of, number_hypotheses, numbers_of

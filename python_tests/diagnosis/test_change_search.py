@@ -12,8 +12,6 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from command import Call
 from repetitions import repeated
 from tendonfmu.diagnosis.diagnosis import diagnose

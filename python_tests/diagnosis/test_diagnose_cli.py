@@ -14,8 +14,6 @@ import jsonschema
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 import diagnosis_examples as examples
 from command import Call
 from evidence.diagnosis.hidden_effects import hide

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from tendonfmu.diagnosis import event_gain as module
 from tendonfmu.diagnosis.event_gain import event_gain
 from tendonfmu.diagnosis.result import Event

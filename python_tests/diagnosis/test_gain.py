@@ -31,7 +31,6 @@ from tendonfmu.diagnosis.extension_fit import (
 from tendonfmu.diagnosis.gain import measure_gain, residual_of, run_both
 from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimate.estimation import HAS_ESTIMATION
 from tendonfmu.model import native
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
@@ -41,7 +40,6 @@ from tendonfmu.statistics.paired_gain import blocks_of, gain_interval
 Array = NDArray[Any]
 EXAMPLES = ROOT / "examples"
 NOISE = 0.002
-needs_estimation = pytest.mark.skipif(not HAS_ESTIMATION, reason="SKIPPED: no estimation (built without Eigen)")
 
 
 def described(data: dict[str, Any]) -> Finger:
@@ -185,7 +183,6 @@ def test_a_known_load_leaves_noise() -> None:
 # --- refit and gain ---------------------------------------------------------------------------------------------------
 
 
-@needs_estimation
 def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     """Two causes, one of them not there: sizes, gains of each, and the gain on far more data of the same kind."""
     truth = hidden({"effect": "presliding", "joint": 1, "displacement": 0.02})
@@ -221,7 +218,6 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     assert blocks.held_out and blocks.value.low > 0 and blocks.blocks >= 4
 
 
-@needs_estimation
 def test_a_number_that_was_driven_to_nothing_comes_back() -> None:
     """Its expected size is that of the description that was given, not what is left of it."""
     training = prepared(nominal(), 1)
@@ -235,7 +231,6 @@ def test_a_number_that_was_driven_to_nothing_comes_back() -> None:
     assert fit_numbers(starved, [training], settings).values[path] < 1e-4 * known  # pinned to what it starts from
 
 
-@needs_estimation
 def test_forces_without_noise_explain_the_measured_torque() -> None:
     """Noise in the forces is in the target and in a term that scales with them, which shrinks it; the target of the
     recording is explained also at forces without it.
@@ -256,7 +251,6 @@ def test_forces_without_noise_explain_the_measured_torque() -> None:
     assert abs(found.values[path]) < abs(shrunk.values[path])
 
 
-@needs_estimation
 def test_what_cannot_be_compared_is_refused() -> None:
     training = prepared(nominal(), 1)
     with pytest.raises(InputError, match="no sample to measure the gain on"):

@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from dask_on_loopback import dask_processes
 from real_browser import Elements
 from tendonfmu.diagnosis.changes import history as change_history
@@ -275,7 +273,6 @@ def test_friction_that_grows_is_followed(tmp_path: Path, workers: int) -> None:
         return diagnose_history(files["finger"], now, then, rows=tmp_path / "out", client=client, kinematics=3)
 
     if workers:
-        pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
         with dask_processes(workers) as processes, workers_of(processes.address) as client:
             found = follow(client)
     else:

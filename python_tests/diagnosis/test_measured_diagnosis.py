@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,25 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from optional_parts import DATA, needs
 from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.recordings.recording import Recording
 
-DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
-
-emps = pytest.mark.skipif(
-    not (DATA / "emps" / "DATA_EMPS_PULSES.mat").is_file(), reason=f"SKIPPED: the EMPS recordings are not in {DATA}"
-)
-davinci = pytest.mark.skipif(
-    not (DATA / "davinci_tool" / "Tool_4_Maryland_L_4").is_dir(),
-    reason=f"SKIPPED: the da Vinci recordings are not in {DATA}",
-)
+emps = needs("emps data")
+davinci = needs("davinci data")
 EMPS_LIMITS = {"DATA_EMPS": 2.2, "DATA_EMPS_PULSES": 3.1}  # % of the force
 JAW_LIMIT = 0.008  # N·m
 ODD = ("01", "03", "05", "07", "09")

@@ -27,7 +27,6 @@ from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimate.estimation import HAS_ESTIMATION
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.balance import moment_arms, pretension_vector
@@ -53,7 +52,6 @@ FINGER: dict[str, Any] = {
 }
 RANGES = ((-0.4, 0.4), (-0.5, 0.5))
 RATE = 100.0
-needs_estimation = pytest.mark.skipif(not HAS_ESTIMATION, reason="SKIPPED: no estimation (built without Eigen)")
 
 
 def usual(seconds: float = 30.0, pretension: float = 10.0) -> Entry:
@@ -81,8 +79,6 @@ GAIN = accepted("force_gain", Place(tendon=1))
 @pytest.fixture(scope="module")
 def planned() -> Experiments:
     """After one recording at one pretension: friction in joint 2, or friction that its load makes? And a gain?"""
-    if not HAS_ESTIMATION:
-        pytest.skip("SKIPPED: no estimation (built without Eigen)")
     old = recording_of(FINGER, usual())
     return plan_experiments(FINGER, [old], [Question(JOINT, LOAD), Question(GAIN)], noise=[NOISE, NOISE])
 
@@ -230,7 +226,6 @@ def test_a_wrong_folder_is_refused(planned: Experiments, tmp_path: Path) -> None
         discriminating_motion(folder, FINGER)
 
 
-@needs_estimation
 def test_no_question_no_experiment() -> None:
     old = recording_of(FINGER, usual(10.0))
     assert plan_experiments(FINGER, [old], []).best.sentence == ""

@@ -11,8 +11,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 from evidence.fingers import sticking_finger
 from tendonfmu.calibrate.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose

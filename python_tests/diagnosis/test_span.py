@@ -7,8 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from tendonfmu.diagnosis.span import _turning_points
 
 TURNS = [0.0, 2.0, 0.5, 3.0, -1.0]

@@ -14,8 +14,6 @@ import plotly.graph_objects as go
 import pytest
 from matplotlib.image import imread
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from tendonfmu.drawing.figures import dark_colours, figure_of, figures_json, packed_plotly, pooled, stretched, thinned
 from tendonfmu.drawing.panel import DIVERGING, STYLES, Band, Bars, Curve, Dots, Heat, Panel, Sheet
 from tendonfmu.drawing.png import write_sheet

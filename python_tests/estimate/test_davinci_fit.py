@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,18 +16,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-
+from optional_parts import DATA, needs
 from repository_paths import ROOT
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings.recording import read_recording
 
 EXAMPLE = ROOT / "examples" / "davinci"
 START = EXAMPLE / "jaw_start.json"
-DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 RUNS = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
 
-measured = pytest.mark.skipif(not RUNS.is_dir(), reason=f"SKIPPED: the da Vinci recordings are not in {DATA}")
+measured = needs("davinci data")
 
 LIMIT = 0.020  # N·m
 EVEN, ODD, FAST = ("00", "02", "04", "06", "08"), ("01", "03", "05", "07", "09"), ("40", "42", "44", "46", "48")

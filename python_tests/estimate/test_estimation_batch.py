@@ -18,9 +18,6 @@ from random_fingers import Description, Recording, random_recording
 from repetitions import repeated
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 Array = NDArray[Any]
 
 EXACT = 1e-9  # of the largest entry: a filter of 400 samples against Cholesky of the whole covariance

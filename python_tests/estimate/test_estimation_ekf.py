@@ -17,9 +17,6 @@ from random_fingers import Description, Recording
 from repetitions import repeated
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 Array = NDArray[Any]
 
 CLOSE = 1e-8  # of a prior's standard deviation, or of the largest innovation: rounding through a few hundred updates

@@ -18,9 +18,6 @@ from oracle_trace import with_values
 from random_fingers import Description, Recording
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 Array = NDArray[Any]
 
 

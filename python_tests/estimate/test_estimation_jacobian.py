@@ -19,9 +19,6 @@ from oracle_trace import Trace, run_recorder, with_values
 from repetitions import repeated
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 Array = NDArray[Any]
 
 FINGERS = 40

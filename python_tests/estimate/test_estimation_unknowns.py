@@ -25,9 +25,6 @@ from fit_cases import (
 from random_fingers import Description
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 SMALL = small_finger()
 PATHS, VALUES = parameters_of(SMALL)
 INDEX = {path: k for k, path in enumerate(PATHS)}

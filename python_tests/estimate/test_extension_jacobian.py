@@ -20,9 +20,6 @@ from random_fingers import Description, random_case
 from repetitions import repeated
 from tendonfmu.estimate import estimation
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 Array = NDArray[Any]
 
 FINGERS = range(700, 712)

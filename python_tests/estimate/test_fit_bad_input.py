@@ -17,8 +17,6 @@ from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.recordings.prepared import slack_sentences
 from tendonfmu.recordings.recording import Recording
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 
 def fitted(recording: Recording | list[Recording], finger: dict[str, Any] | None = None, **options: Any) -> FrictionFit:
     settings = {"share": ["tendons"], "kinematics": 3, "max_passes": 8} | options

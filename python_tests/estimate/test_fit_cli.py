@@ -21,8 +21,6 @@ from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.estimate.structure import get_number
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
 FIT = ("--share", "tendons", "--kinematics", "3")

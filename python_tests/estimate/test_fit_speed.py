@@ -17,9 +17,6 @@ from tendonfmu.estimate import estimation
 from tendonfmu.model.balance import balanced_forces
 from tendonfmu.model.description import Finger, read_finger
 
-if not estimation.HAS_ESTIMATION:
-    pytest.skip(f"FIT NOT TESTED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
-
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 PASS, FILTER = 15_000, 2_000  # samples per second of CPU time, 468 unknowns
 

@@ -17,8 +17,6 @@ from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.model import native
 from tendonfmu.statistics.error_directions import few_directions, predicted
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 Numbers = NDArray[np.float64]
 SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 1e-3}
 

@@ -24,8 +24,6 @@ from tendonfmu.model import description_text, native
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.residuals import chi_square_tail, consistency, whiteness
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
-
 
 @pytest.fixture(autouse=True)
 def _quiet() -> Any:

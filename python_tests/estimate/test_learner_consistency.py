@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
-
-pytestmark = [pytest.mark.long, pytest.mark.skipif(not HAS_ESTIMATION, reason=ESTIMATION_MISSING)]
+pytestmark = pytest.mark.long
 
 Array = NDArray[np.float64]
 FINGERS, RECORDINGS, SAMPLES, RATE, PRIOR = 8, 10, 12_500, 200.0, 0.05

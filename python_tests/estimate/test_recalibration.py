@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,12 @@ from numpy.typing import NDArray
 
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
-from repository_paths import ROOT
+from optional_parts import needs
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import read_previous_fit
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.files import report_text
 from tendonfmu.recordings.recording import Recording
-
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 
 Numbers = NDArray[np.float64]
 SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 0.05, "uncertainty": False}
@@ -228,11 +225,9 @@ def test_a_previous_fit_of_another_finger_is_refused(previous: tuple[FrictionFit
 
 # --- measured ---------------------------------------------------------------------------------------------------------
 
-DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
-
 
 @pytest.mark.long
-@pytest.mark.skipif(not (DATA / "davinci_tool").is_dir(), reason=f"SKIPPED: no da Vinci recordings in {DATA}")
+@needs("davinci data")
 def test_one_light_load_leaves_a_jaw_fit_for_the_others() -> None:
     """The bench on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""
     from evidence.fit import recalibration

@@ -14,10 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.estimate.estimation import ESTIMATION_MISSING, HAS_ESTIMATION
-
-pytestmark = pytest.mark.skipif(not HAS_ESTIMATION, reason=ESTIMATION_MISSING)
-
 SEED, DURATION, RATE = 1, 400.0, 25.0
 
 

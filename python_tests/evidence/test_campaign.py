@@ -8,12 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from evidence.diagnosis import makers
 from evidence.diagnosis.campaign import STRENGTHS, Counts, judged, markdown, mean, planned, rate, rates, rates_by_part
 from evidence.diagnosis.makers import Case, Made
 from evidence.judge import Truth
+from optional_parts import require
 from tendonfmu.diagnosis.result import FoundPlace, Where
 
 
@@ -74,7 +73,7 @@ def test_foreign_fingers_of_numpy_follow_the_seed(tmp_path: Path) -> None:
 
 
 def test_foreign_fingers_of_mujoco_have_the_joints_asked_for(tmp_path: Path) -> None:
-    pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed")
+    require("mujoco")
     made = makers.mujoco_finger(tmp_path, 9, 24, 4, 2.0, 250.0)
     assert len(json.loads(made.finger.read_text(encoding="utf-8"))["joints"]) == made.facts["joints"] == 4
     assert "inertia" in made.also and made.test == ()

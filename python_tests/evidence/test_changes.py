@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-
 from evidence.diagnosis import change_measured, change_real, changes
 from evidence.diagnosis.change_measured import (
     Stretch,
@@ -42,6 +40,7 @@ from evidence.diagnosis.measured import (
 )
 from evidence.diagnosis.measured import LOAD as LOAD_TORQUE
 from evidence.judge import Truth
+from optional_parts import require
 
 RATE, COULOMB, VISCOUS, NOISE, PRESLIDING = 1000.0, 8.0, 30.0, 0.5, 1e-5
 
@@ -251,7 +250,7 @@ def test_a_few_cases_are_spread_over_all() -> None:
 
 @pytest.fixture
 def simulated() -> Any:
-    pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed")
+    require("mujoco")
     from evidence.diagnosis import change_simulated
 
     return change_simulated

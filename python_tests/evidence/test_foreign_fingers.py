@@ -20,21 +20,16 @@ from evidence.diagnosis.command import run_diagnose
 from evidence.diagnosis.foreign_cases import cases_of, markdown, row_of
 from evidence.fingers import numpy_cases, recorded
 from evidence.fingers.foreign import Array, Truth
+from optional_parts import is_there, needs
 from repetitions import repeated
 from repository_paths import ROOT
 
-try:
+if is_there("mujoco"):
     from evidence.fingers import mujoco_cases, mujoco_run
-
-    HAS_MUJOCO = True
-except ModuleNotFoundError as missing:
-    if missing.name != "mujoco":
-        raise
-    HAS_MUJOCO = False
 
 FOLDER = ROOT / "evidence" / "fingers"
 SECONDS = 6.0  # of the training recordings that are made here
-NEEDS_MUJOCO = pytest.mark.skipif(not HAS_MUJOCO, reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+NEEDS_MUJOCO = needs("mujoco")
 # every numpy case, and the MuJoCo cases that use different parts of its model
 MUJOCO_NUMBERS = (3, 11, 14)
 BEDS = [pytest.param("numpy_cases", number, id=f"numpy_{number:02d}") for number in numpy_cases.NUMBERS]
@@ -145,7 +140,7 @@ def test_the_probe_touches_while_it_pushes() -> None:
     assert touched[(trace.time > 1.5) & (trace.time < 2.0)].min() > 0.01
 
 
-@pytest.mark.skipif(not recorded.TRUTHS.is_file(), reason="SKIPPED: no folder shared/foreign beside the repository")
+@needs("foreign data")
 def test_recorded_cases_are_read() -> None:
     numbers = recorded.numbers()
     assert len(numbers) == 26

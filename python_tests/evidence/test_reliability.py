@@ -10,12 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from evidence.reliability import __main__ as reliability
 from evidence.reliability.row import Outcome, Run, Unavailable, spoken
+from repository_paths import ROOT
 
 PAGE = ROOT / "docs" / "evidence" / "reliability.md"
 

@@ -26,6 +26,7 @@ from evidence.diagnosis.rival_methods import (
 )
 from evidence.diagnosis.rivals import Answer, judged, markdown, rival_answers
 from evidence.judge import Truth
+from optional_parts import require
 from tendonfmu.diagnosis.result import Where
 
 ARMS = np.array([[0.01, 0.008], [-0.01, 0.008], [0.0, -0.009]])
@@ -59,7 +60,7 @@ def test_the_correlation_keeps_its_level_in_white_noise() -> None:
 
 
 def test_knockoffs_name_what_is_there() -> None:
-    pytest.importorskip("knockpy", reason="SKIPPED: knockpy is not installed (requirements-diagnosis-peers.lock)")
+    require("knockpy")
     for seed in range(3):
         data = with_cause(columns_at_joints(np.random.default_rng(seed), [0, 1, 0, 1, 0, 1]), 3, 0.5)
         assert by_knockoffs(data)[0].where == Where("stribeck", 2)

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from evidence import tables
 from evidence.runner import ROOT, digest, run_cases
 
@@ -45,7 +43,6 @@ def test_errors_are_rows_where_they_count(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_same_rows_come_from_workers(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     cases = {f"case_{number}": (number, 10) for number in (20, 30)}
     rows = run_cases(divmod_row, cases, tmp_path, workers=2)
     assert [(row["quotient"], row["rest"]) for row in rows] == [(2, 0), (3, 0)]

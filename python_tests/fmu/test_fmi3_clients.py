@@ -14,7 +14,6 @@ from __future__ import annotations
 import csv
 import importlib.util
 import json
-import os
 import re
 import shutil
 import struct
@@ -25,16 +24,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("fmpy", reason="SKIPPED: fmpy is not installed")
-
-import fmpy
-
 from fmi3_binary import UnpackedFmu3, fmi3_platform, unpack3
 from fmu_binary import FINGER, OK, Instance, UnpackedFmu, motion
+from optional_parts import require
 from repository_paths import ROOT, TESTS
 
 SAMPLES, STEP = 60, 1 / 512  # a step that is exact in binary: every client then adds up the same times
@@ -186,7 +182,6 @@ def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.long
-@pytest.mark.skipif(shutil.which("cmake") is None, reason="SKIPPED: fmpy compiles by cmake, which is not installed")
 def test_fmpy_compiles_the_sources(
     small_fmu: UnpackedFmu, small_fmu3_path: Path, expected: list[list[float]], tmp_path: Path
 ) -> None:
@@ -207,11 +202,8 @@ def test_fmpy_compiles_the_sources(
 
 
 def toolbox(name: str) -> str:
-    """A command of the Python package fmu-manipulation-toolbox, beside this Python or on the path."""
-    found = shutil.which(name, path=str(Path(sys.executable).parent)) or shutil.which(name)
-    if not found:
-        pytest.skip(f"SKIPPED: {name} is not installed (pip install fmu-manipulation-toolbox)")
-    return found
+    """A command of the Python package fmu-manipulation-toolbox, beside its `fmutool`."""
+    return str(Path(require("fmutool")).with_name(name))
 
 
 def test_fmutool_finds_nothing_to_complain_of(small_fmu3_path: Path) -> None:
@@ -255,7 +247,7 @@ def one_joint(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 
 
 def test_ecos(one_joint: dict[int, Path]) -> None:
-    ecospy = pytest.importorskip("ecospy", reason="SKIPPED: ecospy is not installed (requirements-coupling.lock)")
+    ecospy = require("ecos")
     found = {}
     for fmi, index in ((2, "[1]"), (3, "")):
         structure = ecospy.EcosSimulationStructure()
@@ -271,16 +263,9 @@ def test_ecos(one_joint: dict[int, Path]) -> None:
     assert found[2] == found[3] and len(set(found[2])) > 0.9 * SAMPLES
 
 
-def fmi_sim() -> str:
-    found = os.environ.get("TENDONFMU_FMI_SIM") or shutil.which("fmi-sim")
-    if not found:
-        pytest.skip("SKIPPED: fmi-sim is not installed (cargo install fmi-sim)")
-    return found
-
-
 def test_fmi_sim(one_joint: dict[int, Path], tmp_path: Path) -> None:
     """fmi-sim 0.7.0: its reader refuses these three attributes of a Float64, so they are left out."""
-    program, rows = fmi_sim(), {}
+    program, rows = require("fmi-sim"), {}
     for fmi, index in ((2, "[1]"), (3, "")):
         fmu, samples, out = (tmp_path / f"{fmi}.{suffix}" for suffix in ("fmu", "in.csv", "out.csv"))
         with zipfile.ZipFile(one_joint[fmi]) as given, zipfile.ZipFile(fmu, "w") as archive:

@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from fmi3_binary import Instance3, UnpackedFmu3, unpack3
 from fmu_binary import ERROR, FINGER, OK, STATIC, Instance, UnpackedFmu, motion, unpack
 from repository_paths import ROOT, TESTS
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from tendonfmu.fmu import build_fmu, run_fmu
 from tendonfmu.recordings import read_recording
 

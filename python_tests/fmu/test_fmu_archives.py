@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from archive_cases import ARCHIVES, HARMLESS, with_member
 from fmu_binary import FINGER
 from tendonfmu.errors import InputError

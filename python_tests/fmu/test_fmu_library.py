@@ -21,6 +21,7 @@ from fmi2_headers import FMPY_HEADERS
 from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, unpack
 from fmu_kinds import MAKERS
 from leak_count import least_growth, needs_count
+from optional_parts import require
 from plant_rigs import needs_plant
 from repository_paths import SUPPORT
 
@@ -31,19 +32,12 @@ def run(*command: str | Path) -> str:
     return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
 
 
-def tool(name: str) -> str:
-    path = shutil.which(name)
-    if path is None:
-        pytest.skip(f"SKIPPED: {name} is not installed")
-    return path
-
-
 # --- the binary -------------------------------------------------------------------------------------------------------
 
 
 @linux
 def test_exports_the_fmi_functions_only(small_fmu: UnpackedFmu) -> None:
-    lines = run(tool("nm"), "-D", "--defined-only", small_fmu.binary).splitlines()
+    lines = run(require("nm"), "-D", "--defined-only", small_fmu.binary).splitlines()
     names = {line.split()[-1] for line in lines}
     header = (FMPY_HEADERS / "fmi2Functions.h").read_text()
     assert names == set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
@@ -52,7 +46,7 @@ def test_exports_the_fmi_functions_only(small_fmu: UnpackedFmu) -> None:
 
 @linux
 def test_needs_libc_and_libm_only(small_fmu: UnpackedFmu) -> None:
-    headers = run(tool("objdump"), "-p", small_fmu.binary)
+    headers = run(require("objdump"), "-p", small_fmu.binary)
     needed = set(re.findall(r"NEEDED\s+(\S+)", headers))
     assert needed <= {"libc.so.6", "libm.so.6"} and "libc.so.6" in needed
     assert "SYMBOLIC" in headers
@@ -63,7 +57,7 @@ def test_needs_libc_and_libm_only(small_fmu: UnpackedFmu) -> None:
 
 @linux
 def test_no_executable_stack_and_no_text_relocations(small_fmu: UnpackedFmu) -> None:
-    headers = run(tool("objdump"), "-p", small_fmu.binary)
+    headers = run(require("objdump"), "-p", small_fmu.binary)
     assert "TEXTREL" not in headers
     stack = re.search(r"STACK.*\n.*flags (\S+)", headers)
     assert stack and "x" not in stack[1]

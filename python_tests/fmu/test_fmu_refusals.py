@@ -11,8 +11,6 @@ import sys
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from fmu_binary import ERROR, OK, Instance, UnpackedFmu
 from leak_count import ROUNDS, least_growth, needs_count
 from plant_rigs import needs_plant

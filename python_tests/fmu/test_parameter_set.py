@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssv
 
-from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu was built without the estimation")
-
 import tendonfmu as tf
+from optional_parts import require
+from repository_paths import ROOT
 from tendonfmu.estimate import FitWarning
 
 DEMO = ROOT / "examples" / "demo_recording"
@@ -134,10 +132,9 @@ SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def values_in_ecos(package: Path) -> list[float]:
-    try:
-        from ecospy import EcosSimulation
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"ECOS NOT TESTED: {missing}; it wants the packages ecospy (PyPI) and libtbb12")
+    require("ecos")
+    from ecospy import EcosSimulation
+
     with EcosSimulation(ssp_path=str(package), step_size=0.001) as simulation:
         simulation.init(parameter_set="two_joints: fitted")
         simulation.step()
@@ -145,12 +142,11 @@ def values_in_ecos(package: Path) -> list[float]:
 
 
 def values_in_libcosim(package: Path) -> list[float]:
-    try:
-        from libcosimpy.CosimExecution import CosimExecution
-        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-        from libcosimpy.CosimObserver import CosimObserver
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"LIBCOSIM NOT TESTED: {missing}; it wants the package libcosimpy (PyPI)")
+    require("libcosim")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
     log_output_level(CosimLogLevel.FATAL)
     with zipfile.ZipFile(package) as archive:
         archive.extractall(package.parent / "unpacked")

@@ -9,7 +9,6 @@ import csv
 import importlib.util
 import os
 import re
-import shutil
 import struct
 import subprocess
 import sys
@@ -23,6 +22,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from optional_parts import require
 from repository_paths import ROOT, TESTS
 
 pytestmark = pytest.mark.xdist_group("portable")  # one worker builds for all of them
@@ -34,15 +34,8 @@ import portable_binaries as portable  # noqa: E402
 
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 RECORDING = TESTS / "reference" / "index_finger_in.csv"
-ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")  # of the package libc6-arm64-cross
 FUNCTIONS = {2: 44, 3: 75}  # all of the headers of FMI 2.0 and 3.0
 Bits = NDArray[np.uint64]
-
-
-def needs(*programs: str) -> None:
-    missing = [program for program in programs if shutil.which(program) is None]
-    if missing:
-        pytest.skip(f"SKIPPED: {', '.join(missing)} not installed")
 
 
 def installed_library() -> Path:
@@ -86,7 +79,7 @@ def test_a_missing_list_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the host's ELF library")
 def test_contents_agree_with_readelf() -> None:
-    needs("readelf")
+    require("readelf")
     library = installed_library()
     contents = binary_contents.read_contents(library.read_bytes())
 
@@ -156,8 +149,7 @@ def binaries(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of all platforms. TENDONFMU_PORTABLE_BINARIES names one that is built already."""
     if ready := os.environ.get("TENDONFMU_PORTABLE_BINARIES"):
         return Path(ready)
-    if importlib.util.find_spec("ziglang") is None:
-        pytest.skip("SKIPPED: the Python package ziglang is not installed (requirements-portable.lock)")
+    require("zig")
     folder = tmp_path_factory.mktemp("portable")
     done = tool(str(folder))
     assert done.returncode == 0, done.stderr
@@ -203,7 +195,8 @@ def test_a_portable_library_keeps_its_promises(binaries: Path, name: str, platfo
 @pytest.mark.long
 def test_contents_agree_with_other_readers(binaries: Path) -> None:
     """PE by objdump, Mach-O by llvm-nm."""
-    needs("objdump", "llvm-nm")
+    require("objdump")
+    require("llvm-nm")
 
     def output(*command: str | Path) -> str:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
@@ -294,15 +287,12 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Fmu:
 def emulated(platform: str) -> Emulated:
     if sys.platform != "linux" or os.uname().machine != "x86_64":
         pytest.skip("SKIPPED: compared on Linux x86-64 only")
-    if importlib.util.find_spec("ziglang") is None:
-        pytest.skip("SKIPPED: the Python package ziglang is not installed (requirements-portable.lock)")
+    require("zig")
     if platform == "aarch64-linux":
-        needs("qemu-aarch64-static")
-        if not ARM_LIBRARIES.is_dir():
-            pytest.skip("SKIPPED: the C library of aarch64 is not installed (libc6-arm64-cross)")
-        return Emulated(platform, ("qemu-aarch64-static", "-L", str(ARM_LIBRARIES)))
+        require("qemu")
+        return Emulated(platform, ("qemu-aarch64-static", "-L", str(require("aarch64 library"))))
     if platform == "win64":
-        needs("wine")
+        require("wine")
         return Emulated(platform, ("wine",))
     return Emulated(platform)
 

@@ -20,12 +20,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from command import Answer, run_script
-from repository_paths import ROOT, TESTS
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import tendonfmu as tf
+from command import Answer, run_script
+from optional_parts import require
+from repository_paths import ROOT, TESTS
 
 EXAMPLE = ROOT / "examples" / "ci_reference_check"
 DESCRIPTION = TESTS / "reference" / "cable_loop.json"
@@ -444,7 +442,7 @@ class Decay(Fmi3Slave):
 @pytest.mark.parametrize(("tool", "source"), [("pythonfmu", DECAY_2), ("pythonfmu3", DECAY_3)])
 def test_the_fmu_of_another_tool_with_its_result(tmp_path: Path, tool: str, source: str) -> None:
     """FMI 2.0 and 3.0, a result as the Reference FMUs have it: Euler's steps, in closed form."""
-    pytest.importorskip(tool, reason=f"SKIPPED: {tool} is not installed (dependency group coupling)")
+    require(tool)
     # a name for each: the FMUs import it into this process
     (tmp_path / f"of_{tool}.py").write_text(source + STEP)
     subprocess.run([sys.executable, "-m", tool, "build", "-f", f"of_{tool}.py"], cwd=tmp_path, check=True)

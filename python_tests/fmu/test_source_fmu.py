@@ -256,8 +256,6 @@ def test_without_a_prefix_all_but_fmi_is_hidden(fingers: list[UnpackedFmu], tmp_
 
 
 def built_by_cmake(fmu: UnpackedFmu, folder: Path, *options: str) -> Path:
-    if shutil.which("cmake") is None:
-        pytest.skip("SKIPPED: cmake is not installed")
     shutil.copytree(fmu.folder, folder)
     run("cmake", "-S", folder / "sources", "-B", folder / "build", *options)
     run("cmake", "--build", folder / "build", "--config", "Release")
@@ -281,8 +279,6 @@ def test_cmake_builds_both_kinds_of_library(fingers: list[UnpackedFmu], tmp_path
 @needs_tools
 @pytest.mark.long
 def test_fmpy_compiles_them(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
-    if shutil.which("cmake") is None:
-        pytest.skip("SKIPPED: fmpy compiles by cmake, which is not installed")
     fmu = fingers[0]
     with zipfile.ZipFile(tmp_path / "finger.fmu", "w") as archive:
         for path in sorted(fmu.folder.rglob("*")):

@@ -5,25 +5,20 @@ It is inside Maestro's program, which `./test --all` fetches: its converter from
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
 
+from optional_parts import MAESTRO, needs
 from plant_rigs import needs_plant
-from repository_paths import ROOT
 
-MAESTRO = ROOT / "build" / "clients" / "maestro-2.3.0-jar-with-dependencies.jar"
 NAME = "described"
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(
-        shutil.which("java") is None or not MAESTRO.exists(),
-        reason="VDMCHECK NOT TESTED: no java, or no Maestro in build/clients",
-    ),
+    needs("java", "maestro"),
 ]
 
 

@@ -9,12 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import tendonfmu as tf
 from command import Call
 from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
-import tendonfmu as tf
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, INDEX = DEMO / "two_joints.json", DEMO / "index_finger_calibrated.json"

@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import tendonfmu as tf
+from repository_paths import ROOT
 from tendonfmu import options
 from tendonfmu.estimate.fitting import FrictionFit
 

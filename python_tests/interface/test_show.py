@@ -13,12 +13,9 @@ import pandas as pd
 import pytest
 
 import diagnosis_examples as examples
+import tendonfmu as tf
 from real_browser import Elements
 from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
-import tendonfmu as tf
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.interface import Diagnosis, diagnosing
 from tendonfmu.report import diagnosis_sheets

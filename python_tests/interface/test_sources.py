@@ -11,11 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from repository_paths import ROOT
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import tendonfmu as tf
+from repository_paths import ROOT
 
 FINGER = ROOT / "examples/demo_recording/two_joints.json"
 RECORDING = ROOT / "examples/demo_recording/two_joints_unseen.parquet"

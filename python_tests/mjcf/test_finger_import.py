@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+from optional_parts import require
+
+require("mujoco")
 
 import mujoco
 

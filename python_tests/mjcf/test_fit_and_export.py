@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+from optional_parts import require
+
+require("mujoco")
 
 from evidence.fit.mujoco_friction import recover
 

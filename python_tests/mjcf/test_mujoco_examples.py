@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+from optional_parts import require
+
+require("mujoco")
 
 from command import Call
 from repository_paths import ROOT

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed (requirements-foreign.lock)")
+from optional_parts import require
+
+require("mujoco")
 
 import mujoco
 from lxml import etree

@@ -271,7 +271,8 @@ def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
 
 
 def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
-    fmpy = pytest.importorskip("fmpy")
+    import fmpy
+
     description, _recording = resting_case(300)
     plain = description | {"contact": {k: v for k, v in description["contact"].items() if k != "rest"}}
     names = {}

@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 
 from fit_finger import made_recording, moved_start, write_recording
+from optional_parts import needs, require
 from repository_paths import ROOT, TESTS
 
 pytestmark = pytest.mark.xdist_group("installed library")  # one worker builds for all of them
@@ -30,7 +31,7 @@ PARTS = {
     "plant": (["tendonfmu_plant.h"], REFUSED),
     "estimation": (["tendonfmu_estimation.h", "tendonfmu_learner.h"], f"{NO_IMAGE}\n{NO_IMAGE}"),
 }
-needs_pkg_config = pytest.mark.skipif(shutil.which("pkg-config") is None, reason="pkg-config is not installed")
+needs_pkg_config = needs("pkg-config")
 
 
 def call(*command: str | Path, env: Mapping[str, str] | None = None) -> str:
@@ -125,7 +126,6 @@ def test_pkg_config(prefix: Path, tmp_path: Path, module: str, source: str, expe
 def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_path: Path) -> None:
     if not has(prefix, "estimation"):
         pytest.skip("SKIPPED: built without the estimation of parameters")
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: the package is built without Eigen")
     from tendonfmu.estimate.fitting import FrictionFit
 
     page = (ROOT / "docs" / "reference" / "commands" / "fit.md").read_text(encoding="utf-8")
@@ -150,8 +150,8 @@ def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_
 def test_kernels_for_one_processor_share_no_function(prefix: Path) -> None:
     """What they define weakly, the linker may give to sources for every processor."""
     archive = prefix / "lib" / "libtendonfmu_estimation.a"
-    if not archive.exists() or shutil.which("nm") is None:
-        pytest.skip("SKIPPED: built without the estimation of parameters, or nm is not there")
+    require("nm")
+    assert archive.exists()
     symbols: dict[str, list[str]] = {}
     for line in call("nm", archive).splitlines():
         if line.endswith(":"):

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from evidence.detection import key_cases, keys
 from evidence.detection.keys import ABSORPTION, FORGETTING, PAPER, Trial
 

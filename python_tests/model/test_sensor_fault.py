@@ -361,7 +361,8 @@ def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
 
 
 def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
-    fmpy = pytest.importorskip("fmpy")
+    import fmpy
+
     names = {}
     for name, data in (("watched", pair()), ("plain", {k: v for k, v in pair().items() if k != "sensor_fault"})):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
@@ -379,7 +380,8 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
 
 def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
     """What contact at rest and the place of contact depend on, with sensors that are watched."""
-    fmpy = pytest.importorskip("fmpy")
+    import fmpy
+
     data = pair()
     joints = len(data["joints"])
     rest = {"travel": 1e-5, "threshold": [0.01] * joints}

@@ -78,8 +78,6 @@ def test_the_snippets_of_fmpy(folder: Path) -> None:
 
 @pytest.mark.long
 def test_fmpy_compiles_the_sources(folder: Path) -> None:
-    if shutil.which("cmake") is None:
-        pytest.skip("SKIPPED: cmake is not installed")
     shutil.move(folder / "cable_loop.fmu", folder / "packed.fmu")
     shell("cp packed.fmu cable_loop.fmu && " + snippets("fmpy", "sh")[1], folder)
     script = ROOT / "examples" / "ci_reference_check" / "check_reference.py"

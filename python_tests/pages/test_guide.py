@@ -13,8 +13,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from plant_rigs import needs_plant
 from repetitions import repeated
 from repository_paths import ROOT
@@ -67,8 +65,6 @@ def follow(name: str, folder: Path) -> None:
 
 @pytest.mark.parametrize("name", repeated(("your_finger", "detect", "in_your_loop", "in_your_simulator", *FITS), 0))
 def test_a_reader_can_follow(name: str, tmp_path: Path) -> None:
-    if name in FITS:
-        pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     follow(name, tmp_path)
 
 

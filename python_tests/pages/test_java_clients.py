@@ -15,24 +15,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from optional_parts import FMI4J, MAESTRO, needs
 from plant_fmu_rig import fmu_rig
 from plant_rigs import needs_plant
 from repository_paths import ROOT, TESTS
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
-CLIENTS = ROOT / "build" / "clients"
-FMI4J, MAESTRO = CLIENTS / "fmi4j", CLIENTS / "maestro-2.3.0-jar-with-dependencies.jar"
 PAGES = ROOT / "docs" / "reference" / "clients"
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 STEPS = 400
 # Java finds the memory of the whole machine, not what is left of it; one core is enough.
 JAVA = ["java", "-Xmx512m", "-XX:ActiveProcessorCount=1"]
-
-
-def needs(path: Path) -> pytest.MarkDecorator:
-    reason = f"{path.name.upper()} NOT TESTED: no java, or no {path}; ./test --all fetches it"
-    return pytest.mark.skipif(shutil.which("java") is None or not path.exists(), reason=reason)
 
 
 def java(folder: Path, *arguments: str) -> None:
@@ -45,7 +37,7 @@ def snippets(page: str, language: str) -> list[str]:
 
 
 @pytest.mark.long
-@needs(FMI4J)
+@needs("java", "fmi4j")
 def test_the_program_of_fmi4j(tmp_path: Path) -> None:
     """The program of the page, against the trace of the independent implementation."""
     from tendonfmu.fmu.packaging import build_fmu
@@ -71,7 +63,7 @@ def test_the_program_of_fmi4j(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @needs_plant
-@needs(MAESTRO)
+@needs("java", "maestro")
 def test_maestro_couples_both_fmus(tmp_path: Path) -> None:
     """Row k of Maestro is step k by hand, to the bit."""
     from tendonfmu.simulate.ssp import build_ssp

@@ -41,9 +41,6 @@ def printed(outputs: list[Any]) -> str:
 
 @pytest.fixture(scope="module")
 def run_notebook() -> Any:
-    pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-    pytest.importorskip("nbclient", reason="SKIPPED: nbclient is not installed")
-    pytest.importorskip("ipykernel", reason="SKIPPED: ipykernel is not installed")
     from run_notebooks import run_notebook
 
     return run_notebook

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 
@@ -39,7 +37,6 @@ def test_figures_2b_and_5_are_those_of_the_formulas(tmp_path: Path, capsys: pyte
 @pytest.mark.long
 def test_the_page_has_the_numbers_of_the_command(tmp_path: Path) -> None:
     """Rounded as on the page: within 3 %."""
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     command = [sys.executable, "-m", "evidence.fit.paper_figures", "-o", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     rows = [line.strip("| ").split(" | ") for line in done.stdout.splitlines()]

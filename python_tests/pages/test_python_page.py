@@ -11,8 +11,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-
 import tendonfmu as tf
 from command import run_script
 from repository_paths import ROOT

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 from tendonfmu.files.tables import read_table

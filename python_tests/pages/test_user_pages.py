@@ -13,8 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from repository_paths import ROOT
 from tendonfmu.files.tables import read_table
 from tendonfmu.model.description import read_finger

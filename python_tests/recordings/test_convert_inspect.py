@@ -10,8 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from command import Call
 from map_cases import VALIDATOR
 from tendonfmu.errors import InputError
@@ -126,7 +124,6 @@ def test_faults_are_listed(call: Call, tmp_path: Path) -> None:
 
 
 def test_joint_states_are_found_by_name(call: Call, tmp_path: Path) -> None:
-    pytest.importorskip("rosbags", reason="SKIPPED: tendonfmu is not installed with its extra logs")
     from evidence.recordings.log_cases import FORMATS, sound, write
 
     write(tmp_path, FORMATS["ROS 2 bag, MCAP"], sound())
@@ -218,7 +215,6 @@ def test_missing_numbers_are_left_to_the_user(call: Call, tmp_path: Path) -> Non
 
 def joint_states(folder: Path, topic: str, names: tuple[str, ...], **more: list[float]) -> dict[str, Line]:
     """A topic of messages like JointState, with names, positions (m) and efforts."""
-    pytest.importorskip("mcap", reason="SKIPPED: tendonfmu is not installed with its extra logs")
     from mcap.writer import Writer
 
     with open(folder / "log.mcap", "wb") as raw:

@@ -14,9 +14,6 @@ import pytest
 
 from command import Call
 from map_cases import LOG, SCHEMA, SMALL, TURNING, VALIDATOR, edited, written
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import units

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
-from repository_paths import ROOT
+from optional_parts import DATA, needs
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import CONVERTERS, converter
 from tendonfmu.recordings.converters.davinci import convert
 from tendonfmu.recordings.recording import read_recording
 
-DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "davinci_tool"
-RECORDINGS = sorted(DATA.glob("Tool_4_Maryland_L_4/*.TXT"))
+TOOLS = DATA / "davinci_tool"
+RECORDINGS = sorted(TOOLS.glob("Tool_4_Maryland_L_4/*.TXT"))
 RADIUS = 0.01
 
 HEADER = "%Used left spindle of tool number 5\n%idxPulse_0=0\n"
@@ -30,9 +27,7 @@ ROWS = [
 ]
 GOOD = HEADER + "\n".join(ROWS) + "\n"
 
-measured = pytest.mark.skipif(
-    not RECORDINGS, reason=f"SKIPPED: no recordings of the da Vinci tool (looked in {DATA.name})"
-)
+measured = needs("davinci data")
 
 
 def written(folder: Path, text: str | bytes) -> Path:

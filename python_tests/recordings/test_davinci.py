@@ -17,15 +17,13 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from optional_parts import DATA, needs
 from repository_paths import ROOT
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 JAW = ROOT / "examples" / "davinci" / "jaw.json"
-DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
 RUNS = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
 
-pytestmark = pytest.mark.skipif(not RUNS.is_dir(), reason=f"SKIPPED: the da Vinci recordings are not in {DATA}")
+pytestmark = needs("davinci data")
 
 LIMIT = 0.025  # N·m
 SLOW = [f"0{load}" for load in range(10)]
@@ -80,7 +78,6 @@ def test_signs_and_units_by_the_error_without_a_friction_model(tmp_path: Path, n
 
 @pytest.mark.long
 def test_numbers_of_the_jaw_are_those_of_the_fit(tmp_path: Path) -> None:
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     fitted = tmp_path / "jaw.json"
     done = subprocess.run(
         [sys.executable, str(JAW.with_name("fit_jaw.py")), "-o", str(fitted)],

@@ -12,13 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("scipy", reason="SKIPPED: scipy is not installed")
-
 from scipy import io
 
 from command import Call
+from optional_parts import DATA, needs
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.model.native import run_recording
@@ -27,11 +24,9 @@ from tendonfmu.recordings.converters.emps import EDGE, MASS, convert
 from tendonfmu.recordings.recording import read_recording
 
 EXAMPLE = ROOT / "examples" / "emps"
-DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data") / "emps"
-MEASURED = [DATA / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
-measured = pytest.mark.skipif(
-    not all(file.is_file() for file in MEASURED), reason=f"SKIPPED: no EMPS files (looked in {DATA})"
-)
+EMPS = DATA / "emps"
+MEASURED = [EMPS / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
+measured = needs("emps data")
 
 RATE = 1000.0
 GAIN = 35.15065
@@ -225,7 +220,6 @@ def test_it_moves_from_the_first_sample_on() -> None:
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Both files by the command, and the symmetric carriage fitted to the one without pulses."""
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
     folder = tmp_path_factory.mktemp("emps")
     files = {file.stem: folder / f"{file.stem}.parquet" for file in MEASURED}
     for file in MEASURED:
@@ -278,8 +272,7 @@ def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[
 @pytest.mark.long
 def test_the_script_finds_the_mass_too() -> None:
     """The rows of its first table: published, published M, all fitted, at 1 kHz, the same decimated."""
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is not installed with its estimation")
-    environment = os.environ | {"TENDONFMU_DATA": str(DATA.parent)}
+    environment = os.environ | {"TENDONFMU_DATA": str(DATA)}
     script = [sys.executable, str(EXAMPLE / "fit_emps.py")]
     done = subprocess.run(script, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr

@@ -8,11 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("h5py", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-pytest.importorskip("mcap_protobuf", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-pytest.importorskip("rosbags", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-
 from evidence.recordings.log_cases import (
     FAULTS,
     FORMATS,

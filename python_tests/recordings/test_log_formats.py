@@ -12,11 +12,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-pytest.importorskip("h5py", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-pytest.importorskip("pint", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-pytest.importorskip("rosbags", reason="SKIPPED: tendonfmu is not installed with its extra logs")
-
 from command import Call
 from evidence.recordings.log_cases import FORMATS, START, TYPE, header, ros_store, sound, truth, write
 from map_cases import LOG, SMALL, VALIDATOR, edited, written

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -15,9 +14,7 @@ import pytest
 
 from command import Call
 from map_cases import TURNING, VALIDATOR, edited, written
-
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
+from optional_parts import DATA, needs
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
@@ -28,7 +25,7 @@ from tendonfmu.recordings.converters.table import convert_table
 
 EXAMPLE = ROOT / "examples" / "one_joint"
 MEASURED = (ROOT / "docs" / "evidence" / "one_joint.md").read_text(encoding="utf-8")
-DATA = Path(os.environ.get("TENDONFMU_DATA", ROOT.parent / "shared" / "data")) / "emps"
+EMPS = DATA / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
 
@@ -226,11 +223,11 @@ def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not DATA.is_dir(), reason="SKIPPED: no EMPS data")
+@needs("emps data")
 def test_the_measured_machine_of_the_page(call: Call, tmp_path: Path) -> None:
     """Its own lines: half against half nothing has changed; 2 N put in by hand are found, to 10 %."""
     script = EXAMPLE / "make_carriage.py"
-    subprocess.run([sys.executable, script, DATA], cwd=tmp_path, check=True)
+    subprocess.run([sys.executable, script, EMPS], cwd=tmp_path, check=True)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for line in MEASURED.splitlines():
         if line.startswith("tendonfmu "):

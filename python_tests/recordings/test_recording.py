@@ -13,8 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.recording import read_recording

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from evidence.recordings import check
 
 

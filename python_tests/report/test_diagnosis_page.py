@@ -18,8 +18,6 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
 from repetitions import repeated

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
 from tendonfmu.drawing.panel import STYLES, Curve, Panel, Sheet
 from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands

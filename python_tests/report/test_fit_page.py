@@ -17,8 +17,6 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from fit_pictures import made_up_picture
 from real_browser import Elements, figures_of, measure, needs_nothing_else, visit
 from repetitions import repeated
@@ -235,7 +233,6 @@ def recording_of(data: dict[str, Any], pretension: float, seed: int) -> dict[str
 @pytest.mark.long
 def test_the_command_writes_it(tmp_path: Path) -> None:
     """A real fit, with the two recordings of figs. 6 and 7: training, and four times the pretension."""
-    pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: tendonfmu is built without the estimation")
     data = finger_of_one_joint()
     (tmp_path / "finger.json").write_text(json.dumps(data), encoding="utf-8")
     for name, pretension in (("train", 10.0), ("x4", 40.0)):

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from command import Call
 from fmu_binary import FINGER
 from real_browser import figures_of, measure, needs_nothing_else

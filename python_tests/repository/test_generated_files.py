@@ -15,8 +15,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
-
 from repository_paths import ROOT
 from tendonfmu.model import native
 from tendonfmu.model.description_numbers import DEFAULTS, RANGES

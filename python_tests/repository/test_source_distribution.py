@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import email
-import importlib.util
 import re
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
+from optional_parts import require
 from repository_paths import ROOT
 
 # One worker packs for all of them.
@@ -29,16 +29,13 @@ SIZE = 7_000_000  # bytes; the built-in recordings are 5.2 million of them
 
 
 def git_files(*patterns: str) -> set[str]:
+    require("git")
     listed = subprocess.run(["git", "ls-files", "-z", *patterns], cwd=ROOT, capture_output=True, text=True, check=False)
-    if listed.returncode:
-        pytest.skip("SKIPPED: not a git checkout")
     return {name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()}
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if importlib.util.find_spec("scikit_build_core") is None:
-        pytest.skip("SKIPPED: scikit-build-core is not installed")
     folder = tmp_path_factory.mktemp("source")
     program = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
     subprocess.run([sys.executable, "-c", program, folder], cwd=ROOT, capture_output=True, check=True)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from optional_parts import require
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 
@@ -76,11 +77,7 @@ def by_hand(example: Any, fmus: tuple[Path, Path]) -> Any:
 
 def run_master(example: Any, name: str, package: Path) -> Any:
     masters: ModuleType = example("ssp_masters")
-    module = {"ecos": "ecospy", "libcosim": "libcosimpy"}[name]
-    try:
-        importlib.import_module(module)
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"{name.upper()} NOT TESTED: {missing}; it wants the package {module} (PyPI)")
+    require(name)
     return masters.run(name, package, example("controller").Task(**SHORTEST))
 
 

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from optional_parts import require
 from plant_fmu_rig import fmu_rig
 from plant_rigs import needs_plant
 from repository_paths import ROOT
@@ -71,10 +72,9 @@ def by_hand(package: Path) -> Table:
 
 
 def run_ecos(package: Path, unpacked: Path) -> Table:
-    try:
-        from ecospy import EcosSimulation
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"ECOS NOT TESTED: {missing}; it wants the packages ecospy (PyPI) and libtbb12")
+    require("ecos")
+    from ecospy import EcosSimulation
+
     rows = []
     with EcosSimulation(ssp_path=str(package), step_size=STEP) as simulation:
         simulation.init()
@@ -86,12 +86,11 @@ def run_ecos(package: Path, unpacked: Path) -> Table:
 
 
 def run_libcosim(package: Path, unpacked: Path) -> Table:
-    try:
-        from libcosimpy.CosimExecution import CosimExecution
-        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-        from libcosimpy.CosimObserver import CosimObserver
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"LIBCOSIM NOT TESTED: {missing}; it wants the package libcosimpy (PyPI)")
+    require("libcosim")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
     log_output_level(CosimLogLevel.FATAL)
     execution = CosimExecution.from_ssp_file(str(unpacked), step_size=round(STEP * 1e9))
     observer = CosimObserver.create_last_value()
@@ -259,15 +258,14 @@ def test_the_scripts_of_the_example(tmp_path: Path) -> None:
 PAGE = (EXAMPLE / "README.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("module", ["fmpy", "ecospy", "libcosimpy"])
-def test_the_snippets_of_the_page(module: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("module", "part"), [("fmpy", None), ("ecospy", "ecos"), ("libcosimpy", "libcosim")])
+def test_the_snippets_of_the_page(
+    module: str, part: str | None, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     snippets = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     (code,) = [code for code in snippets if f"from {module}" in code]
-    if module != "fmpy":
-        try:
-            importlib.import_module(module)
-        except (ImportError, OSError) as missing:
-            pytest.skip(f"{module.upper()} NOT TESTED: {missing}")
+    if part is not None:
+        require(part)
     shutil.copy(package, tmp_path / "finger.ssp")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}

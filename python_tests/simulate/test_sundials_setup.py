@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from optional_parts import needs
 from repetitions import repeated
 from repository_paths import ROOT
 
@@ -217,7 +218,7 @@ def test_set_up_leaves_a_package_that_is_too_old(tmp_path: Path) -> None:
     assert not (tmp_path / "build/sundials/package").exists()
 
 
-@pytest.mark.skipif(sys.platform != "linux" or shutil.which("readelf") is None, reason="SKIPPED: readelf is not there")
+@needs("readelf")
 def test_sundials_is_inside_the_extension_and_stays_there() -> None:
     module = importlib.util.find_spec("tendonfmu._plant")
     if module is None:

@@ -12,6 +12,7 @@ import functools
 import importlib
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,9 @@ import pytest
 from repository_paths import ROOT
 
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")
+RECORDINGS = "../shared beside the repository, or $TENDONFMU_DATA"
+FMI4J = ROOT / "build" / "clients" / "fmi4j"
+MAESTRO = ROOT / "build" / "clients" / "maestro-2.3.0-jar-with-dependencies.jar"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 
 
@@ -44,12 +48,17 @@ def _package(untested: str, name: str, source: str) -> Part:
     return Part(untested, source, find)
 
 
+def _which(name: str) -> str | None:
+    """Return a program that is beside this Python, or on the path."""
+    return shutil.which(name, path=str(Path(sys.executable).parent)) or shutil.which(name)
+
+
 def _program(untested: str, source: str, *names: str) -> Part:
-    return Part(untested, source, lambda: next(filter(None, map(shutil.which, names)), None))
+    return Part(untested, source, lambda: next(filter(None, map(_which, names)), None))
 
 
-def _folder(untested: str, path: Path) -> Part:
-    return Part(untested, str(path), lambda: path if path.is_dir() else None)
+def _file(untested: str, path: Path, source: str) -> Part:
+    return Part(untested, source, lambda: path if path.exists() else None)
 
 
 PARTS = {
@@ -58,29 +67,31 @@ PARTS = {
     "libcosim": _package("our FMUs in libcosim", "libcosimpy", "requirements-coupling.lock"),
     "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "requirements-coupling.lock"),
     "pythonfmu3": _package("FMUs of pythonfmu3", "pythonfmu3", "requirements-coupling.lock"),
-    "fmutool": _program(
-        "our FMUs in containers of the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmucontainer"
-    ),
+    "fmutool": _program("our FMUs in the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmutool"),
     "fmi-sim": _program(
         "our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"
     ),
-    "java": _program("our FMUs in FMI4j and Maestro", "a Java development kit and Maven", "java"),
+    "java": _program("our FMUs in programs in Java", "a Java runtime", "java"),
+    "fmi4j": _file("our FMUs in FMI4j", FMI4J, "./test --all fetches it with Maven"),
+    "maestro": _file("our FMUs in Maestro and VDMCheck", MAESTRO, "./test --all fetches it with Maven"),
     "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
     "knockpy": _package("rivals of the diagnosis", "knockpy", "requirements-diagnosis-peers.lock"),
-    "data": _folder("measured machines", DATA),
-    "davinci data": _folder("the da Vinci tools", DATA / "davinci_tool"),
-    "emps data": _folder("the carriage EMPS", DATA / "emps"),
-    "foreign data": _folder("recordings of foreign fingers", DATA.parent / "foreign"),
+    "davinci data": _file("the da Vinci tools", DATA / "davinci_tool", RECORDINGS),
+    "emps data": _file("the carriage EMPS", DATA / "emps", RECORDINGS),
+    "foreign data": _file("recordings of foreign fingers", DATA.parent / "foreign", RECORDINGS),
     "browser": _program("pages in a browser", "Debian: chromium", *BROWSERS),
     "pkg-config": _program("the libraries as pkg-config offers them", "Debian: pkg-config", "pkg-config"),
     "valgrind": _program("memory as valgrind sees it", "Debian: valgrind", "valgrind"),
     "wine": _program("Windows binaries", "Debian: wine64", "wine64", "wine"),
     "qemu": _program("binaries for aarch64", "Debian: qemu-user-static", "qemu-aarch64-static"),
+    "aarch64 library": _file("binaries for aarch64", Path("/usr/aarch64-linux-gnu"), "Debian: libc6-arm64-cross"),
+    "llvm-nm": _program("symbols of Windows binaries", "Debian: llvm", "llvm-nm"),
     "nm": _program("symbols of the binaries", "Debian: binutils", "nm"),
     "objdump": _program("code of the binaries", "Debian: binutils", "objdump"),
     "readelf": _program("what the binaries need", "Debian: binutils", "readelf"),
-    "git": _program("what git tracks", "Debian: git, and a checkout", "git"),
-    "localedef": _program("locales with a decimal comma", "Debian: locales", "localedef"),
+    "git": Part(
+        "what git tracks", "Debian: git, and a checkout", lambda: (ROOT / ".git").exists() and shutil.which("git")
+    ),
 }
 
 
@@ -95,11 +106,15 @@ def _reason(name: str) -> str:
 
 def require(name: str) -> Any:
     """Return a part; the test, or the module that asks for it, is skipped where it is not there."""
-    if _found(name) is None:
+    if not is_there(name):
         pytest.skip(_reason(name), allow_module_level=True)
     return _found(name)
 
 
+def is_there(name: str) -> bool:
+    return bool(_found(name))
+
+
 def needs(*names: str) -> pytest.MarkDecorator:
-    missing = [name for name in names if _found(name) is None]
+    missing = [name for name in names if not is_there(name)]
     return pytest.mark.skipif(bool(missing), reason="; ".join(map(_reason, missing)))

@@ -6,20 +6,12 @@ import base64
 import html
 import json
 import re
-import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
-
-
-def find_browser() -> str | None:
-    """The first that is installed."""
-    return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 class Elements(HTMLParser):

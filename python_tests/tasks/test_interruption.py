@@ -19,7 +19,6 @@ import pytest
 from repetitions import repeated
 from repository_paths import SUPPORT
 
-pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")
 if os.name != "posix":
     pytest.skip("SKIPPED: signals as POSIX has them", allow_module_level=True)
 

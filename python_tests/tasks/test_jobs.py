@@ -65,7 +65,6 @@ def test_no_job_begins_after_the_time(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_refused_by_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     monkeypatch.setattr(engine, "SECONDS_TO_CONNECT", 1.0)
     with (
         pytest.raises(InputError, match=r"--scheduler tcp://127.0.0.1:1: .*expected the address"),
@@ -77,7 +76,6 @@ def test_a_scheduler_that_is_not_there_is_refused_by_its_address(monkeypatch: py
 def test_a_scheduler_without_workers_and_workers_of_another_version_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     with dask_processes(0) as processes:
         with monkeypatch.context() as patched:
             patched.setattr(engine, "SECONDS_TO_CONNECT", 10.0)
@@ -94,7 +92,6 @@ def test_a_scheduler_without_workers_and_workers_of_another_version_are_refused(
 def test_a_worker_killed_on_the_way_costs_no_row_and_adds_none(tmp_path: Path) -> None:
     """A scheduler and two workers, processes of their own on the loopback. One is killed with a job in its hands: that
     job begins twice and has one row, all others begin once."""
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     log, output, count = tmp_path / "log", tmp_path / "out", 16
     jobs = noting(count, 0.4, log)
     reported: list[tuple[int, int]] = []
@@ -129,7 +126,6 @@ def log_lines(log: Path) -> list[str]:
 @pytest.mark.long
 def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) -> None:
     """Nannies start the workers again; after the fourth death the job is given up, and the others have their rows."""
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     some = [Job(str(k), (k,)) for k in range(3)]
     with workers_of(count=1) as client:
         assert run_jobs(some_jobs.end_its_worker, some, tmp_path, client) == 3
@@ -141,7 +137,6 @@ def test_a_job_that_kills_every_worker_is_an_error_of_its_own(tmp_path: Path) ->
 def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     (tmp_path / "only_here.py").write_text("def nothing():\n    return {}\n", encoding="utf-8")
     with dask_processes(1) as processes, workers_of(processes.address) as client:
         monkeypatch.syspath_prepend(tmp_path)
@@ -152,7 +147,6 @@ def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
 
 
 def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="SKIPPED: dask and distributed are not installed")
     jobs = noting(8, 0.2, tmp_path / "log")
     output = tmp_path / "out"
     with dask_processes(1) as processes, workers_of(processes.address) as client:
