@@ -58,20 +58,15 @@ def product(module: str) -> Any:
 
 
 def run_native(
-    description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
+    description: Mapping[str, Any],
+    recording: Mapping[str, NDArray[Any]],
+    kinematics_source: int,
+    kernel: str | None = None,
 ) -> Outputs:
-    """The batch run of the C interface, through the one module that binds it."""
+    """The batch run of the C interface, through the one module that binds it. kernel: `plain` runs on any machine."""
     finger = product("model.native").Instance.from_description(description, kinematics_source)
-    outputs: Outputs = finger.run(recording, parts=True)
-    return outputs
-
-
-def run_plain_kernel(
-    description: Mapping[str, Any], recording: Mapping[str, NDArray[Any]], kinematics_source: int
-) -> Outputs:
-    """The same on the kernel in plain C, which any machine can run."""
-    finger = product("model.native").Instance.from_description(description, kinematics_source)
-    finger.kernel = "plain"
+    if kernel is not None:
+        finger.kernel = kernel
     outputs: Outputs = finger.run(recording, parts=True)
     return outputs
 
@@ -125,7 +120,7 @@ NATIVE = Runner("native", run_native)
 RUNNERS: list[Runner] = [
     ORACLE,
     NATIVE,
-    Runner("plain_kernel", run_plain_kernel),
+    Runner("plain_kernel", functools.partial(run_native, kernel="plain")),
     Runner("single_steps", run_single_steps),
     # fmi2DoStep has no step of length 0; test_fmu_states.py takes a time twice
     Runner("fmu", run_fmu, repeated_time=False),
