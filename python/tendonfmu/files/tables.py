@@ -115,7 +115,8 @@ def frame_of(columns: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
     """Make a DataFrame."""
     import pandas as pd
 
-    return pd.DataFrame(dict(columns))
+    frame: pd.DataFrame = pd.DataFrame(dict(columns))
+    return frame
 
 
 def table_of_frame(file: Path, frame: pd.DataFrame, check_names: CheckNames, flags: Collection[str] = ()) -> Table:
