@@ -282,6 +282,15 @@ def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pyt
             convert_table(*written(tmp_path, log))
 
 
+def test_a_block_without_a_whole_row_does_not_set_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time counts from the first row that is kept, though blocks before it have none."""
+    monkeypatch.setattr(text_log, "CHUNK", 64)
+    rows = [f"{1774746000 + k},{'' if k < 20 else 1},5" for k in range(40)]
+    wanted = edited(SMALL, "columns/time", {"column": "t", "unit": "epoch_s"}) | {"log": {"missing": "leave out"}}
+    found = convert_table(*written(tmp_path, "\n".join(["t,force,spool", *rows]) + "\n", wanted)).columns
+    assert found["time"] == pytest.approx(np.arange(20), abs=1e-12)
+
+
 def test_mcap_that_is_written_reads_back(call: Call, tmp_path: Path) -> None:
     written(tmp_path)
     answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.mcap")

@@ -140,11 +140,11 @@ def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
 
 
 def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
-    from tendonfmu.recordings import clock_line, field_rows, proposal_rows, time_factor
+    from tendonfmu.recordings import clock_line, field_rows, proposal_rows
 
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in inspection.topics:
-        line = clock_line(topic, time_factor(proposal, topic))
+        line = clock_line(topic, proposal.time_factor)
         print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         inspection_document,
         proposal_rows,
         propose,
-        time_factor,
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps

@@ -272,7 +272,7 @@ def _orders(count: int) -> Iterator[tuple[int, ...]]:
         for i, j, k in combinations(given, 3):
             for one, two, three in ((i, j, k), (i, k, j)):
                 circle = {one: two, two: three, three: one}
-                yield tuple(circle.get(each, each) for each in given)
+                yield tuple(circle.get(place, place) for place in given)
 
 
 def _exchange(groups: Sequence[Sequence[str]], order: Sequence[int]) -> Correction:

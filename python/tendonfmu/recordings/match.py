@@ -74,20 +74,19 @@ def belongs(finger: Finger, recordings: Sequence[Recording], *, unfit: float = U
     list of Finding
         In the order of the recordings, errors of each before its warnings. Empty if nothing was found.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for recording in recordings:
-        of_this = _findings(finger, recording, unfit)
-        found += sorted(of_this, key=lambda finding: finding.severity != "error")
-    return found
+        of_recording = _findings(finger, recording, unfit)
+        findings += sorted(of_recording, key=lambda finding: finding.severity != "error")
+    return findings
 
 
 def admit(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
     """Check recordings before a fit, and refuse those that do not belong to the finger."""
     for recording in recordings:
         check_numbers(recording)
-    return refuse_errors(
-        [each for each in belongs(finger, recordings, unfit=unfit) if each.kind not in LEFT_TO_THE_FIT]
-    )
+    findings = belongs(finger, recordings, unfit=unfit)
+    return refuse_errors([finding for finding in findings if finding.kind not in LEFT_TO_THE_FIT])
 
 
 def refuse_errors(findings: Sequence[Finding]) -> list[str]:
@@ -103,27 +102,29 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
     wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
     if wrong:
         return [text.columns(recording.path, name, recording.groups[name].shape[1], counts) for name in wrong]
-    found = list(_of_clock(recording))
-    clock = next((finding for finding in found if finding.kind == "clock"), None)
+    findings = list(_of_clock(recording))
+    clock = next((finding for finding in findings if finding.kind == "clock"), None)
     unit = clock.entries.get("time", {}).get("scale") if clock else None
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
     kinematic, mended = _of_kinematics(finger, recording, unfit)
-    stands = held_channels(mended, finger)
-    held = [
-        text.held(recording.path, each, "error" if each.share > HALF and each.value != 0.0 else "warning")
-        for each in stands
-    ]
-    dead = any(finding.severity == "error" for finding in held)
-    silent = any(each.share > HALF for each in stands)
-    if not dead:  # no equation holds with a dead sensor
-        found += kinematic
-        mended = _with_velocities(finger, mended, found)
-        found += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
-        if not silent and not any(finding.severity == "error" for finding in found):
-            found += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
-    found += _of_channels(finger, mended, held)
-    return found
+    channels = held_channels(mended, finger)
+    held = []
+    for channel in channels:
+        is_dead = channel.share > HALF and channel.value != 0.0
+        held.append(text.held(recording.path, channel, "error" if is_dead else "warning"))
+    is_silent = any(channel.share > HALF for channel in channels)
+    if not _has_error(held):  # no equation holds with a dead sensor
+        findings += kinematic
+        mended = _with_velocities(finger, mended, findings)
+        findings += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
+        if not is_silent and not _has_error(findings):
+            findings += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
+    return [*findings, *_of_channels(finger, mended, held)]
+
+
+def _has_error(findings: Sequence[Finding]) -> bool:
+    return any(finding.severity == "error" for finding in findings)
 
 
 # --- clock and channels -----------------------------------------------------------------------------------------------
@@ -141,17 +142,17 @@ def _of_clock(recording: Recording) -> Iterator[Finding]:
 def _of_channels(finger: Finger, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
     coarse = list(coarse_channels(recording))
     clipped = list(clipped_channels(recording, finger))
-    steps = {each.column for each in coarse}
-    often = {each.column for each in clipped if each.runs > 1}
-    stands = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in steps | often]
-    if stands or coarse:  # the other channels do not give a reliable position then
-        clipped = [each for each in clipped if each.column.startswith("tendon_force")]
-    yield from stands
-    said = {finding.columns[0] for finding in stands}
-    for each in clipped:
-        if each.column not in said:
-            yield text.clipped(recording.path, each, "error" if each.share > MUCH_CLIPPED else "warning")
-    yield from (text.coarse(recording.path, each) for each in coarse if each.column not in said)
+    # a channel with few steps, or one that clips often, repeats values without a fault of the sensor
+    repeating = {channel.column for channel in coarse} | {channel.column for channel in clipped if channel.runs > 1}
+    stuck = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in repeating]
+    if stuck or coarse:  # the other channels do not give a reliable position then
+        clipped = [channel for channel in clipped if channel.column.startswith("tendon_force")]
+    yield from stuck
+    reported = {finding.columns[0] for finding in stuck}
+    for channel in clipped:
+        if channel.column not in reported:
+            yield text.clipped(recording.path, channel, "error" if channel.share > MUCH_CLIPPED else "warning")
+    yield from (text.coarse(recording.path, channel) for channel in coarse if channel.column not in reported)
 
 
 # --- what the columns say of each other -------------------------------------------------------------------------------
@@ -161,7 +162,7 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
     """Return findings about signs, order and units of columns, and the recording with these corrected."""
     if len(recording) < FEWEST:
         return [], recording
-    found: list[Finding] = []
+    findings: list[Finding] = []
     balance, moves = _balance(finger, recording)
     if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
@@ -170,33 +171,34 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
             return [text.unfit(recording.path, worst, "error" if worst > unfit else "warning", balance)], recording
         if len(done) == 1:
             done = [_likeliest(finger, recording, done[0])]
-        found = [text.repair(recording.path, each) for each in done]
-        for each in done:
-            recording = _mended(recording, each.correction)
+        findings = [text.repair(recording.path, fitting) for fitting in done]
+        for fitting in done:
+            recording = _mended(recording, fitting.correction)
         if left > POOR:
-            found.append(text.unfit(recording.path, left, "warning", balance))
+            findings.append(text.unfit(recording.path, left, "warning", balance))
     turn = np.ptp(tendon_angles(recording, finger), axis=0)
     if turn.max() > TURNS and not is_direct_drive(np.array(finger.moment_arms)):
-        correction = balance.plausible_scale() if not found else None
-        found.append(text.turns(recording.path, turn, finger.joint_names, correction))
+        correction = balance.plausible_scale() if not findings else None
+        findings.append(text.turns(recording.path, turn, finger.joint_names, correction))
         if correction is not None:
             recording = _mended(recording, correction)
-    return found, recording
+    return findings, recording
 
 
-def _likeliest(finger: Finger, recording: Recording, found: Repair) -> Repair:
+def _likeliest(finger: Finger, recording: Recording, repair: Repair) -> Repair:
     """Put first, of corrections that fit the equations equally, the one that fits velocities and friction best."""
-    corrections = [found.correction, *found.alternatives]
+    corrections = [repair.correction, *repair.alternatives]
     if len(corrections) == 1 or len(corrections) > MOST_COMPARED:
-        return found
+        return repair
     contradicted = []
     for correction in corrections:
         mended = _mended(recording, correction)
         share = power_shares(finger, mended)
         braked = 0 if share is None else int((share < 0.0).sum())
         contradicted.append(sum(1 for _ in velocity_corrections(mended, finger)) + braked)
-    best = [each for each, count in zip(corrections, contradicted, strict=True) if count == min(contradicted)]
-    return replace(found, correction=best[0], alternatives=tuple(best[1:]))
+    counts = zip(corrections, contradicted, strict=True)
+    best = [correction for correction, count in counts if count == min(contradicted)]
+    return replace(repair, correction=best[0], alternatives=tuple(best[1:]))
 
 
 def _balance(finger: Finger, recording: Recording) -> tuple[Balance, bool]:
@@ -243,10 +245,10 @@ def _mended(recording: Recording, correction: Correction) -> Recording:
     return replace(recording, groups=groups)
 
 
-def _with_velocities(finger: Finger, recording: Recording, found: list[Finding]) -> Recording:
+def _with_velocities(finger: Finger, recording: Recording, findings: list[Finding]) -> Recording:
     """Add findings about joint velocities, and return the recording with these corrected."""
     for correction, slope in velocity_corrections(recording, finger):
-        found.append(text.velocity(recording.path, correction, slope))
+        findings.append(text.velocity(recording.path, correction, slope))
         recording = _mended(recording, correction)
     return recording
 
@@ -295,7 +297,7 @@ def _turning(finger: Finger, recording: Recording) -> list[Correction]:
     balance, _ = _balance(finger, recording)
     given = np.eye(len(balance.columns))
     most, pushing = max(2 * balance.misfit(given), SAME), balance.pushing(given)
-    found: list[tuple[int, int, Correction]] = []
+    fitting: list[tuple[int, int, Correction]] = []
     for correction in balance.corrections():
         with_it = balance.transform(correction)
         if correction.kind == "scale" or balance.pushing(with_it) > pushing or balance.misfit(with_it) > most:
@@ -303,11 +305,12 @@ def _turning(finger: Finger, recording: Recording) -> list[Correction]:
         mended = _mended(recording, correction)
         share = power_shares(finger, mended)
         if share is not None and share.min() >= 0.0:
-            found.append((sum(1 for _ in _of_reference(finger, mended)), len(correction.columns), correction))
-        if len(found) >= MOST_COMPARED:
+            opposed = sum(1 for _ in _of_reference(finger, mended))
+            fitting.append((opposed, len(correction.columns), correction))
+        if len(fitting) >= MOST_COMPARED:
             break
-    found.sort(key=lambda each: each[:2])
-    return [correction for opposed, _, correction in found if opposed == found[0][0]]
+    fitting.sort(key=lambda rank: rank[:2])
+    return [correction for opposed, _, correction in fitting if opposed == fitting[0][0]]
 
 
 def power_shares(finger: Finger, recording: Recording) -> Numbers | None:

@@ -315,17 +315,17 @@ def read_recordings(
     sources: Sequence[RecordingSource], role: str = "recordings", *, label: str = LABEL, others: Collection[str] = ()
 ) -> list[Recording]:
     """Read and check several recordings; messages name a DataFrame by its place in the list."""
-    found = []
+    recordings = []
     for place, source in enumerate(sources, start=1):
         if is_frame(source):
             name = "DataFrame" if len(sources) == 1 else f"DataFrame {place}"
             name = name if role == "recordings" else f"{role}: {name}"
-            found.append(Recording.from_frame(source, name=name, label=label, others=others))
+            recordings.append(Recording.from_frame(source, name=name, label=label, others=others))
         elif isinstance(source, Recording | str | os.PathLike):
-            found.append(read_recording(source, label=label, others=others))
+            recordings.append(read_recording(source, label=label, others=others))
         else:
             raise InputError(f"{role}[{place}]: {_type_of(source)}")
-    return found
+    return recordings
 
 
 def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list[RecordingSource]:
@@ -358,8 +358,8 @@ def _labelled(recording: Recording, label: str) -> Recording:
 def _of_table(file: Path, table: Table, label: str, others: Collection[str]) -> Recording:
     time = table["time"]
     check_times(file, time)
-    found = table.get(label)
-    contact = None if found is None else _flags(file, label, found)
+    flags = table.get(label)
+    contact = None if flags is None else _flags(file, label, flags)
     groups = {name: np.column_stack(columns) for name, columns in _grouped(table).items()}
     kept = {name: table[name] for name in others if name in table}
     return Recording(file, time, groups, contact, kept, label)
@@ -380,10 +380,10 @@ def _numbers(file: Path, name: str, values: ArrayLike | None, dimensions: int) -
         if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
             row = int(np.argwhere(np.ma.getmaskarray(values))[0][0]) + 1 if np.ndim(values) else 1
             raise ValueError(f"masked in row {row}")
-        found = np.asarray(values)
-        if found.dtype.kind not in "fiub":
-            raise TypeError(f"{found.dtype} values")
-        numbers = found.astype(np.float64, copy=False)
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiub":
+            raise TypeError(f"{array.dtype} values")
+        numbers = array.astype(np.float64, copy=False)
     except (TypeError, ValueError) as refused:
         raise InputError(f"{file}: {name}: {refused}; expected numbers {shape}") from None
     if numbers.ndim != dimensions:
@@ -436,10 +436,10 @@ def _refuse_time_in_index(file: Path, frame: pd.DataFrame) -> None:
 
 def _grouped(table: Mapping[str, NDArray[np.float64]]) -> dict[str, list[NDArray[np.float64]]]:
     """Return the columns of each group, groups in the order of `GROUPS`, columns in that of their index."""
-    found: dict[str, dict[int, NDArray[np.float64]]] = {}
+    columns_of: dict[str, dict[int, NDArray[np.float64]]] = {}
     for name, column in table.items():
         element = element_of(name)
         if element is not None and element[0] in GROUPS:
-            found.setdefault(element[0], {})[element[1]] = column
-    ordered = {name: found[name] for name in GROUPS if name in found}
+            columns_of.setdefault(element[0], {})[element[1]] = column
+    ordered = {name: columns_of[name] for name in GROUPS if name in columns_of}
     return {name: [columns[i] for i in sorted(columns)] for name, columns in ordered.items()}

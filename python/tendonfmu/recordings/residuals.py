@@ -46,12 +46,12 @@ def model_alone(
     slack = np.zeros((samples, tendons), dtype=bool)
     for part, given in zip(parts, arrays, strict=True):
         probe.restore_state(start)
-        found = probe.run(given)
-        bias = found["bias_torque"]
-        torque[part] = found["friction_torque"] - bias - delayed_torque(data, given, found["joint_torque"])
+        outputs = probe.run(given)
+        bias = outputs["bias_torque"]
+        torque[part] = outputs["friction_torque"] - bias - delayed_torque(data, given, outputs["joint_torque"])
         jump[part] = np.diff(bias, axis=0, prepend=bias[:1])
-        angle[part], speed[part] = found["joint_angle"], found["joint_speed"]
-        slack[part] = found["slack"]
+        angle[part], speed[part] = outputs["joint_angle"], outputs["joint_speed"]
+        slack[part] = outputs["slack"]
     return Model(torque, jump, angle, speed, slack)
 
 
@@ -206,7 +206,7 @@ def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str
     # The quantiles of χ²_k follow Wilson and Hilferty (1931). From 30 innovations on they are within 1e-3 of the
     # interval's width.
     # standardised: [N, n]; returns [low, high]
-    values = np.concatenate([each[~np.isnan(each)] for each in standardised])
+    values = np.concatenate([part[~np.isnan(part)] for part in standardised])
     if not len(values):
         return {"mean": math.nan, "interval": [math.nan, math.nan], "consistent": False}
     mean = float(np.mean(values**2))
@@ -227,22 +227,22 @@ def whiteness(standardised: Sequence[Numbers]) -> dict[str, list[float]]:
     joints = standardised[0].shape[1]
     lag_one, p_value = [], []
     for j in range(joints):
-        series = [each[:, j] for each in standardised]
-        power = sum(float(np.nansum(each**2)) for each in series)
-        count = sum(int(np.sum(~np.isnan(each))) for each in series)
+        series = [part[:, j] for part in standardised]
+        power = sum(float(np.nansum(part**2)) for part in series)
+        count = sum(int(np.sum(~np.isnan(part))) for part in series)
         if count <= LAGS + 1 or not power:
             lag_one.append(math.nan)
             p_value.append(math.nan)
             continue
-        found = [_lagged(series, lag) / power for lag in range(1, LAGS + 1)]
-        statistic = count * (count + 2) * sum(r * r / (count - lag) for lag, r in enumerate(found, start=1))
-        lag_one.append(found[0])
+        correlations = [_lagged(series, lag) / power for lag in range(1, LAGS + 1)]
+        statistic = count * (count + 2) * sum(r * r / (count - lag) for lag, r in enumerate(correlations, start=1))
+        lag_one.append(correlations[0])
         p_value.append(chi_square_tail(statistic, LAGS))
     return {"lag_one": lag_one, "ljung_box_p": p_value}
 
 
 def _lagged(series: Sequence[Numbers], lag: int) -> float:
-    return sum(float(np.nansum(each[lag:] * each[:-lag])) for each in series if len(each) > lag)
+    return sum(float(np.nansum(part[lag:] * part[:-lag])) for part in series if len(part) > lag)
 
 
 def chi_square_tail(value: float, degrees: int) -> float:

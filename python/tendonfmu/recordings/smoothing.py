@@ -59,12 +59,12 @@ class Signals:
         )
 
     def _smoothed(self, time: Numbers, values: Numbers) -> Numbers:
-        found = np.array(values, dtype=np.float64)
+        smoothed = np.array(values, dtype=np.float64)
         for begin, end in pairwise([0, *gaps(time), len(time)]):
             if end - begin >= FEWEST:
                 rate = 1.0 / float(np.median(np.diff(time[begin:end])))
-                found[begin:end] = zero_phase(found[begin:end], self.cutoff or 0.0, rate)
-        return found
+                smoothed[begin:end] = zero_phase(smoothed[begin:end], self.cutoff or 0.0, rate)
+        return smoothed
 
     def description(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Return the description for estimating."""
@@ -79,33 +79,33 @@ class Signals:
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         """Return an estimated description with the filter and bias settings of the given one, as it runs online."""
-        found = dict(data)
+        restored = dict(data)
         for key in ("velocity_filter_cutoff", "position_filter", "bias"):
-            found.pop(key, None)
+            restored.pop(key, None)
             if key in given:
-                found[key] = given[key]
+                restored[key] = given[key]
         start = (data.get("bias") or {}).get("initial_torque")
         if start is not None:
-            found["bias"] = {**(found.get("bias") or {}), "initial_torque": start}
-        return found
+            restored["bias"] = {**(restored.get("bias") or {}), "initial_torque": start}
+        return restored
 
 
 def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Signals | None:
     """Choose the smoothing of recordings."""
     arms = moment_arms(data)
-    found, rates = [], []
+    crossings, rates = [], []
     for recording in recordings:
         for begin, end in pairwise([0, *gaps(recording.time), len(recording.time)]):
             if end - begin >= 4 * FEWEST:
                 rate = 1.0 / float(np.median(np.diff(recording.time[begin:end])))
-                found.append(_crossing(recording.groups["tendon_force"][begin:end] @ arms, rate))
+                crossings.append(_crossing(recording.groups["tendon_force"][begin:end] @ arms, rate))
                 rates.append(rate)
-    if not found:
+    if not crossings:
         return None
     rate = min(rates)
     if OF_RATE * rate < LOWEST:
         return None
-    cutoff = float(np.clip(OF_CROSSING * np.median(found), LOWEST, min(HIGHEST, OF_RATE * rate)))
+    cutoff = float(np.clip(OF_CROSSING * np.median(crossings), LOWEST, min(HIGHEST, OF_RATE * rate)))
     return Signals(cutoff, max(1, int(rate / min(SAMPLES_PER_PERIOD * cutoff, max(FAST[0] * cutoff, FAST[1])))))
 
 
@@ -133,7 +133,7 @@ def _kept(time: Numbers, every: int) -> NDArray[np.intp]:
 
 def _any_around(flags: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
     """Return whether [N] any of the samples that a kept sample stands for is set."""
-    found = flags.copy()
+    around = flags.copy()
     for shift in range(1, every):
-        found[:-shift] |= flags[shift:]
-    return np.asarray(found)
+        around[:-shift] |= flags[shift:]
+    return np.asarray(around)

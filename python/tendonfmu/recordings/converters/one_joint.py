@@ -243,15 +243,15 @@ def starting_numbers(columns: dict[str, Numbers], slowest: float) -> dict[str, f
     matrix = np.column_stack(regressors)[moving]
     # normalised columns: for a motion at one speed, where two columns are equal, this gives the smallest numbers
     sizes = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
-    found = np.linalg.lstsq(matrix / sizes, torque[moving], rcond=1e-9)[0] / sizes
-    missed = float(np.sqrt(np.mean((torque[moving] - matrix @ found) ** 2)))
+    coefficients = np.linalg.lstsq(matrix / sizes, torque[moving], rcond=1e-9)[0] / sizes
+    missed = float(np.sqrt(np.mean((torque[moving] - matrix @ coefficients) ** 2)))
     least = LEAST_SHARE * float(np.sqrt(np.mean(torque**2)))
     speed = float(np.sqrt(np.mean(velocity[moving] ** 2)))
     numbers = {
-        "coulomb": max(float(found[0]), least),
-        "viscous": max(float(found[1]), least / speed),
-        "inertia": float(found[3]) if known is None else 0.0,
-        "offset": float(found[2]),
+        "coulomb": max(float(coefficients[0]), least),
+        "viscous": max(float(coefficients[1]), least / speed),
+        "inertia": float(coefficients[3]) if known is None else 0.0,
+        "offset": float(coefficients[2]),
         "missed": max(missed, least),
     }
     return {name: float(f"{value:.6g}") for name, value in numbers.items()}

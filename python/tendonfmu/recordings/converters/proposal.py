@@ -68,6 +68,14 @@ class Proposal:
     orders: list[Order] = field(default_factory=list)  # how tendons and joints are numbered, where there are several
     undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
 
+    @property
+    def time_factor(self) -> float | None:
+        """Factor of the clocks to s, if their unit is known."""
+        unit = next((line.unit for line in self.lines if line.column == "time"), UNDECIDED)
+        if unit in units.STAMPS:
+            return 1e-9 * units.STAMPS[unit]
+        return units.TIME.get(unit)
+
 
 def propose(inspection: Inspection) -> Proposal:
     """Propose a map."""
@@ -276,7 +284,7 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
     return {
         "format": REPORT_FORMAT,
         "log": str(inspection.file),
-        "topics": [_topic(topic, time_factor(proposal, topic)) for topic in inspection.topics],
+        "topics": [_topic(topic, proposal.time_factor) for topic in inspection.topics],
         "proposal": [asdict(line) for line in proposal.lines],
         "orders": [{**asdict(order), "line": order.line()} for order in proposal.orders],
         "undecided": proposal.undecided,
@@ -284,14 +292,6 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
         "map": proposal.document,
         "notes": inspection.notes,
     }
-
-
-def time_factor(proposal: Proposal, topic: TopicSummary) -> float | None:
-    """Return the factor of a topic's clock to s, if the proposal knows its unit."""
-    unit = next((line.unit for line in proposal.lines if line.column == "time"), "?")
-    if unit in units.STAMPS:
-        return 1e-9 * units.STAMPS[unit]
-    return units.TIME.get(unit)
 
 
 def _topic(topic: TopicSummary, factor: float | None) -> dict[str, Any]:

@@ -141,11 +141,11 @@ def _factor_by_pint(name: str, reference: str) -> float | None:
     require_extra("pint", f"unit {name!r}")
     registry = _registry()
     try:
-        found = registry.Quantity(1.0, registry.parse_units(name)).to_root_units()
+        given = registry.Quantity(1.0, registry.parse_units(name)).to_root_units()
     except Exception:  # pint raises errors of its parser and of Python's tokenizer for texts that are no unit
         return None
     wanted = registry.Quantity(1.0, registry.parse_units(reference.replace(".", "*"))).to_root_units()
-    if found.units != wanted.units:
+    if given.units != wanted.units:
         return None
-    value = float(found.magnitude / wanted.magnitude)
+    value = float(given.magnitude / wanted.magnitude)
     return value if math.isfinite(value) and value > 0.0 else None
