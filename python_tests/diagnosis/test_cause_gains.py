@@ -25,7 +25,7 @@ def bench(nominal: list[Any], tests: Any = (), only_sliding: bool = False) -> An
     made = cause_gains._Bench.__new__(cause_gains._Bench)
     made._training = cast("Any", [SimpleNamespace(at=k, held_out=held) for k, held in enumerate(HELD_OUT)])
     made._tests, made.nominal = tests, cast("Any", SimpleNamespace(data=nominal))
-    made._found = cast(
+    made._result = cast(
         "Any", SimpleNamespace(estimation=SimpleNamespace(online=lambda data: data), only_sliding=only_sliding)
     )
     return made
@@ -92,7 +92,7 @@ def test_a_shape_says_which_law_of_a_place_it_is_of(shape: dict[str, float], law
 def in_nominal(data: Any, effect: Accepted) -> bool:
     made = whole._Result.__new__(whole._Result)
     search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
-    made._found = cast("Any", search)
+    made._searched = cast("Any", search)
     return made._is_in_nominal(effect)
 
 

@@ -158,7 +158,7 @@ class _Bench:
         settings: FitSettings,
         seed: int,
     ) -> None:
-        self._given, self._found, self._settings, self._seed = given, result, settings, seed
+        self._given, self._result, self._settings, self._seed = given, result, settings, seed
         self._training, self._tests = training, tests
         self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
@@ -184,7 +184,7 @@ class _Bench:
 
     def fit(self, causes: Sequence[NamedCause]) -> FittedModel:
         """Return the fit that causes are judged by."""
-        return self._fit(causes, self._found.only_sliding)
+        return self._fit(causes, self._result.only_sliding)
 
     def result(self, causes: Sequence[NamedCause]) -> FittedModel:
         """Return the fit that becomes the extended model."""
@@ -196,7 +196,7 @@ class _Bench:
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""
-        return squared_residual(self._found.estimation.online(data), self._training)
+        return squared_residual(self._result.estimation.online(data), self._training)
 
     def is_sound(self, causes: Sequence[NamedCause]) -> bool:
         """Return whether all causes together run better than the nominal model."""
@@ -213,7 +213,7 @@ class _Bench:
         key = frozenset(map(id, accepted)), sliding
         if key not in self._fits:
             fit_to = self._fit_to if sliding else self._everything
-            if accepted and self._found.causes:
+            if accepted and self._result.causes:
                 fit_to = [
                     replace(clean, train=recording.train)
                     for clean, recording in zip(self._predicted, fit_to, strict=True)
@@ -224,8 +224,8 @@ class _Bench:
     @cached_property
     def _predicted(self) -> list[FitRecording]:
         """Return the recordings with the forces that the model of all causes predicts."""
-        extended, estimation = self._found.extended.data, self._found.estimation
-        series = series_of(extended, estimation.recordings, estimation.grid, self._found.out)
+        extended, estimation = self._result.extended.data, self._result.estimation
+        series = series_of(extended, estimation.recordings, estimation.grid, self._result.out)
         return predicted_of(extended, estimation.recordings, estimation.grid, series)
 
     def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
@@ -238,7 +238,7 @@ class _Bench:
 
     def holds(self, model: FittedModel) -> bool:
         """Return whether the model leaves no more of r than the nominal one where neither was fitted."""
-        if self._tests and not self._found.only_sliding:
+        if self._tests and not self._result.only_sliding:
             return True  # `runs_better` has judged the same samples
         judged = self._tests or self._training
         flags = [recording.train if self._tests else recording.held_out for recording in judged]
@@ -253,8 +253,8 @@ class _Bench:
             if self._tests:
                 error = self._unseen.by_stretch(self.online(model))
             else:
-                own = self._found.estimation
-                view = look(model.data, own.recordings, own.grid, own.least, self._found.out, candidates=())
+                own = self._result.estimation
+                view = look(model.data, own.recordings, own.grid, own.least, self._result.out, candidates=())
                 error = view.selection.base
             self._errors[id(model)] = (model, error)
         return self._errors[id(model)][1]
@@ -265,9 +265,9 @@ class _Bench:
         judged = self._tests or [
             replace(recording, train=recording.train | recording.held_out) for recording in self._training
         ]
-        if self._found.only_sliding:
+        if self._result.only_sliding:
             judged = without_stuck(self._given, judged, self._signals)
         return OnlineError(self.online(self.nominal), judged)
 
     def online(self, model: FittedModel) -> dict[str, Any]:
-        return self._found.estimation.online(model.data)
+        return self._result.estimation.online(model.data)

@@ -77,20 +77,20 @@ class Selection:
                 error, by_fold = grams.error(*columns)
                 if error <= (1.0 - hypothesis.least_gain) ** 2 * self.base.sum():
                     judged.append((error, hypothesis, magnitudes, by_fold))
-        self._found = sorted(judged, key=lambda result: result[0])
+        self._results = sorted(judged, key=lambda result: result[0])
         self._known: dict[int, Judged] = {}
 
     def ranked(self) -> list[Judged]:
         """Return the best hypothesis of each effect that lowers the error, the best first."""
         seen: dict[str, int] = {}
-        for k, (error, hypothesis, _, _) in enumerate(self._found):
+        for k, (error, hypothesis, _, _) in enumerate(self._results):
             if error < self.base.sum():
                 seen.setdefault(hypothesis.effect, k)
         return [self._judged(k) for k in seen.values()]
 
     def _judged(self, number: int) -> Judged:
         if number not in self._known:
-            error, hypothesis, magnitudes, by_fold = self._found[number]
+            error, hypothesis, magnitudes, by_fold = self._results[number]
             mix, _, _ = self._beside.with_(hypothesis)
             self._known[number] = Judged(hypothesis, error, self.grams.by_stretch(mix, by_fold), magnitudes)
         return self._known[number]
@@ -118,7 +118,7 @@ class Selection:
     def refined(self, effect: str) -> Judged:
         """Return the best place at the coarsest level, or a finer one if it is certainly better."""
         levels: dict[int, int] = {}
-        for k, (_, hypothesis, _, _) in enumerate(self._found):
+        for k, (_, hypothesis, _, _) in enumerate(self._results):
             if hypothesis.effect == effect:
                 levels.setdefault(hypothesis.level, k)
         places = [self._judged(levels[level]) for level in sorted(levels)]
@@ -134,7 +134,7 @@ class Selection:
         own = judged.hypothesis
         most = judged.error + NEAR * (float(self.base.sum()) - judged.error)
         seen: dict[Key, int] = {}
-        for k, (error, other, _, _) in enumerate(self._found):
+        for k, (error, other, _, _) in enumerate(self._results):
             if (other.effect, other.level) == (own.effect, own.level) and other.key != own.key and error <= most:
                 seen.setdefault(other.key, k)
         return [self._judged(k) for k in seen.values()]

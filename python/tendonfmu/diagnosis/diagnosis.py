@@ -109,13 +109,13 @@ class _Result:
     def __init__(
         self, case: GivenCase, searched: Search, least_gain: float, seed: int, jobs: int, phases: Phases
     ) -> None:
-        self._case, self._found, self._seed, self._phases = case, searched, seed, phases
+        self._case, self._searched, self._seed, self._phases = case, searched, seed, phases
         self._least_gain, self._settings = least_gain, FitSettings(threads=jobs, path=case.finger.path)
         self._series = searched.last.series
 
     def diagnosis(self) -> Diagnosis:
         """Return the diagnosis; its duration is still 0."""
-        searched, case = self._found, self._case
+        searched, case = self._searched, self._case
         with self._phases.start("gain on unseen data"):
             verified = self._verified()
         with self._phases.start("what is left"):
@@ -170,9 +170,9 @@ class _Result:
         )
 
     def _warnings(self, verified: Verified, left: Numbers) -> list[str]:
-        folds = self._found.first.folds
-        warnings = list(self._found.extended.warnings)
-        if self._found.only_sliding:
+        folds = self._searched.first.folds
+        warnings = list(self._searched.extended.warnings)
+        if self._searched.only_sliding:
             warnings.append(self._stuck(verified, left))
         if not folds.enough:
             warnings.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
@@ -186,15 +186,15 @@ class _Result:
 
     def _stuck(self, verified: Verified, left: Numbers) -> str:
         """Say what was done about stuck samples, and what the causes gain in the others."""
-        searched, used = self._found, self._series.used
+        searched, used = self._searched, self._series.used
         sliding, everything = (
-            sum(int(each.train.sum()) for each in seen) for seen in (searched.fitted_to, searched.everything)
+            sum(int(recording.train.sum()) for recording in seen) for seen in (searched.fitted_to, searched.everything)
         )
         fitted = (
             "numbers are fitted, and causes and their gains judged," if verified.fits_sliding else "causes are judged"
         )
         before, after = (
-            1e3 * float(np.sqrt(np.mean(each[used] ** 2))) for each in (self._left(searched.nominal.data), left)
+            1e3 * float(np.sqrt(np.mean(residual[used] ** 2))) for residual in (self._left(searched.nominal.data), left)
         )
         return (
             f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples, in which "
@@ -206,7 +206,7 @@ class _Result:
     # --- gain ---
 
     def _verified(self) -> Verified:
-        searched, case = self._found, self._case
+        searched, case = self._searched, self._case
         tests = case.tests
         unseen = [self._events_in(recording) for recording in tests]
         tests = [without_events(recording, events) for recording, events in zip(tests, unseen, strict=True)]
@@ -215,14 +215,14 @@ class _Result:
         return verify(case.finger, searched, training, tests, self._least_gain, self._settings, self._seed)
 
     def _events_in(self, recording: FitRecording) -> Sequence[Event]:
-        data = self._found.estimation.online(self._found.extended.data)
+        data = self._searched.estimation.online(self._searched.extended.data)
         return events_of(data, [recording], make_grid([recording]), self._seed)[0]
 
     # --- causes ---
 
     def _left(self, data: Mapping[str, Any]) -> Numbers:
         """Return the residual of a model over all recordings that were estimated from, bias removed, N·m [B, n]."""
-        estimation = self._found.estimation
+        estimation = self._searched.estimation
         series = series_of(data, estimation.recordings, estimation.grid)
         return residual_alone(data, replace(series, used=self._series.used))
 
@@ -251,15 +251,15 @@ class _Result:
     # --- what is left, and what to do next ---
 
     def _remainder(self, residual: Numbers) -> Remainder:
-        view = self._found.last
+        view = self._searched.last
         force = [
             segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
-            for segment in self._found.estimation.grid.segments
+            for segment in self._searched.estimation.grid.segments
         ]
         return measure_remainder(view.series, residual, view.splines, force=np.concatenate(force), seed=self._seed)
 
     def _unexplained(self, remainder: Remainder, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
-        searched = self._found
+        searched = self._searched
         looked_at = np.sum(left[self._series.used] ** 2, axis=0)
         if not searched.only_sliding:
             return unexplained_of(remainder, looked_at, looked_at, self._least_gain)
@@ -269,7 +269,7 @@ class _Result:
 
     def _torque(self) -> Numbers:
         """Return the torque to be explained, N·m [B, n]."""
-        estimation = self._found.estimation
+        estimation = self._searched.estimation
         return np.concatenate(
             [
                 segment.mean(estimation.recordings[segment.recording].target[segment.part])
@@ -279,26 +279,26 @@ class _Result:
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""
-        nominal = self._found.nominal.data
+        nominal = self._searched.nominal.data
         rivals = [
             Question(cause.accepted[0], rival)
             for cause in verified.causes
             for rival in [_ordinary(other) for other in cause.alike[:MOST_RIVALS]]
-            if all(self._is_in_nominal(each) for each in (cause.accepted[0], rival))
+            if all(self._is_in_nominal(term) for term in (cause.accepted[0], rival))
         ]
-        known = [*verified.causes, *verified.dropped, *self._found.small]
-        unseen = unseen_effects(self._found.last.selection, verified.causes, known, self._least_gain)
+        known = [*verified.causes, *verified.dropped, *self._searched.small]
+        unseen = unseen_effects(self._searched.last.selection, verified.causes, known, self._least_gain)
         nearest: dict[str, Hypothesis] = {}
         for hidden in unseen:
             if self._is_in_nominal(_ordinary(hidden.hypothesis)):
                 nearest.setdefault(hidden.hypothesis.effect, hidden.hypothesis)
         asked = list(nearest)
         questions = [*rivals, *(Question(_ordinary(nearest[effect])) for effect in asked)]
-        noise = self._left(self._found.extended.data)[self._series.used].std(axis=0)
+        noise = self._left(self._searched.extended.data)[self._series.used].std(axis=0)
         with self._phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(
                 nominal,  # without the causes in question
-                self._found.fitted_to,
+                self._searched.fitted_to,
                 questions,
                 noise=[float(value) for value in noise],
                 seed=self._seed,
@@ -322,12 +322,12 @@ class _Result:
 
     @cached_property
     def _nominal_span(self) -> Span:
-        return span_of(self._found.nominal.data, self._found.fitted_to)
+        return span_of(self._searched.nominal.data, self._searched.fitted_to)
 
     def _is_in_nominal(self, effect: Accepted) -> bool:
         """Return whether the nominal description has the place, and the law there that the effect belongs to."""
-        nominal = self._found.nominal.data
-        if effect.place not in effect.candidate.places(nominal, self._found.fitted_to[0].kinematics):
+        nominal = self._searched.nominal.data
+        if effect.place not in effect.candidate.places(nominal, self._searched.fitted_to[0].kinematics):
             return False
         shapes = effect.candidate.find_shapes(nominal, effect.place, self._nominal_span)
         return any(law_of(shape) == law_of(effect.shape) for shape in shapes)

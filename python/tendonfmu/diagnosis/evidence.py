@@ -51,8 +51,8 @@ def _binned(
         return ()
     order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
     parts = np.array_split(order, bins)
-    before, after = (np.array([each[rows].mean() for rows in parts]) for each in pair)
-    before_std, after_std = (standard_errors(each, parts, series) for each in pair)
+    before, after = (np.array([torque[rows].mean() for rows in parts]) for torque in pair)
+    before_std, after_std = (standard_errors(torque, parts, series) for torque in pair)
     coordinate = np.array([values[rows].mean() for rows in parts])
     return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std),)
 

@@ -188,14 +188,14 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 
 def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
     """Return the causes without those that change a law which only a cause outside of the list would add."""
-    found = []
+    kept = []
     for cause in causes:
         try:
             data = cause.added_to(data)
         except (KeyError, StopIteration, AttributeError):  # the law that the cause would change is missing
             continue
-        found.append(cause)
-    return found
+        kept.append(cause)
+    return kept
 
 
 def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:

@@ -103,7 +103,7 @@ def squared_residual(data: Data, recordings: Sequence[FitRecording], flags: Sequ
     """Return Σ r² over all joints, (N·m)², at the flagged samples [N] of each recording; those trained on if None."""
     chosen = [recording.train for recording in recordings] if flags is None else flags
     left = (residual_of(data, recording)[own] for recording, own in zip(recordings, chosen, strict=True))
-    return float(sum(np.nansum(each**2) for each in left))
+    return float(sum(np.nansum(residual**2) for residual in left))
 
 
 # --- an FMU and the core side by side ---------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ class _Test:
     def squares(self, left: Sequence[Numbers]) -> Numbers:
         """Return block sums [B] of the squared residuals [N, n], over all joints and recordings."""
         return np.concatenate(
-            [block.sums(np.sum(each**2, axis=1)) for block, each in zip(self.blocks, left, strict=True)]
+            [block.sums(np.sum(residual**2, axis=1)) for block, residual in zip(self.blocks, left, strict=True)]
         )
 
     def squares_of(self, data: Data) -> Numbers:

@@ -31,7 +31,7 @@ def predicted_forces(
     spread = np.linalg.pinv(arms)
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-    found = []
+    moved = []
     for number, recording in enumerate(recordings):
         groups = dict(recording.recording.groups)
         force = groups["tendon_force"]
@@ -43,8 +43,8 @@ def predicted_forces(
             # a description with a delay pairs the present position with the force `delay` s later
             change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
             groups["tendon_position"] = groups["tendon_position"] + change
-        found.append(replace(recording, recording=replace(recording.recording, groups=groups)))
-    return found
+        moved.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+    return moved
 
 
 def _delay(data: Mapping[str, Any]) -> float:

@@ -266,7 +266,7 @@ def _of_memory(series: Series, states: _States) -> _Made:
         decays = [side * np.exp(-travel / (scale * stroke)) for scale in TRAVELS]
         yield "travel", _joint(joint), np.stack(decays, axis=1)
         signals = np.stack([side, np.abs(series.velocity[:, joint]) / states.speed[joint]], axis=1)
-        past = np.stack([_filtered(signals, each, series.step, starts) for each in MEMORY], axis=2)
+        past = np.stack([_filtered(signals, memory, series.step, starts) for memory in MEMORY], axis=2)
         yield "memory of direction", _joint(joint), past[:, 0]
         quick = [past[:, 1] * side[:, None], past[:, 1] * moving[:, None]]
         yield "memory of speed", _joint(joint), np.concatenate(quick, axis=1)
@@ -285,7 +285,7 @@ def _of_slides(series: Series, states: _States) -> _Made:
         slip = series.tendon_velocity[:, tendon]
         ratio = np.abs(slip[:, 0]) / states.tendon_speed[tendon]
         signals = np.stack([np.minimum(ratio / 0.2, 1.0), ratio], axis=1)
-        past = np.concatenate([_filtered(signals, each, series.step, starts) for each in MEMORY[2:5]], axis=1)
+        past = np.concatenate([_filtered(signals, memory, series.step, starts) for memory in MEMORY[2:5]], axis=1)
         past -= past.mean(axis=0)
         side = _last_side(slip, np.full(slip.shape[1], MOVING * states.tendon_speed[tendon]), starts)
         columns = [past * (load * side[:, joint])[:, None] for joint in range(slip.shape[1])]
@@ -298,7 +298,7 @@ def _of_time(series: Series, states: _States) -> _Made:
     curve = _spline(since, 4)
     for joint in range(series.velocity.shape[1]):
         ratio = series.velocity[:, joint] / states.speed[joint]
-        moved = [curve * each[:, None] for each in (states.side[:, joint], states.moving[:, joint], ratio)]
+        moved = [curve * factor[:, None] for factor in (states.side[:, joint], states.moving[:, joint], ratio)]
         yield "time", _joint(joint), np.concatenate(moved, axis=1)
 
 
@@ -327,7 +327,7 @@ def _interactions(series: Series, states: _States, rng: np.random.Generator) -> 
     """Return random waves of two or three states at a time, half of them with the sign of a motion."""
     starts = run_starts(series.segment)
     ratio = series.velocity / states.speed
-    recent = [_filtered(states.side, each, series.step, starts) for each in (0.3, 3.0)]
+    recent = [_filtered(states.side, memory, series.step, starts) for memory in (0.3, 3.0)]
     table = np.concatenate(
         [series.angle, np.sign(ratio) * np.sqrt(np.abs(ratio)), series.force, np.abs(series.travel), *recent], axis=1
     )

@@ -51,8 +51,8 @@ class Learner:
         self.columns = np.arange(table.shape[1])
         own = [folds.fold == number for number in range(folds.folds)]
         self._rows = own
-        self._gram = [(self._table[each].T @ self._table[each]).astype(np.float64) for each in own]
-        self._score = [self._table[each].T.astype(np.float64) @ self.target[each] for each in own]
+        self._gram = [(self._table[rows].T @ self._table[rows]).astype(np.float64) for rows in own]
+        self._score = [self._table[rows].T.astype(np.float64) @ self.target[rows] for rows in own]
 
     def predicted(self, columns: Indices) -> Numbers:
         """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""

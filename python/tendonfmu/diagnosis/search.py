@@ -138,14 +138,14 @@ def _searched(
     own, predicted = _without_blocks(alone.estimation, out)
     rounds = _Rounds(own, out, OnlineError(own.online(own.nominal.data), alone.measured), least_gain)
     rounds.run(step)
-    found = _Searched(rounds, own, predicted)
+    sliding = _Searched(rounds, own, predicted)
 
     def error(data: Mapping[str, Any]) -> float:
         return online.square(chosen.online(data))
 
-    is_better = alone.is_better(found.model, whole.model)
-    runs = is_better and error(settled(found.model.data, error)) < RUNS**2 * error(whole.model.data)
-    return found if runs else whole
+    is_better = alone.is_better(sliding.model, whole.model)
+    runs = is_better and error(settled(sliding.model.data, error)) < RUNS**2 * error(whole.model.data)
+    return sliding if runs else whole
 
 
 def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:

@@ -113,11 +113,11 @@ def _wave(text: str) -> Callable[[Numbers], str]:
 def _with(words: Callable[[Numbers], str], name: str, more: str) -> Callable[[Numbers], str]:
     """Return a function that adds `more` to the words if the mechanism's number is given and not the default."""
 
-    def found(numbers: Numbers) -> str:
+    def with_more(numbers: Numbers) -> str:
         value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
         return words(numbers) + ("" if value == LEFT_OUT[name] else more.format(f"{value:.3g}".replace("-", "−")))
 
-    return found
+    return with_more
 
 
 def _correction(what: str) -> Callable[[Numbers], str]:

@@ -20,7 +20,7 @@ def unexplained_of(left: Remainder, looked_at: Numbers, everything: Numbers, lea
     share = float(shares @ everything) / whole if whole > 0.0 else 0.0
     square = float(left.square.sum()) * (whole / float(looked_at.sum()) if looked_at.any() else 1.0)
     half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0.0 else 0.0
-    gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(each, 1.0))) for each in (share, share - half, share + half)))
+    gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(end, 1.0))) for end in (share, share - half, share + half)))
     unknown = left.unknown and gain.value >= least_gain and gain.low > 0.0
     description = left.description if unknown else ""
     return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)

@@ -236,7 +236,7 @@ class _Changes:
             nominal=gain.nominal,
             extended=gain.extended,
             bias_only_rms=gain.bias_only_rms,
-            noise_floor=tuple(float(each) for each in np.minimum(self._floor(), gain.extended.test_rms)),
+            noise_floor=tuple(float(value) for value in np.minimum(self._floor(), gain.extended.test_rms)),
             floor_source="what remains on unseen stretches without the errors that both recordings share",
             gain=gain.value,
             steps=gain.steps,
@@ -299,7 +299,7 @@ class _Changes:
         apart = float(level[is_now, worst].mean() - level[~is_now, worst].mean())
         beyond = apart > SPREAD * float(level[~is_now, worst].std())
         unknown = bool(worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL and beyond)
-        share = tuple(float(1.0 - (1.0 - each) ** 2) if unknown else 0.0 for each in worse)
+        share = tuple(float(1.0 - (1.0 - share) ** 2) if unknown else 0.0 for share in worse)
         gain = Interval(0.0, 0.0, 0.0)
         if unknown:
             spread = float(np.sqrt(sum(np.var(level[s, worst], ddof=1) / s.sum() for s in (is_now, ~is_now))))

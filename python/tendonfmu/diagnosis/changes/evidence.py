@@ -52,7 +52,7 @@ def _binned(
     inside = then & (values >= low) & (values <= high)
     theirs = [np.flatnonzero(inside & (member == member[part[0]])) for part in parts]
     before, after = (left + added)[:, joint], left[:, joint]
-    means = [_means(each, parts, search) for each in (before, after)]
+    means = [_means(torque, parts, search) for torque in (before, after)]
     return (
         Evidence(
             joint + 1,

@@ -254,15 +254,15 @@ def _line(
     sizes: Sequence[dict[str, Any]],
     times: Sequence[float],
 ) -> Line:
-    found, when = [], []
+    listed, when = [], []
     for recording, cause, row, time in zip(recordings, causes, sizes, times, strict=True):
         entry = json.loads(row.get("sizes") or "{}").get(key)
         if entry is not None:
             gain = float(json.loads(cause.get("gains") or "{}").get(key, 0.0))
-            found.append(Size(recording, _read(entry), gain > 0.0, gain))
+            listed.append(Size(recording, _read(entry), gain > 0.0, gain))
             when.append(time)
-    trend = slope(np.array(when), [each.size.now for each in found]) if len(found) >= FEWEST else None
-    return Line(Where(*json.loads(key)), title, tuple(found), trend, _since(found))
+    trend = slope(np.array(when), [size.size.now for size in listed]) if len(listed) >= FEWEST else None
+    return Line(Where(*json.loads(key)), title, tuple(listed), trend, _since(listed))
 
 
 def _since(sizes: Sequence[Size]) -> str | None:

@@ -55,7 +55,7 @@ class _Side:
         return _Side(
             level,
             float(own.std()),
-            max(abs(each - level) for each in by_recording),
+            max(abs(other - level) for other in by_recording),
             np.asarray(sums[0] / counts, dtype=np.float64),
             np.asarray(sums[1], dtype=np.float64),
             counts,

@@ -274,7 +274,7 @@ class ChangeSearch:
     def new_recordings(self) -> list[int]:
         """Numbers of the new recordings that are learned from."""
         learned = self.sides.now & ~self.sides.test
-        return [int(each) for each in np.unique(self.series.recording[learned])]
+        return [int(number) for number in np.unique(self.series.recording[learned])]
 
     def left(self) -> Numbers:
         """Return what is left with all changes and without what both share, N·m [B, n]; 0 where nothing is used."""
@@ -304,7 +304,7 @@ class ChangeSearch:
             for new_recording in self.new_recordings
         }
         kept = [change for k, change in enumerate(self.changes) if k != number]
-        shared = [self._values @ self._together(kept), *(of[each] for each in of if each != only)]
+        shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
         nominal = np.concatenate([self._shared, *shared], axis=2)
         products = Products(self.folds, nominal, of[only], self._splines)
         scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
@@ -356,7 +356,7 @@ class ChangeSearch:
         segments = tuple(segment for segment in self._grid.segments if segment.recording in self._new)
         rows = np.concatenate([np.arange(segment.blocks.start, segment.blocks.stop) for segment in segments])
         part = replace(self._grid, segments=segments)
-        after, before = (block_prediction(each, self._recordings, part) for each in (self.now_data(), self.data))
+        after, before = (block_prediction(data, self._recordings, part) for data in (self.now_data(), self.data))
         moved[rows] = after - before
         return moved
 
@@ -399,7 +399,7 @@ class ChangeSearch:
         energy, scores = grams.scores(mix, by_fold)
         inverse = np.linalg.pinv(energy, hermitian=True)
         score = energy @ magnitudes
-        spreads = [each.T @ each for each in (scores, _in_twos(scores))]
+        spreads = [values.T @ values for values in (scores, _in_twos(scores))]
         squares = [float(score @ np.linalg.pinv(spread, hermitian=True) @ score) for spread in spreads]
         least = int(np.argmin(squares))
         stretches, size = scores.shape

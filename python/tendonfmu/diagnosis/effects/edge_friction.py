@@ -34,7 +34,7 @@ def _places(data: Data, kinematics: int) -> list[Place]:
 def _shapes(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
     if place not in _edges(data):
         return [{}]
-    low, high = (float(each) for each in span.angle[(place.joint or 2) - 2])
+    low, high = (float(end) for end in span.angle[(place.joint or 2) - 2])
     if not high - low > _NARROW or max(abs(low), abs(high)) > _FARTHEST:
         return []
     return [dict(zip(_ANGLES, np.linspace(low, high, 3).tolist(), strict=True))]
