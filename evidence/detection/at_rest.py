@@ -71,7 +71,7 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
     below, forced = ([row for row in rows if row[key]] for key in ("below", "forced"))
     both = [row for row in below if row["forced"]]
     counts = [tables.count(row["found"] for row in own) for own in (below, both, forced)]
-    delay = tables.median((row["delay"] for row in rows), ".0f", 1e3)
+    delay = tables.median((row.get("delay") for row in rows), ".0f", 1e3)
     tail = np.nanmean(tables.column(rows, "tail"))
     cells = [f"{60 * rule.hours:.1f}", rule.rests, f"{minutes:.1f}", alarms, sum(row["before"] for row in rows)]
     return [*cells, *counts, delay, f"{100 * tail:.0f}"]

@@ -84,7 +84,10 @@ class Counts:
     foreign: int = 1  # times this many of each plan
 
 
-def planned(seed: int, counts: Counts = Counts(), options: Options = Options()) -> list[Case]:  # noqa: B008
+WHOLE, USUAL = Counts(), Options()
+
+
+def planned(seed: int, counts: Counts = WHOLE, options: Options = USUAL) -> list[Case]:
     """All cases, each kind in random order and spread evenly over the whole."""
     foreign = counts.foreign
     kinds = [
@@ -121,9 +124,8 @@ def _matched(
 
 def _nulls(count: int, seed: int, options: Options) -> Iterator[Case]:
     for k in range(count):
-        yield _matched(
-            f"null_{k}", "null", makers.null, seed + k, replace(options, wander=3.0 if k % 2 else 1.0)
-        )  # fmt: skip
+        wander = 3.0 if k % 2 else 1.0
+        yield _matched(f"null_{k}", "null", makers.null, seed + k, replace(options, wander=wander))
 
 
 def _singles(counts: Counts, seed: int, options: Options) -> Iterator[Case]:

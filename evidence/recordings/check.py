@@ -82,7 +82,7 @@ def checked(module: str, number: int) -> Row:
     rows = [row for part in PARTS for row in check_clean(f"{case.name}_{part}", case.nominal, getattr(case, part))]
     finger = described(case.nominal)
     suited = (corruption for corruption in corruptions() if applicable(case.test, corruption))
-    return {"rows": rows + [check_corrupted(f"{case.name}_test", finger, case.test, each) for each in suited]}
+    return {"rows": rows + [check_corrupted(case.name, finger, case.test, each) for each in suited]}
 
 
 # --- judgement --------------------------------------------------------------------------------------------------------
