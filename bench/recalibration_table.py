@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from recalibration import EVEN, PLANTED, Outcome, SampleCount, campaign, sample_counts, ways
-from tendonfmu.estimate.previous_fit import CHANGE
+from tendonfmu.options import FitOptions
 
 LIMIT = 1.05  # of the error before
 
@@ -66,7 +66,7 @@ def by_samples(found: Sequence[SampleCount]) -> Iterator[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--change", type=float, nargs="*", default=[CHANGE])
+    parser.add_argument("--change", type=float, nargs="*", default=[FitOptions().change])
     found = campaign(ways(parser.parse_args().change))
     print("\n".join(rows(found)), end="\n\n")
     print("\n".join(by_run(found)), end="\n\n")

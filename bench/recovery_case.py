@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
-from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.excitation import Excitation, Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
 from tendonfmu.model import native
 from tendonfmu.model.balance import balanced_forces, moment_arms

@@ -1,4 +1,4 @@
-"""Types of arrays; shape and unit stand where a name is declared."""
+"""Types of arrays, whose shape and unit stand where a name is declared, and the numbers of a file from them."""
 
 from __future__ import annotations
 
@@ -13,3 +13,8 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 Array = NDArray[Any]
 Data = Mapping[str, Any]  # parsed JSON
+
+
+def rounded(values: Numbers, digits: int) -> list[float]:
+    """Round numbers to significant digits, as a description holds them."""
+    return [float(f"{value:.{digits}g}") for value in values]

@@ -20,11 +20,10 @@ from command import Call, DemoRun
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.files import write_calibration
-from tendonfmu.calibrate.fit import fit_all
-from tendonfmu.calibrate.parts import DIAGNOSED, JUDGED, stretches_for_diagnosis
+from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, rms_of
 from tendonfmu.calibrate.text import size_rows, verdict
-from tendonfmu.cli.several_values import several_values
+from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described

@@ -21,7 +21,7 @@ import tendonfmu
 from command import Call
 from fmu_binary import FINGER
 from tendonfmu.cli.console import reader_may_leave
-from tendonfmu.cli.fault_report import write_fault_report
+from tendonfmu.cli.program import write_fault_report
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native

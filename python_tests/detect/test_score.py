@@ -21,8 +21,7 @@ pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not insta
 from command import Answer, Call
 from repository_paths import ROOT
 from tendonfmu.cli import main
-from tendonfmu.detect.run import read_subject, residual_of, run_track, scaled_detection
-from tendonfmu.detect.scoring import score_recordings
+from tendonfmu.detect.scoring import read_subject, residual_of, run_track, scaled_detection, score_recordings
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording

@@ -21,7 +21,7 @@ pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eige
 import diagnosis_examples as examples
 from command import Call
 from repository_paths import ROOT, TESTS
-from tendonfmu.cli.several_values import several_values
+from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.effects import CANDIDATES
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.errors import InputError, InternalError

@@ -12,8 +12,7 @@ import pytest
 from excite_fingers import INDEX, SMALL, SMALL_RANGES
 from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities, unknowns
 from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.excite.excitation import Plan, plan_excitation
-from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.excitation import Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.model import native
 from tendonfmu.model.balance import balanced_forces

@@ -17,9 +17,9 @@ from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.files import read_previous_fit
 from tendonfmu.estimate.fit_report import report_text
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
-from tendonfmu.estimate.previous_fit import read_previous_fit
 from tendonfmu.recordings.recording import Recording
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")

@@ -14,12 +14,10 @@ from scipy.interpolate import BPoly
 from command import Call
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.coverage import EffectCoverage, coverage_of, durations
 from tendonfmu.estimate.fisher_information import unknowns
-from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, plan_excitation
-from tendonfmu.excite.joint_coverage import joint_coverage
-from tendonfmu.excite.tension_plan import Variation
-from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, read_subject
+from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, durations
+from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, Variation, plan_excitation
+from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, joint_coverage, read_subject
 from tendonfmu.files.tables import read_table
 from tendonfmu.model import native
 from tendonfmu.model.balance import balanced_forces, moment_arms, pretension_vector

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,35 +15,9 @@ from repository_paths import ROOT
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 import tendonfmu as tf
-from tendonfmu.cli import build, detect, diagnose, fit, run
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, INDEX = DEMO / "two_joints.json", DEMO / "index_finger_calibrated.json"
-# what a command writes, and how it shows progress
-OF_COMMANDS = {"output", "report", "figures", "progress", "as_json", "quiet"}
-COMMANDS: dict[str, tuple[Callable[..., Any], Callable[..., Any], set[str]]] = {
-    "build": (build.build, tf.build, set()),
-    "run": (run.run, tf.run, set()),
-    "fit": (fit.fit, tf.fit, {"ssv"}),  # FitResult.write writes it
-    "tune": (detect.tune, tf.tune, set()),
-    "score": (detect.score, tf.score, set()),
-    "diagnose": (diagnose.diagnose, tf.diagnose, {"history", "scheduler"}),
-}
-# what a function takes in place of a command's None
-EMPTY = {"compare", "only", "fix", "share", "scale", "ssv", "test"}
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_options_have_the_names_and_defaults_of_the_command(name: str) -> None:
-    command, function, others = COMMANDS[name]
-
-    def options(of: Callable[..., Any]) -> dict[str, Any]:
-        found = inspect.signature(of).parameters.values()
-        return {each.name: each.default for each in found if each.default is not inspect.Parameter.empty}
-
-    expected = {key: value for key, value in options(command).items() if key not in OF_COMMANDS | others}
-    expected |= dict.fromkeys(EMPTY & set(expected), ())
-    assert {key: value for key, value in options(function).items() if key != "progress"} == expected
 
 
 @pytest.fixture(scope="module")

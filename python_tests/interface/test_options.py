@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import inspect
 import math
-import types
-import typing
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,20 +16,33 @@ from repository_paths import ROOT
 pytest.importorskip("tendonfmu._native", reason="SKIPPED: tendonfmu is not installed")
 
 import tendonfmu as tf
-from tendonfmu.cli import build, detect, diagnose, fit, run
-from tendonfmu.interface.options import OPTIONS, Kind, Number, Paths, Texts, read_option
+from tendonfmu import options
+from tendonfmu.estimate.fitting import FrictionFit
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, RECORDING = DEMO / "two_joints.json", DEMO / "two_joints_training.parquet"
-COMMANDS: list[tuple[Callable[..., Any], Callable[..., Any]]] = [
-    (build.build, tf.build),
-    (run.run, tf.run),
-    (fit.fit, tf.fit),
-    (detect.tune, tf.tune),
-    (detect.score, tf.score),
-    (diagnose.diagnose, tf.diagnose),
+FUNCTIONS: list[tuple[Callable[..., Any], type[options.Options]]] = [
+    (tf.build, options.BuildOptions),
+    (tf.run, options.RunOptions),
+    (tf.fit, options.FitOptions),
+    (tf.tune, options.TuneOptions),
+    (tf.score, options.ScoreOptions),
+    (tf.diagnose, options.DiagnoseOptions),
 ]
-SOURCES = {"test", "reference", "compare"}
+OTHERS = {"compare", "progress", "reference", "test"}  # recordings, and a function
+
+
+@pytest.mark.parametrize(("function", "of_command"), FUNCTIONS)
+def test_a_function_has_the_options_of_its_command(
+    function: Callable[..., Any], of_command: type[options.Options]
+) -> None:
+    """Its signature is written out for editors and type checkers; the command line is made from the class."""
+    signature = {
+        name: parameter.default
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name not in OTHERS
+    }
+    assert signature == of_command.defaults()
 
 
 @pytest.mark.parametrize(
@@ -46,7 +57,9 @@ SOURCES = {"test", "reference", "compare"}
         (tf.fit, {"fix": ["a", 3]}, "fix: ['a', 3]; expected a text or a list of texts"),
         (tf.fit, {"previous": 3}, "previous: 3; expected a path or None"),
         (tf.fit, {"asymmetric": "yes"}, "asymmetric: 'yes'; expected True, False or None"),
-        (tf.fit, {"method": 3}, "method: 3; expected a text"),
+        (tf.fit, {"method": 3}, "method: 3; expected batch or ekf"),
+        (FrictionFit, {"sides": "both"}, "sides: 'both'; expected given, symmetric, asymmetric"),
+        (FrictionFit, {"parameter_drift": 2.0}, "drift: 2.0; expected a number, 0 to 1"),
         (tf.fit, {"progress": True}, "progress: True; expected a function or None"),
         (tf.tune, {"confidence": "a"}, "confidence: 'a'; expected a number, 0.5 to 0.9999"),
         (tf.tune, {"strict": 1}, "strict: 1; expected True or False"),
@@ -62,8 +75,9 @@ SOURCES = {"test", "reference", "compare"}
 def test_a_value_that_an_option_cannot_have(
     function: Callable[..., Any], options: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
+    sources = {tf.build: [tmp_path / "f.fmu"], FrictionFit: []}.get(function, [RECORDING])
     with pytest.raises(tf.InputError) as refused:
-        function(FINGER, tmp_path / "f.fmu" if function is tf.build else RECORDING, **options)
+        function(FINGER, *sources, **options)
     assert str(refused.value) == words
 
 
@@ -78,31 +92,8 @@ def test_a_name_that_is_no_option_is_an_error_of_the_call() -> None:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    found = read_option("holdout", np.float32(0.5)), read_option("jobs", np.int64(2)), read_option("strict", np.True_)
-    assert found == (0.5, 2, True) and [type(each) for each in found] == [float, int, bool]
-    assert read_option("holdout", 0) == 0.0
-    assert read_option("only", "joints[1].*") == ["joints[1].*"]
-
-
-@pytest.mark.parametrize(("command", "function"), COMMANDS)
-def test_types_and_ranges_are_those_of_the_command(command: Callable[..., Any], function: Callable[..., Any]) -> None:
-    hints = typing.get_type_hints(command, include_extras=True)
-    checked = set()
-    for name, parameter in inspect.signature(function).parameters.items():
-        if parameter.kind is not inspect.Parameter.KEYWORD_ONLY or name in SOURCES | {"progress"}:
-            continue
-        option, (hint, typed) = OPTIONS[name], typing.get_args(hints[name])[:2]
-        inner = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-        kind = next(each for each in inner if each is not type(None))
-        if isinstance(option, Number):
-            assert (kind is int) == option.whole and kind in (int, float)
-            assert (option.least, option.most) == (typed.min, math.inf if typed.max is None else typed.max)
-            assert option.optional == (type(None) in inner)
-        elif isinstance(option, Texts):
-            assert kind == list[str]
-        elif isinstance(option, Paths):
-            assert kind == list[Path]
-        else:
-            assert isinstance(option, Kind) and kind in (*option.types, Path)
-        checked.add(name)
-    assert checked
+    fit = options.FitOptions(holdout=np.float32(0.5), uncertainty=np.True_, only="joints[1].*")  # type: ignore[arg-type]
+    diagnose = options.DiagnoseOptions(jobs=np.int64(2))  # type: ignore[arg-type]
+    values = fit.holdout, diagnose.jobs, fit.uncertainty, fit.only, options.FitOptions(holdout=0).holdout
+    assert values == (0.5, 2, True, ["joints[1].*"], 0.0)
+    assert [type(value) for value in values] == [float, int, bool, list, float]

@@ -17,8 +17,7 @@ from fit_pictures import index_finger, internal_values, made_up_picture, made_up
 from tendonfmu.drawing.panel_data import Curve, MatrixPanel, Panel, Sheet
 from tendonfmu.drawing.panel_styles import STYLES, size_of
 from tendonfmu.drawing.panels import draw_panel, png, write_sheet
-from tendonfmu.estimate.laws import CONFIDENCE, LawBands
-from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import native
 from tendonfmu.model.friction_places import Effect, effects
 from tendonfmu.report import fit_law_figures

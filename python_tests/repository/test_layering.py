@@ -54,22 +54,18 @@ ONLY = {
 }
 COMMANDS = {
     "cli/program.py",
-    "cli/build.py",
     "cli/calibrate.py",
     "cli/campaign.py",
     "cli/check.py",
+    "cli/command.py",
     "cli/convert.py",
     "cli/demo.py",
-    "cli/describe.py",
     "cli/detect.py",
     "cli/diagnose.py",
     "cli/excite.py",
     "cli/fit.py",
     "cli/import_mjcf.py",
-    "cli/options.py",
     "cli/run.py",
-    "cli/simulate.py",
-    "cli/several_values.py",
 }  # what a user may call
 # those that draw, and what they share
 DRAWING = {

@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import text
-    from .calibration import DIAGNOSIS, Calibration, Options, calibrate
+    from .calibration import DIAGNOSIS, Calibration, calibrate
     from .files import PAGE, REPORT, check_folder, write_calibration
     from .report import rms_of
 

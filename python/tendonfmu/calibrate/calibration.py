@@ -21,16 +21,16 @@ from time import perf_counter
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all
-from tendonfmu.calibrate.parts import stretches_for_diagnosis
+from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of, record_next, recording_of, rms_of, structure_of, tuning_of
-from tendonfmu.detect import ContactTuning, TuneWarning, by_size, require_no_contact, score_recordings
+from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once, check_unseen, described
 from tendonfmu.files import finite, write_text
 from tendonfmu.model import Finger, description_text, read_finger
+from tendonfmu.options import CalibrateOptions, ScoreOptions
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
@@ -44,6 +44,8 @@ from tendonfmu.recordings import (
 from tendonfmu.report import diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
+Options = CalibrateOptions  # its name in earlier versions
+USUAL = CalibrateOptions()
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
 HELD = Held(0.2, 10.0)  # part of the recordings to measure the errors on if there are no tests
@@ -75,26 +77,14 @@ class Calibration:
     diagnosis: Diagnosis | None
 
 
-@dataclass(frozen=True)
-class Options:
-    """Options of `calibrate`."""
+def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
+    """Return the options that affect the thresholds only."""
+    return {"false_alarms_per_hour": options.false_alarms_per_hour, "confidence": options.confidence}
 
-    kinematics: int = 1  # 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities
-    # highest rate of false alarms (1/h), and the probability that it is not exceeded
-    false_alarms_per_hour: float = 6.0
-    confidence: float = 0.9
-    seed: int = 0  # seed of the random numbers
-    jobs: int = 1  # processor cores to use; no effect on the result
 
-    @property
-    def of_alarms(self) -> dict[str, float]:
-        """The options that affect the thresholds only."""
-        return {"false_alarms_per_hour": self.false_alarms_per_hour, "confidence": self.confidence}
-
-    @property
-    def of_all(self) -> dict[str, int]:
-        """The options that affect all results."""
-        return {"kinematics": self.kinematics, "seed": self.seed}
+def _of_all(options: CalibrateOptions) -> dict[str, int]:
+    """Return the options that affect all results."""
+    return {"kinematics": options.kinematics, "seed": options.seed}
 
 
 def calibrate(
@@ -105,7 +95,7 @@ def calibrate(
     tests: Sequence[Path | str] = (),
     pushes: Sequence[Path | str] = (),
     previous: Path | str | None = None,
-    options: Options = Options(),
+    options: CalibrateOptions = USUAL,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
     """Calibrate a finger on free motion.
@@ -143,57 +133,30 @@ def calibrate(
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
-    given = [[Path(each) for each in group] for group in (free, tests, pushes)]
     with phases.start("reading"):
-        start = _start(Path(finger), None if previous is None else Path(previous))
-        case = _read(start, given[0], given[1], given[2], options)
+        earlier = None if previous is None else Path(previous)
+        case = _read(
+            Path(finger), earlier, [[Path(file) for file in files] for files in (free, tests, pushes)], options
+        )
     run = _Run(case, Path(folder), options, phases)
     report, data = run.report()
-    return Calibration(
-        data,
-        {key: finite(value) for key, value in {**report, "seconds": perf_counter() - begun}.items()},
-        run.diagnosed,
-    )
+    report["seconds"] = perf_counter() - begun
+    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed)
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class _Start:
-    """The finger to begin with, and the file of an earlier calibration or None."""
+class _Case:
+    """The finger to begin with, the file of an earlier calibration or None, and the recordings of a calibration."""
 
     finger: Finger
     previous: Path | None
-
-
-def _start(finger: Path, previous: Path | None) -> _Start:
-    given = read_finger(finger)
-    if previous is None:
-        return _Start(given, None)
-    earlier = earlier_finger(given, previous)
-    for what, names, other in (
-        ("joints", given.joint_names, earlier.joint_names),
-        ("tendons", given.tendon_names, earlier.tendon_names),
-    ):
-        if names != other:
-            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {finger}")
-    return _Start(earlier, previous)
-
-
-@dataclass(frozen=True)
-class _Case:
-    """The recordings of a calibration."""
-
-    start: _Start
     free: list[FitRecording]
     tests: list[FitRecording]
     pushes: list[Path]
     sentences: list[str]
-
-    @property
-    def finger(self) -> Finger:
-        return self.start.finger
 
     @property
     def judged(self) -> list[FitRecording]:
@@ -203,33 +166,52 @@ class _Case:
     def made_from(self) -> dict[str, Any]:
         from tendonfmu import __version__
 
-        files = [each.path for each in (*self.free, *self.tests)]
+        files = [recording.path for recording in (*self.free, *self.tests)]
         return {
             "version": __version__,
             "finger": digest_of({"data": self.finger.data}),
-            "previous": None if self.start.previous is None else digest_of_file(self.start.previous),
+            "previous": None if self.previous is None else digest_of_file(self.previous),
             "recordings": [(file.name, digest_of_file(file)) for file in files],
             "tests": len(self.tests),
         }
 
+    def errors(self, data: Data | None) -> list[float]:
+        """Return [n] the error of a description on unseen motion (N·m); that of the bias alone if None."""
+        return errors_of(data, self.judged, not self.tests, self.finger.data if data is None else None)
 
-def _read(
-    start: _Start, free: Sequence[Path], tests: Sequence[Path], pushes: Sequence[Path], options: Options
-) -> _Case:
+
+def _finger(file: Path, previous: Path | None) -> Finger:
+    """Read the finger to begin with: that of an earlier calibration, if there is one."""
+    given = read_finger(file)
+    if previous is None:
+        return given
+    earlier = earlier_finger(given, previous)
+    for what, names, other in (
+        ("joints", given.joint_names, earlier.joint_names),
+        ("tendons", given.tendon_names, earlier.tendon_names),
+    ):
+        if names != other:
+            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {file}")
+    return earlier
+
+
+def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], options: CalibrateOptions) -> _Case:
+    free, tests, pushes = recordings
+    finger = _finger(file, previous)
     if not free:
         raise InputError("no recording; expected at least one of free motion")
     check_given_once(free, tests, "a test")
     check_given_once(free, pushes, "one with pushes")
-    given = start.finger
-    read, others, touched = ([read_recording(each) for each in group] for group in (free, tests, pushes))
-    for each in (*read, *others):
-        require_no_contact(each)
-    sentences = admit(given, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
-    own = [prepare(given, each, options.kinematics, Held() if tests else HELD) for each in read]
-    unseen = [prepare(given, each, options.kinematics, Held()) for each in others]
-    require_noise(given, own)
-    check_unseen([each.recording for each in own], [each.recording for each in unseen])
-    return _Case(start, own, unseen, list(pushes), sentences)
+    read, others, touched = ([read_recording(path) for path in group] for group in (free, tests, pushes))
+    for recording in (*read, *others):
+        require_no_contact(recording)
+    sentences = admit(finger, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
+    held = Held() if tests else HELD
+    seen = [prepare(finger, recording, options.kinematics, held) for recording in read]
+    unseen = [prepare(finger, recording, options.kinematics, Held()) for recording in others]
+    require_noise(finger, seen)
+    check_unseen(read, others)
+    return _Case(finger, previous, seen, unseen, pushes, sentences)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -238,16 +220,16 @@ def _read(
 class _Run:
     """One calibration: each step works on the results of the previous ones."""
 
-    def __init__(self, case: _Case, folder: Path, options: Options, phases: Phases) -> None:
+    def __init__(self, case: _Case, folder: Path, options: CalibrateOptions, phases: Phases) -> None:
         self._case, self._folder, self._options, self._phases = case, folder, options, phases
-        self._steps = Steps(folder, {**case.made_from, **options.of_all})
+        self._steps = Steps(folder, {**case.made_from, **_of_all(options)})
         self._seconds: dict[str, float] = {}
         self.diagnosed: Diagnosis | None = None
 
     def report(self) -> tuple[dict[str, Any], Data]:
         """Return the report, and the calibrated description."""
         case, steps = self._case, self._steps
-        if case.start.previous is None:
+        if case.previous is None:
             page = self._folder / DIAGNOSIS / diagnosis_page.PAGE
             lacks = self._step("what the model lacks", "diagnosis", {}, self._diagnosis, page)
             fitted = self._step("all its numbers", "fit", {}, lambda step: self._fit(lacks))
@@ -255,7 +237,7 @@ class _Run:
             lacks = NOTHING_ASKED
             fitted = self._step("all its numbers", "refit", {}, lambda step: self._refit())
         tuned = self._step(
-            "thresholds of contact", "tune", self._options.of_alarms, lambda step: self._tune(fitted, step)
+            "thresholds of contact", "tune", _of_alarms(self._options), lambda step: self._tune(fitted, step)
         )
         pushed = None
         if case.pushes:
@@ -267,8 +249,8 @@ class _Run:
             "format": FORMAT,
             "finger": case.finger.name,
             "joints": case.finger.joint_names,
-            "recordings": [recording_of(each) for each in case.free],
-            "tests": [recording_of(each) for each in case.tests],
+            "recordings": [recording_of(recording) for recording in case.free],
+            "tests": [recording_of(recording) for recording in case.tests],
             "error": fitted["error"],
             "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
             "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
@@ -282,7 +264,7 @@ class _Run:
                 *tuned["warnings"],
                 *([] if pushed is None else pushed["warnings"]),
             ],
-            "options": {**self._options.of_all, **self._options.of_alarms},
+            "options": {**_of_all(self._options), **_of_alarms(self._options)},
             "steps": {"seconds": self._seconds, "repeated": steps.repeated},
         }
         return report, tuned["finger"]
@@ -297,9 +279,9 @@ class _Run:
     ) -> dict[str, Any]:
         begun = perf_counter()
         with self._phases.start(words, 100) as step:
-            found = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))), page)
+            result = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))), page)
         self._seconds[name] = perf_counter() - begun
-        return found
+        return result
 
     def _diagnosis(self, step: Callable[[float], None]) -> dict[str, Any]:
         case, options = self._case, self._options
@@ -311,7 +293,7 @@ class _Run:
             part = state.done / state.total if state.total else 0.0
             step((state.number - 1 + part) / state.count)
 
-        found = diagnose(
+        diagnosis = diagnose(
             case.finger,
             seen,
             judged,
@@ -321,48 +303,46 @@ class _Run:
             checked=True,
             progress=show,
         )
-        self.diagnosed = found
-        write_diagnosis(found, self._folder / DIAGNOSIS)
-        return structure_of(found)
+        self.diagnosed = diagnosis
+        write_diagnosis(diagnosis, self._folder / DIAGNOSIS)
+        return structure_of(diagnosis)
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
         case = self._case
-        held_out = not case.tests
-        nominal, found = (self._fitted(lacks, name) for name in ("nominal", "extended"))
+        nominal, extended = (self._fitted(lacks, name) for name in ("nominal", "extended"))
         error = {
-            "held_out": held_out,
-            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
-            "as_given": errors_of(case.finger.data, case.judged, held_out),
-            "fitted": errors_of(nominal.data, case.judged, held_out),
-            "calibrated": errors_of(found.data, case.judged, held_out),
+            "held_out": not case.tests,
+            "bias_only": case.errors(None),
+            "as_given": case.errors(case.finger.data),
+            "fitted": case.errors(nominal.data),
+            "calibrated": case.errors(extended.data),
         }
         touched = [
             f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
-            for event in found.events
+            for event in extended.events
         ]
-        return {"finger": found.data, "error": error, "warnings": [*found.warnings, *touched]}
+        return {"finger": extended.data, "error": error, "warnings": [*extended.warnings, *touched]}
 
     def _refit(self) -> dict[str, Any]:
         """Fit with the previous numbers as the prior; keep those if the new ones are no better on unseen motion."""
         case, options = self._case, self._options
-        found = fit_again(
+        fitted = fit_again(
             case.finger,
-            case.start.previous or Path(),
+            case.previous or Path(),
             case.free,
             share=0.0 if case.tests else HELD.share,
             kinematics=options.kinematics,
             threads=options.jobs,
         )
-        held_out = not case.tests
-        before, after = (errors_of(data, case.judged, held_out) for data in (case.finger.data, found.data))
+        before, after = case.errors(case.finger.data), case.errors(fitted.data)
         error = {
-            "held_out": held_out,
-            "bias_only": errors_of(None, case.judged, held_out, case.finger.data),
+            "held_out": not case.tests,
+            "bias_only": case.errors(None),
             "previous": before,
             "calibrated": after,
         }
-        if sum(each**2 for each in after) <= sum(each**2 for each in before):
-            return {"finger": found.data, "error": error, "warnings": list(found.warnings)}
+        if sum(value**2 for value in after) <= sum(value**2 for value in before):
+            return {"finger": fitted.data, "error": error, "warnings": list(fitted.warnings)}
         kept = (
             f"the new numbers leave an error of {1e3 * rms_of(after):.3g} mN·m on unseen motion, "
             f"the earlier ones {1e3 * rms_of(before):.3g}: the earlier ones are kept"
@@ -370,7 +350,7 @@ class _Run:
         return {
             "finger": case.finger.data,
             "error": {**error, "calibrated": before},
-            "warnings": [*found.warnings, kept],
+            "warnings": [*fitted.warnings, kept],
         }
 
     def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
@@ -404,12 +384,9 @@ class _Run:
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
         file = self._folder / FOLDER / "tuned.json"
         write_text(file, description_text(tuned["finger"]))
+        options = ScoreOptions(kinematics=self._options.kinematics, seed=self._options.seed)
         scored = score_recordings(
-            file,
-            self._case.pushes,
-            kinematics=self._options.kinematics,
-            seed=self._options.seed,
-            progress=lambda done, total: step(done / max(total, 1)),
+            file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
         report = detect_score_report.build_report(scored)
         keys = (
@@ -424,6 +401,6 @@ class _Run:
         )
         return {
             **{key: report[key] for key in keys},
-            "sizes": by_size(scored, left),
+            "sizes": detect_score_report.by_size(scored, left),
             "warnings": list(scored.warnings),
         }

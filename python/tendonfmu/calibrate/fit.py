@@ -1,4 +1,4 @@
-"""The numbers of a diagnosed finger, fitted to all of its free motion, with their uncertainty.
+"""What a calibration diagnoses, and the numbers of a diagnosed finger, fitted to all of its free motion.
 
 A diagnosis finds the structure on a part of the recordings. The numbers become more accurate with all of the motion. If
 there is little motion, an earlier calibration is the prior.
@@ -29,10 +29,10 @@ from tendonfmu.diagnosis import (
     without_stuck,
 )
 from tendonfmu.estimate import (
+    FIT_REPORT,
     FitWarning,
     FrictionFit,
     evaluate,
-    fit_report,
     parameter_uncertainty,
     read_previous_fit,
     unknowns,
@@ -42,7 +42,11 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
-from tendonfmu.recordings import FitRecording, Signals
+from tendonfmu.recordings import FitRecording, Recording, Signals
+
+DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
+JUDGED = 45.0  # s, in all, to judge it on
+SHORTEST = 15.0  # s, least length of a stretch
 
 
 @dataclass(frozen=True)
@@ -69,30 +73,30 @@ def fit_all(
     data = signals.description(finger.data)
     if not unknowns(data):
         return CalibratedFit(finger.data, (), ())
-    own = estimation_recordings(replace(finger, data=data), recordings, signals)
-    grid = make_grid(own)
-    events, out = events_of(data, own, grid, seed)
+    estimated = estimation_recordings(replace(finger, data=data), recordings, signals)
+    grid = make_grid(estimated)
+    events, out = events_of(data, estimated, grid, seed)
     if only_sliding:
         sliding = without_stuck(finger, recordings, signals)
-        own = estimation_recordings(replace(finger, data=data), sliding, signals)
-    own = [without_blocks(each, k, grid, out) for k, each in enumerate(own)]
-    clean = predicted_of(data, own, grid, series_of(data, own, grid, out))
+        estimated = estimation_recordings(replace(finger, data=data), sliding, signals)
+    estimated = [without_blocks(recording, k, grid, out) for k, recording in enumerate(estimated)]
+    clean = predicted_of(data, estimated, grid, series_of(data, estimated, grid, out))
     structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
     fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     online = replace(fitted, data=signals.restored(fitted.data, finger.data))
     if only_sliding:
         online = replace(online, data=settled(online.data, lambda data: squared_residual(data, recordings)))
     if uncertainty and np.isfinite(learned.covariance).all():
-        judged = [evaluate(data, fitted.data, each) for each in own]
-        known = parameter_uncertainty(structure, learned, fitted.data, judged)
+        judged = [evaluate(data, fitted.data, recording) for recording in estimated]
+        directions, _ = parameter_uncertainty(structure, learned, fitted.data, judged)
         level = (finger.data["contact"] or {}).get("uncertainty_level")
-        online = with_uncertainty(online, known.directions, level)
+        online = with_uncertainty(online, directions, level)
     return CalibratedFit(online.data, events, tuple(learned.warnings))
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:
     """Return the description of an earlier calibration; for a fit's report, the given one with its values."""
-    if read_json(previous, "an earlier calibration").get("format") == fit_report.FORMAT:
+    if read_json(previous, "an earlier calibration").get("format") == FIT_REPORT:
         return with_previous_values(given, read_previous_fit(previous))
     return read_finger(previous)
 
@@ -110,5 +114,51 @@ def fit_again(
     fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # the report lists them
-        fitting.fit([each.recording for each in recordings], checked=True)
+        fitting.fit([recording.recording for recording in recordings], checked=True)
     return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))
+
+
+# --- the stretches that a diagnosis uses ------------------------------------------------------------------------------
+
+
+def stretches_for_diagnosis(
+    free: Sequence[Recording], tests: Sequence[Recording]
+) -> tuple[list[Recording], list[Recording]]:
+    """Choose stretches of the recordings to find the structure in, and stretches to judge it on."""
+    whole = sum(map(_seconds, free))
+    if tests:
+        total = sum(map(_seconds, tests))
+        return _cut(free, 0.0, DIAGNOSED / whole), _cut(tests, 0.0, JUDGED / total)
+    if whole < 2.0 * (DIAGNOSED + JUDGED):
+        return list(free), []
+    return _cut(free, 0.0, DIAGNOSED / whole), _cut(free, 0.5, JUDGED / whole)
+
+
+def _seconds(recording: Recording) -> float:
+    return float(recording.time[-1] - recording.time[0])
+
+
+def _cut(recordings: Sequence[Recording], begin: float, share: float) -> list[Recording]:
+    """Cut a share of the time of each recording, from a share on; the whole recording if the share is 1 or more."""
+    if share >= 1.0:
+        return list(recordings)
+    stretches = [_stretch(each, begin, share) for each in recordings if share * _seconds(each) >= SHORTEST]
+    if stretches:
+        return stretches
+    longest = max(recordings, key=_seconds)
+    return [_stretch(longest, begin, min(1.0 - begin, share * len(recordings)))]
+
+
+def _stretch(recording: Recording, begin: float, share: float) -> Recording:
+    first = recording.time[0] + begin * _seconds(recording)
+    last = first + share * _seconds(recording)
+    rows = slice(*(int(row) for row in np.searchsorted(recording.time, (first, last))))
+    beside = f"{recording.path.stem}, {first - recording.time[0]:.0f} to {last - recording.time[0]:.0f} s"
+    return replace(
+        recording,
+        path=Path(recording.path.with_name(beside + recording.path.suffix)),
+        time=recording.time[rows],
+        groups={name: values[rows] for name, values in recording.groups.items()},
+        contact=None if recording.contact is None else recording.contact[rows],
+        others={name: values[rows] for name, values in recording.others.items()},
+    )

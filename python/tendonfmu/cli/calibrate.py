@@ -7,27 +7,12 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli.command import ExtendedFinger, FreeAtPretensions, Progress, command
 from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, say, say_files, warn
-from tendonfmu.cli.options import (
-    AsJson,
-    Confidence,
-    ExtendedFinger,
-    FalseAlarms,
-    FreeAtPretensions,
-    Jobs,
-    Kinematics,
-    Progress,
-    Quiet,
-    Seed,
-)
-from tendonfmu.cli.several_values import SeveralValues
+from tendonfmu.options import CalibrateOptions
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command(cls=SeveralValues)(calibrate)
-
-
+@command(CalibrateOptions)
 def calibrate(
     finger: ExtendedFinger,
     recordings: FreeAtPretensions,
@@ -51,14 +36,9 @@ def calibrate(
             help="finger.json of an earlier calibration, or report of a fit, as the prior; for little data",
         ),
     ] = None,
-    false_alarms_per_hour: FalseAlarms = 6.0,
-    confidence: Confidence = 0.9,
-    kinematics: Kinematics = 1,
-    seed: Seed = 0,
-    jobs: Jobs = 1,
+    *,
+    options: CalibrateOptions,
     progress: Progress = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Make a tuned FMU from free motion: find missing effects, fit all numbers, tune contact detection.
 
@@ -70,14 +50,13 @@ def calibrate(
     --from the structure of the earlier model stays and its numbers are the
     prior.
     """
-    from tendonfmu.calibrate import REPORT, Options, check_folder, text, write_calibration
+    from tendonfmu.calibrate import REPORT, check_folder, text, write_calibration
     from tendonfmu.calibrate import calibrate as run
 
     tests, labelled = test or [], pushes or []
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
-    options = Options(kinematics, false_alarms_per_hour, confidence, seed, jobs)
     with PhaseDisplay(progress) as display:
-        found = run(
+        calibration = run(
             finger,
             recordings,
             output,
@@ -88,11 +67,12 @@ def calibrate(
             progress=display,
         )
         display.note("writing the files")
-        written = write_calibration(found, output)
-    for sentence in found.report["warnings"]:
+        written = write_calibration(calibration, output)
+    report = calibration.report
+    for sentence in report["warnings"]:
         warn(sentence)
-    if found.report["steps"]["repeated"]:
-        say(f"unchanged since the last call, not repeated: {', '.join(found.report['steps']['repeated'])}")
-    print_tables(text.tables(found.report), text.lines(found.report), left="model")
+    if report["steps"]["repeated"]:
+        say(f"unchanged since the last call, not repeated: {', '.join(report['steps']['repeated'])}")
+    print_tables(text.tables(report), text.lines(report), left="model")
     say_files(written)
     print_json((output / REPORT).read_text)

@@ -8,16 +8,12 @@ from typing import Annotated
 
 import typer
 
+from tendonfmu.cli.command import Progress, command
 from tendonfmu.cli.console import NO, fail, print_json, print_tables, progress_bar, say, warn
-from tendonfmu.cli.options import AsJson, LeastGain, Progress, Quiet
 from tendonfmu.files import counted
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command()(campaign)
-
-
+@command()
 def campaign(
     cases: Annotated[
         Path, typer.Argument(metavar="CASES.json", help="recordings whose cause is known, or a function for them")
@@ -29,7 +25,9 @@ def campaign(
     stop_after: Annotated[
         float, typer.Option(min=0.0, metavar="SECONDS", help="start no case after this time; call again to continue")
     ] = math.inf,
-    least_gain: LeastGain = 0.03,
+    least_gain: Annotated[
+        float, typer.Option(min=0.0, max=0.5, metavar="SHARE", help="least drop of the rms on unseen data for a cause")
+    ] = 0.03,
     beside: Annotated[
         str | None, typer.Option(metavar="FILE.py:FUNCTION", help="other methods that also name a cause per case")
     ] = None,
@@ -42,8 +40,6 @@ def campaign(
         ),
     ] = None,
     progress: Progress = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Diagnose many recordings whose cause is known, and count how often the answer is right.
 
@@ -80,9 +76,8 @@ def campaign(
     if waiting and stop_after > 0:
         with (
             workers_of(scheduler, min(jobs or worker_count(), waiting)) as client,
-            progress_bar(progress) as bar,
+            progress_bar("cases", progress, total=len(listed)) as show,
         ):
-            task = bar.add_task("cases", total=len(listed))
             run_campaign(
                 listed,
                 output,
@@ -90,7 +85,7 @@ def campaign(
                 how=How(None if beside is None else str(Path(beside).absolute()), least_gain),
                 stop_after=stop_after,
                 failed_again=again,
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
+                progress=show,
             )
     rows = collect(listed, output)
     if report is not None:

@@ -7,29 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tendonfmu.cli.command import Progress, Subject, command
 from tendonfmu.cli.console import NO, PRINTED, fail, print_json, progress_bar, show, warn
-from tendonfmu.cli.options import AsJson, Progress, Quiet, Subject
-from tendonfmu.cli.standard_streams import reads
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
     from tendonfmu.model import Finger
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command()(check)
-
-
-@reads("file", "recordings")
+@command(reads=("file", "recordings"))
 def check(
     file: Subject,
     recordings: Annotated[
         list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="recordings of this finger, .csv or .parquet")
     ] = None,
     progress: Progress = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Validate a finger description or a rig and describe it. Exit status 1 if it is refused.
 
@@ -65,35 +57,28 @@ def check(
         warn(finding.line())
     checked = [] if finger is None else _check_recordings(finger, recordings or [], progress)
     print_json(lambda: check_report(file, "rig" if rig else "finger", lines, findings, checked))
-    strangers = sum(not each["belongs"] for each in checked)
+    strangers = sum(not report["belongs"] for report in checked)
     if strangers:
         count = f"{strangers} of {len(checked)} recordings" if len(checked) > 1 else checked[0]["file"]
-        fail(f"{count}: does not belong to {file} as it is; {_what_to_change(checked)}")
+        problems = [problem for report in checked for problem in report["findings"]]
+        first = next(problem["line"] for problem in problems if problem["severity"] == "error")
+        what = first if PRINTED.quiet or PRINTED.json else "see above for what to change"
+        fail(f"{count}: does not belong to {file} as it is; {what}")
         raise typer.Exit(NO)
-
-
-def _what_to_change(checked: list[dict[str, Any]]) -> str:
-    """Point to the findings, or, where they do not stand above, give the first error."""
-    if not (PRINTED.quiet or PRINTED.json):
-        return "see above for what to change"
-    findings = [finding for each in checked for finding in each["findings"]]
-    return str(next(finding["line"] for finding in findings if finding["severity"] == "error"))
 
 
 def _check_recordings(finger: Finger, files: list[Path], progress: bool | None) -> list[dict[str, Any]]:
     """Print for each recording whether it belongs to the finger, and return the reports on them."""
     from tendonfmu.recordings import belongs, read_recording, recording_report
 
-    found = []
-    with progress_bar(progress if files else False) as bar:
-        task = bar.add_task("recordings", total=len(files))
-        for file in files:
+    reports, lines = [], []
+    with progress_bar("recordings", progress if files else False, total=len(files)) as show_progress:
+        for number, file in enumerate(files, start=1):
             recording = read_recording(file)
             findings = belongs(finger, [recording])
-            found.append((recording_report(recording, findings), findings))
-            bar.update(task, advance=1)
-    for report, findings in found:
-        show(report["verdict"])
-        for finding in findings:
-            show(f"{finding.severity}: {finding.line()}")
-    return [report for report, _ in found]
+            reports.append(recording_report(recording, findings))
+            lines += [reports[-1]["verdict"], *(f"{finding.severity}: {finding.line()}" for finding in findings)]
+            show_progress(number)
+    for line in lines:
+        show(line)
+    return reports

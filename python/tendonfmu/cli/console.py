@@ -19,13 +19,16 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NoReturn
 
+from tendonfmu.errors import InputError
+
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from rich.progress import Progress
 
     from tendonfmu.tasks import PhaseState
-
 
 # exit status of every command; 0 is done, 129 and 143 are ended by SIGHUP and SIGTERM
 NO, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
@@ -40,7 +43,8 @@ class Printed:
     table: bool = False  # whether standard output carries a table (`--output -`)
 
 
-PRINTED = Printed()  # a process has one standard output; `options.py` sets this anew when it parses a command
+PRINTED = Printed()  # a process has one standard output; `command.py` sets this anew when it parses a command
+DASH = Path("-")  # standard input or output in place of a file
 
 
 def fail(message: str) -> None:
@@ -83,17 +87,10 @@ def print_json(report: Callable[[], Mapping[str, Any] | str]) -> None:
 
     from tendonfmu.files import finite
 
-    found = report()
-    text = found if isinstance(found, str) else json.dumps(finite(found), indent=1, ensure_ascii=False)
+    content = report()
+    text = content if isinstance(content, str) else json.dumps(finite(content), indent=1, ensure_ascii=False)
     with reader_may_leave(sys.stdout):
         sys.stdout.write(f"{text.rstrip()}\n")
-        sys.stdout.flush()
-
-
-def print_csv(lines: Iterable[str]) -> None:
-    """Print a table on standard output."""
-    with reader_may_leave(sys.stdout):
-        sys.stdout.writelines(lines)
         sys.stdout.flush()
 
 
@@ -150,62 +147,138 @@ def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None
             console.print(line, highlight=False, soft_wrap=True)
 
 
-def progress_bar(wanted: bool | None = None) -> Progress:
-    """Make a progress bar on standard error; by default (None) it shows on a terminal only."""
+# --- tables that a command writes -------------------------------------------------------------------------------------
+
+
+def check_table(output: Path, *inputs: Path) -> None:
+    """Check that a table can be written: a .csv, .parquet or .mcap file that is no input, or `-`."""
+    from tendonfmu.files import check_output, check_output_format
+
+    PRINTED.table = output == DASH
+    if PRINTED.table and PRINTED.json:
+        raise InputError("--output -: given with --json; expected a file, since both print on standard output")
+    if not PRINTED.table:
+        check_output_format(output)
+        check_output(output, *inputs)
+
+
+def check_second_file(file: Path | None, output: Path, what: str, *inputs: Path) -> None:
+    """Check that a further file, if there is one, can be written beside `output`."""
+    from tendonfmu.files import check_output
+
+    if file is None:
+        return
+    check_output(file, *inputs)
+    if file.resolve() == output.resolve():
+        raise InputError(f"{file}: the same file for {what}; expected two names")
+
+
+def write_table(output: Path, *blocks: Mapping[str, NDArray[Any]]) -> None:
+    """Write columns [N], in one block of rows or several, to a .csv, .parquet or .mcap file, or to standard output."""
+    write_blocks(output, blocks)
+
+
+def write_blocks(output: Path, blocks: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    """Write a table that comes in blocks of rows, as `write_table` does; only one block is in memory."""
+    from tendonfmu.files import csv_lines
+    from tendonfmu.files import write_blocks as write_file
+
+    if output != DASH:
+        write_file(output, blocks)
+        return
+    with reader_may_leave(sys.stdout):
+        sys.stdout.writelines(csv_lines(blocks))
+        sys.stdout.flush()
+
+
+def name_of(output: Path) -> str:
+    """Return the name of an output as messages say it."""
+    return "standard output" if output == DASH else str(output)
+
+
+# --- progress ---------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _bar(wanted: bool | None) -> Iterator[Progress]:
+    """Show a bar on standard error; by default (None) on a terminal only."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import TimeRemainingColumn
 
     wanted = False if PRINTED.quiet else wanted
     console = Console(stderr=True, force_terminal=wanted or None)
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not (console.is_terminal if wanted is None else wanted),
-        transient=True,
-    )
+    with _progress(console, console.is_terminal if wanted is None else wanted, TimeRemainingColumn()) as bar:
+        yield bar
 
 
-def phase_bar(bar: Progress) -> Callable[[str, int, int | None], None]:
-    """Return a callback that shows a computation of several phases: phase in words, steps done, total or None."""
-    task = bar.add_task("reading", total=None)
-    now = ""
+def _progress(console: Any, shown: bool, left: Any) -> Progress:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    def show(phase: str, done: int, total: int | None) -> None:
-        nonlocal now, task
-        if phase != now:  # rich cannot unset the total of a task, so each phase gets a new one
-            bar.remove_task(task)
-            task = bar.add_task(phase, total=total)
-            now = phase
-        bar.update(task, completed=done, total=total)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
+    return Progress(*columns, console=console, disable=not shown, transient=True)
 
-    return show
+
+@contextmanager
+def progress_bar(words: str, wanted: bool | None, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """Give a callback that shows the number of steps done, and of all steps where `total` is not known before."""
+    with _bar(wanted) as bar:
+        task = bar.add_task(words, total=total)
+
+        def show(done: int, total: int | None = None) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield show
+
+
+@contextmanager
+def phase_bar(wanted: bool | None) -> Iterator[Callable[[str, int, int | None], None]]:
+    """Give a callback that shows a computation of several phases: phase in words, steps done, total or None."""
+    with _bar(wanted) as bar:
+        task, now = bar.add_task("reading", total=None), ""
+
+        def show(phase: str, done: int, total: int | None) -> None:
+            nonlocal now, task
+            if phase != now:  # rich cannot unset the total of a task, so each phase gets a new one
+                bar.remove_task(task)
+                task, now = bar.add_task(phase, total=total), phase
+            bar.update(task, completed=done, total=total)
+
+        yield show
+
+
+@contextmanager
+def fit_bar(wanted: bool | None) -> Iterator[Callable[[Any], None]]:
+    """Give a callback that shows the phase, cost and samples per second of a fit."""
+    with _bar(wanted) as bar:
+        task, phase = bar.add_task("reading", total=None), ""
+
+        def show(state: Any) -> None:
+            nonlocal phase
+            if state.phase != phase:
+                bar.reset(task, total=state.total)
+                phase = state.phase
+            speed = bar.tasks[0].speed
+            rate = f", {speed:,.0f} samples/s" if speed else ""
+            cost = f", cost {state.cost:.6g}" if state.cost == state.cost else ""
+            bar.update(task, completed=state.done, total=state.total, description=f"{phase}{cost}{rate}")
+
+        yield show
 
 
 class PhaseDisplay:
     """Progress of a computation of several phases, on standard error; call it with a `tendonfmu.tasks.PhaseState`."""
 
-    EVERY = 10.0
+    EVERY = 10.0  # s between two lines where standard error is no terminal
 
     def __init__(self, wanted: bool | None = None) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import TextColumn
 
         wanted = False if PRINTED.quiet else wanted
         console = Console(stderr=True)
         self._on_terminal = console.is_terminal
         self._shown = console.is_terminal if wanted is None else wanted
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[left]}"),
-            console=console,
-            disable=not (self._shown and self._on_terminal),
-            transient=True,
-        )
+        self._bar = _progress(console, self._shown and self._on_terminal, TextColumn("{task.fields[left]}"))
         self._task: Any = None
         self._phase: tuple[int, int] | None = None
         self._said = 0.0  # s, time of the last printed line
@@ -261,21 +334,3 @@ def time_left(seconds: float | None) -> str:
     if seconds < 90:
         return f"about {max(5, 5 * round(seconds / 5))} s left"
     return f"about {round(seconds / 60)} min left"
-
-
-def fit_bar(bar: Progress) -> Any:
-    """Return a callback that shows the phase, cost and samples per second of a fit."""
-    task = bar.add_task("reading", total=None)
-    phase = ""
-
-    def show(now: Any) -> None:
-        nonlocal phase
-        if now.phase != phase:
-            bar.reset(task, total=now.total)
-            phase = now.phase
-        speed = bar.tasks[0].speed
-        rate = f", {speed:,.0f} samples/s" if speed else ""
-        cost = f", cost {now.cost:.6g}" if now.cost == now.cost else ""
-        bar.update(task, completed=now.done, total=now.total, description=f"{phase}{cost}{rate}")
-
-    return show

@@ -1,4 +1,4 @@
-"""The command `convert`: a third-party recording as a recording of tendonfmu."""
+"""The commands `convert` and `describe`: a third-party recording, and the description of a machine with one joint."""
 
 from __future__ import annotations
 
@@ -10,9 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.console import print_json, print_tables, say, warn
-from tendonfmu.cli.options import AsJson, Quiet
-from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_blocks, write_table
+from tendonfmu.cli.command import command
+from tendonfmu.cli.console import (
+    check_second_file,
+    check_table,
+    name_of,
+    print_json,
+    print_tables,
+    say,
+    warn,
+    write_blocks,
+    write_table,
+)
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,14 +31,11 @@ if TYPE_CHECKING:
 
 TABLE = "table"  # the format whose columns a map describes
 INSPECT = "inspect"
+JOINT = "joint"
+LARGEST = 1e6  # of torques, speeds and inertias of a described machine
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command()(convert)
-
-
-@reads("file")
+@command(reads=("file",))
 def convert(
     source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, or inspect")],
     file: Annotated[
@@ -76,8 +82,6 @@ def convert(
         Path | None,
         typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
     ] = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Convert a third-party recording or any log into a recording of tendonfmu.
 
@@ -151,17 +155,12 @@ def _print_inspection(found: Inspection, proposal: Proposal) -> None:
 
 def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
     """Convert a log by its map, and write the description of a one-joint machine."""
-    from tendonfmu.files import check_output
-
     if map_file is None:
         raise InputError(
             f"convert {TABLE}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
         )
     check_table(output, file, map_file)
-    if finger is not None:
-        check_output(finger, file, map_file)
-    if finger is not None and finger.resolve() == output.resolve():
-        raise InputError(f"{finger}: the same file for recording and description; expected two names")
+    check_second_file(finger, output, "recording and description", file, map_file)
     if finger is None:
         return _convert_in_blocks(file, output, map_file)
     return _convert_with_finger(file, output, map_file, finger)
@@ -217,3 +216,74 @@ def _written(output: Path, count: int, duration: float, notes: list[str]) -> dic
         "duration": duration,
         "notes": notes,
     }
+
+
+@command()
+def describe(
+    what: Annotated[str, typer.Argument(metavar="joint", help="a servo, one axis of an arm, a linear drive")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.json", help="description to write")],
+    name: Annotated[str, typer.Option(help="name of the machine and of its joint")],
+    recording: Annotated[
+        Path | None,
+        typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet"),
+    ] = None,
+    torque: Annotated[
+        float | None, typer.Option(min=1e-9, max=LARGEST, help="N.m; largest torque of the drive [default: 1]")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=1e-9, max=LARGEST, help="rad/s; largest speed of the joint [default: 5]")
+    ] = None,
+    coulomb: Annotated[
+        float | None, typer.Option(min=0.0, max=LARGEST, help="N.m; Coulomb friction [default: 5 % of the torque]")
+    ] = None,
+    viscous: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=LARGEST, help="N.m.s/rad; viscous friction [default: 2 % of torque/speed]"),
+    ] = None,
+    inertia: Annotated[
+        float | None, typer.Option(min=1e-12, max=LARGEST, help="kg.m2; moved inertia [default: 1 % of torque/speed]")
+    ] = None,
+    moment_arm: Annotated[
+        float, typer.Option(min=1e-4, max=10.0, help="m; 1 if the recording has torque as tendon force")
+    ] = 1.0,
+) -> None:
+    """Write the description of a machine with one joint, for logs of torque and angle.
+
+    Its numbers are starting values; fit estimates them. With --recording they
+    come from the machine's own motion.
+    """
+    from tendonfmu.files import check_format, check_output, write_text
+    from tendonfmu.recordings import describe_recorded_joint, description_text, joint_description, read_recording
+
+    if what != JOINT:
+        raise InputError(f"describe: {what!r}: unknown kind of machine; expected {JOINT}")
+    if not name.strip() or any(ord(letter) < 32 for letter in name):
+        raise InputError(f"describe {JOINT}: --name = {name!r}: expected a name")
+    numbers = {"torque": torque, "speed": speed, "coulomb": coulomb, "viscous": viscous, "inertia": inertia}
+    if recording is None:
+        check_output(output)
+        document = joint_description(
+            name,
+            1.0 if torque is None else torque,
+            5.0 if speed is None else speed,
+            coulomb=coulomb,
+            viscous=viscous,
+            inertia=inertia or 0.0,
+            moment_arm=moment_arm,
+        )
+    else:
+        for option, value in numbers.items():
+            if value is not None:
+                raise InputError(
+                    f"describe {JOINT}: --{option}: not an option beside --recording, which holds the number"
+                )
+        check_format(recording)
+        check_output(output, recording)
+        document = describe_recorded_joint(name, read_recording(recording), moment_arm)
+    write_text(output, description_text(document))
+    law = document["joints"][0]["friction"]
+    say(
+        f"{output}: {name}, coulomb {law['coulomb']:g} N.m, viscous {law['viscous']:g} N.m.s/rad to start from; "
+        "`tendonfmu fit` estimates them"
+    )
+    print_json(lambda: document)

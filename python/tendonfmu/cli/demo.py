@@ -7,22 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import phase_bar, print_json, print_tables, progress_bar, say, warn
-from tendonfmu.cli.options import AsJson, Progress, Quiet
+from tendonfmu.cli.command import Progress, command
+from tendonfmu.cli.console import phase_bar, print_json, print_tables, say, warn
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command()(demo)
-
-
+@command()
 def demo(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
         "tendonfmu-demo"
     ),
     progress: Progress = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Show every step on built-in data in a minute: calibrate, detect, diagnose, fit, run.
 
@@ -35,8 +29,8 @@ def demo(
         warn(f"{story.missing}")
     for number, chapter in enumerate(story.chapters, start=1):
         say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
-        with progress_bar(progress) as bar:
-            chapter.run(phase_bar(bar))
+        with phase_bar(progress) as show:
+            chapter.run(show)
         print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
     write_story(story)
     print_tables((), file_lines(story), left="")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tendonfmu.cli.command import command
 from tendonfmu.cli.console import print_json, say, warn
-from tendonfmu.cli.options import AsJson, Quiet
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 
@@ -21,12 +21,7 @@ ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="MuJoCo mod
 NAMES = "NAMES"  # separated by commas; the option may also be repeated
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command("import")(import_model)
-    app.command("export")(export_model)
-
-
+@command()
 def import_model(
     kind: Format,
     model: ModelFile,
@@ -59,8 +54,6 @@ def import_model(
         typer.Option(min=1e-9, max=1e6, metavar="N.m", help="N.m; contact threshold to begin with, of all joints"),
     ] = 0.03,
     name: Annotated[str | None, typer.Option(metavar="NAME", help="of the finger [default: the model's]")] = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Make a finger description from joints and tendons of a MuJoCo model.
 
@@ -94,13 +87,12 @@ def import_model(
     print_json(lambda: finger.report(model, output))
 
 
+@command()
 def export_model(
     kind: Format,
     finger: Annotated[Path, typer.Argument(metavar="FITTED.json", help="fitted finger description")],
     model: ModelFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.xml", help="model to write")],
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write friction, damping, springs and armature of a description into a MuJoCo model.
 

@@ -8,36 +8,42 @@ Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault 
 from __future__ import annotations
 
 import functools
+import itertools
+import platform
+import shlex
 import sys
+import tempfile
+import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path
 from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
 from typer.main import get_command
 
 from tendonfmu.cli import (
-    build,
     calibrate,
     campaign,
     check,
     convert,
     demo,
-    describe,
     detect,
     diagnose,
     excite,
     fit,
     import_mjcf,
     run,
-    simulate,
 )
+from tendonfmu.cli.command import SeveralValues
 from tendonfmu.cli.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
-from tendonfmu.cli.fault_report import is_own_file, is_without_memory, write_fault_report
 from tendonfmu.errors import InputError, InputWarning, line_of
+from tendonfmu.files import whole_file
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning
+_PACKAGES = ("numpy", "scipy", "scikit-learn", "pyarrow", "fmpy", "typer", "rich")  # versions of a fault report
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -47,23 +53,25 @@ app = typer.Typer(
     help="Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor.",
 )
 
-for command in (
-    check,
-    build,
-    run,
-    simulate,
-    convert,
-    import_mjcf,
-    describe,
-    excite,
-    fit,
-    calibrate,
-    diagnose,
-    detect,
-    campaign,
-    demo,
-):  # the order of --help
-    command.register(app)
+for name, function in {  # in the order of --help
+    "check": check.check,
+    "build": run.build,
+    "run": run.run,
+    "simulate": run.simulate,
+    "convert": convert.convert,
+    "import": import_mjcf.import_model,
+    "export": import_mjcf.export_model,
+    "describe": convert.describe,
+    "excite": excite.excite,
+    "fit": fit.fit,
+    "calibrate": calibrate.calibrate,
+    "diagnose": diagnose.diagnose,
+    "tune": detect.tune,
+    "score": detect.score,
+    "campaign": campaign.campaign,
+    "demo": demo.demo,
+}.items():
+    app.command(name, cls=SeveralValues)(function)
 
 
 @functools.cache
@@ -165,3 +173,73 @@ def options(
     ] = False,
 ) -> None:
     """Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor."""
+
+
+# --- what a user sends after an internal fault ------------------------------------------------------------------------
+
+
+def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path | None:
+    """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable."""
+    # It is written whole or not at all, and never replaces another file.
+    text = _report(error, arguments)
+    for folder in (".", None):
+        try:
+            return _written(Path(folder or tempfile.gettempdir()), text)
+        except (OSError, InputError):
+            continue
+    return None
+
+
+def is_own_file(path: object) -> bool:
+    """Tell whether the path of an OSError lies within the installed package."""
+    return isinstance(path, str) and Path(path).is_absolute() and Path(__file__).parent.parent in Path(path).parents
+
+
+def is_without_memory(error: BaseException) -> bool:
+    """Tell whether memory ran out, in Python or as a library was loaded, which the loader says in words alone."""
+    return isinstance(error, MemoryError) or (
+        isinstance(error, ImportError)
+        and any(words in str(error) for words in ("failed to map segment", "Cannot allocate"))
+    )
+
+
+def _written(folder: Path, text: str) -> Path:
+    """Write the text under the first free name of this second. Raises OSError or InputError."""
+    stem = datetime.now().strftime("tendonfmu-error-%Y%m%d-%H%M%S")
+    for number in itertools.count(1):
+        file = folder / (f"{stem}.txt" if number == 1 else f"{stem}-{number}.txt")
+        try:
+            file.touch(exist_ok=False)  # reserves the name
+            break
+        except FileExistsError:
+            continue
+    try:
+        with whole_file(file) as temporary:
+            temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
+    except BaseException:
+        file.unlink(missing_ok=True)
+        raise
+    return file
+
+
+def _report(error: BaseException, arguments: Sequence[str]) -> str:
+    lines = [
+        "An internal error of tendonfmu. Please send this file to its developers; it holds no measured data.",
+        "",
+        f"command:  {shlex.join(['tendonfmu', *arguments])}",
+        f"time:     {datetime.now().astimezone().isoformat(timespec='seconds')}",
+        f"platform: {platform.platform()}, {platform.machine()}",
+        f"python:   {sys.version.split()[0]} ({platform.python_implementation()})",
+        *(f"{name}: {_version(name)}" for name in ("tendonfmu", *_PACKAGES)),
+        "",
+    ]
+    return "\n".join(lines) + "\n" + "".join(traceback.format_exception(error))
+
+
+def _version(package: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version  # 10 ms of every command
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

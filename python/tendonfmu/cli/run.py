@@ -1,4 +1,4 @@
-"""The command `run`: the model over a recording."""
+"""The commands `build`, `run` and `simulate`: an FMU, the model over a recording, a recording of a simulated finger."""
 
 from __future__ import annotations
 
@@ -7,18 +7,44 @@ from typing import Annotated
 
 import typer
 
-from tendonfmu.cli.console import print_json, progress_bar, say
-from tendonfmu.cli.options import AsJson, Kinematics, Model, Progress, Quiet
-from tendonfmu.cli.standard_streams import check_table, name_of, reads, write_table
+from tendonfmu.cli.command import Model, Progress, Subject, command
+from tendonfmu.cli.console import (
+    check_second_file,
+    check_table,
+    name_of,
+    print_json,
+    progress_bar,
+    say,
+    write_table,
+)
 from tendonfmu.errors import InputError
+from tendonfmu.options import BuildOptions, RunOptions
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
-    app.command()(run)
+@command(BuildOptions, reads=("file",))
+def build(
+    file: Subject,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    reference: Annotated[
+        Path | None,
+        typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks"),
+    ] = None,
+    *,
+    options: BuildOptions,
+) -> None:
+    """Pack a co-simulation FMU: the friction of a finger, or the simulated finger of a rig.
+
+    Needs no compiler. The same input gives the same bytes.
+    """
+    from tendonfmu.fmu import fmu_report
+    from tendonfmu.interface import build as build_fmu
+
+    build_fmu(file, output, reference=reference, **vars(options))
+    say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
+    print_json(lambda: fmu_report(file, output))
 
 
-@reads("model", "recording")
+@command(RunOptions, reads=("model", "recording"))
 def run(
     model: Model,
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="recording, .csv or .parquet")],
@@ -28,10 +54,9 @@ def run(
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html|DIR", help="page of the run; in a folder run.html")
     ] = None,
-    kinematics: Kinematics = 1,
+    *,
+    options: RunOptions,
     progress: Progress = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
 ) -> None:
     """Run the model over a recording and write all outputs, one row per sample at the time of that sample."""
     from tendonfmu.fmu import check_model, finger_of
@@ -46,15 +71,47 @@ def run(
         if report.resolve() == output.resolve():
             raise InputError(f"{report}: the same file for outputs and page; expected two names")
     samples = read_recording(recording)
-    with progress_bar(progress) as bar:
-        task = bar.add_task("samples", total=len(samples))
-        found = run_finger(
-            model, samples, kinematics=kinematics, progress=lambda done: bar.update(task, completed=done)
-        )
-    table = found.columns()
+    with progress_bar("samples", progress, total=len(samples)) as show:
+        result = run_finger(model, samples, progress=show, **vars(options))
+    table = result.columns()
     write_table(output, table)
-    numbers = run_report(model, recording, table, finger_of(model), kinematics=kinematics, output=name_of(output))
-    say(f"{name_of(output)}: {found.summary}")
+    numbers = run_report(
+        model, recording, table, finger_of(model), kinematics=options.kinematics, output=name_of(output)
+    )
+    say(f"{name_of(output)}: {result.summary}")
     if report is not None:
         say(f"{write_run_page(report, numbers, table, samples.contact)}: the run, to be read in a browser")
     print_json(lambda: numbers)
+
+
+@command(reads=("rig",))
+def simulate(
+    rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REC.parquet", help="recording, .csv or .parquet")],
+    truth: Annotated[
+        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals to write, .csv or .parquet")
+    ] = None,
+    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="[default: the rig's]")] = None,
+    progress: Progress = None,
+) -> None:
+    """Simulate a finger and write the recording. The same rig gives the same numbers."""
+    from tendonfmu.files import check_format
+    from tendonfmu.simulate import INTEGRATORS, read_rig
+    from tendonfmu.simulate import simulate as simulate_rig
+
+    if integrator is not None and integrator not in INTEGRATORS:
+        raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
+    read = read_rig(rig)
+    check_table(output, *read.files)
+    if truth is not None:
+        check_format(truth)
+        check_second_file(truth, output, "recording and truth", *read.files)
+    with progress_bar("samples", progress) as show:
+        result = simulate_rig(read, truth=truth is not None, integrator=integrator, progress=show)
+    if truth is not None and result.truth is not None:
+        write_table(truth, result.truth)
+    write_table(output, result.recording)
+    written = {"output": output} if truth is None else {"output": output, "truth": truth}
+    print_json(lambda: result.report(read, written))
+    for line in result.summary(read):
+        say(f"{name_of(output)}: {line}")

@@ -1,7 +1,7 @@
 """Tunes contact detection on free motion, and scores it on labelled recordings (`tendonfmu tune`, `score`).
 
-`free_motion` runs a finger over free motion, and `tuning` chooses the bounds for a stated rate of false alarms. `run`
-and `counting` compare decisions with labels; `summary` and `score_report` report the result.
+`free_motion` runs a finger over free motion, and `tuning` chooses the bounds for a stated rate of false alarms.
+`scoring` and `counting` compare decisions with labels; `summary` and `score_report` report the result.
 """
 
 from typing import TYPE_CHECKING
@@ -10,16 +10,12 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import contact_at_rest, score_report, tune_report
-    from .alarm_level import least_hours, rate_limit
+    from .alarm_level import NotEnough, least_hours, rate_limit
     from .bounds import tail_levels
     from .counting import GRACE, DetectionScore, Event, pooled, score_detection
     from .free_motion import SETTLING, FreeRun, free_parts, require_no_contact
-    from .push_sizes import by_size
-    from .run import Subject, Track, run_track
-    from .score_report import Scored
-    from .scoring import check_outputs, score_recordings
+    from .scoring import Scored, Subject, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
-    from .support import NotEnough
     from .tuning import ContactTuning, TuneWarning
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

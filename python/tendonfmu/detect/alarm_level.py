@@ -1,4 +1,4 @@
-"""How high a bound must be for a number of alarms: cells of time, merged alarms, levels, and limits of rates.
+"""How high a bound must be for a number of alarms: cells of time, merged alarms, levels, and which rate is supported.
 
 A cell is a short stretch of time, of which only the largest excess over a bound counts. This makes it cheap to try many
 bounds.
@@ -19,6 +19,7 @@ from scipy.special import gammaincinv
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import MERGED
 from tendonfmu.detect.free_motion import FreePart, Signal
+from tendonfmu.errors import InputError
 
 Index = NDArray[np.int64]
 
@@ -82,14 +83,22 @@ class Cells:
         size = np.diff(np.append(self.first, values.shape[1]))
         return np.asarray((np.add.reduceat(values, self.first, axis=1) / size).T, dtype=float)
 
+    def alarms_at(self, group: int, part: int, begins: Sequence[float]) -> int:
+        """Count the alarms of a part that begin at one pretension, by the nearest counted cell."""
+        inside = np.flatnonzero(self.part == part)
+        if not len(inside):
+            return 0
+        near = inside[np.clip(np.searchsorted(self.time[inside], begins), 0, len(inside) - 1)]
+        return int((self.group[near] == group).sum())
+
 
 def cells_of(parts: Sequence[FreePart]) -> Cells:
     """Divide the counted samples into cells; parts without any have none."""
     rows = [np.flatnonzero(part.counted) for part in parts]
-    time = np.concatenate([part.time[each] - part.time[0] for part, each in zip(parts, rows, strict=True)])
-    owner = np.repeat(np.arange(len(parts)), [len(each) for each in rows])
-    force = np.concatenate([part.mean_force[each] for part, each in zip(parts, rows, strict=True)])
-    seconds = np.concatenate([part.seconds[each] for part, each in zip(parts, rows, strict=True)])
+    time = np.concatenate([part.time[counted] - part.time[0] for part, counted in zip(parts, rows, strict=True)])
+    owner = np.repeat(np.arange(len(parts)), [len(counted) for counted in rows])
+    force = np.concatenate([part.mean_force[counted] for part, counted in zip(parts, rows, strict=True)])
+    seconds = np.concatenate([part.seconds[counted] for part, counted in zip(parts, rows, strict=True)])
     order = np.floor(time / CELL + 1e-6).astype(np.int64) + _FAR * owner
     first = np.flatnonzero(np.diff(order, prepend=-1))
     size = np.diff(np.append(first, len(order)))
@@ -132,7 +141,7 @@ def _blocks(parts: Sequence[FreePart]) -> Numbers:
 
 def rows_of(values: Sequence[Signal], cells: Cells) -> Signal:
     """Join the counted samples of all parts: [N, n] of each become [n, N]."""
-    return np.concatenate([each[rows].T for each, rows in zip(values, cells.rows, strict=True)], axis=1)
+    return np.concatenate([signal[rows].T for signal, rows in zip(values, cells.rows, strict=True)], axis=1)
 
 
 def _groups(force: Numbers, window: Index) -> Index:
@@ -166,7 +175,7 @@ def alarms_above(order: Index, above: NDArray[np.bool_]) -> int:
 
 def level_for(statistic: Numbers, order: Index, allowed: int, others: Index | None = None) -> float:
     """Find the smallest level that at most `allowed` alarms exceed, here and at every higher level, none for long."""
-    present: list[int] = [] if others is None else sorted(int(each) for each in others)
+    present: list[int] = [] if others is None else sorted(map(int, others))
     alarms = count_alarms(np.array(present, dtype=np.int64))
     if alarms > allowed:
         return math.inf
@@ -202,3 +211,56 @@ def _joins(present: list[int], cell: int) -> int:
     if before and after and present[k] - present[k - 1] <= _APART:
         return 0
     return 1 - int(before) - int(after)
+
+
+# --- which rate the recordings are long enough for --------------------------------------------------------------------
+
+
+class NotEnough(InputError):
+    """There is too little free motion: for the wished rate, or any at all."""
+
+    def __init__(self, message: str, more: float) -> None:
+        super().__init__(message)
+        self.more = more
+
+
+@dataclass(frozen=True)
+class Support:
+    """The rate that a tuning is for."""
+
+    rate: float  # (1/h)
+    allowed: int  # alarms
+    more: float = 0.0  # time missing for the wished rate (min)
+    sentences: tuple[str, ...] = ()
+
+
+def supported(cells: Cells, hours: float, wished: float, confidence: float, strict: bool) -> Support:
+    """Find the rate that the recordings support, for a wished rate (1/h)."""
+    allowed = allowed_alarms(hours, wished, confidence)
+    if allowed >= 0:
+        return Support(wished, allowed)
+    needed = least_hours(wished, confidence)
+    share = needed / cells.groups
+    thin = [(force, there) for force, there in hours_by_pretension(cells) if there < share]
+    evenly = ", ".join(f"{60 * (share - there):.1f} min at {force:.3g} N" for force, there in thin)
+    more, rate = 60 * (needed - hours), rate_limit(0, hours, confidence)
+    if strict:
+        raise NotEnough(
+            f"{60 * hours:.1f} min of free motion: even without any alarm the rate may be {rate:.3g} per hour "
+            f"at confidence {confidence:g}; expected {60 * needed:.1f} min for {wished:g} per hour, {more:.1f} min "
+            f"more (evenly: {evenly})",
+            more,
+        )
+    sentence = (
+        f"{60 * hours:.1f} min of free motion: at most {rate:.3g} false alarms an hour with {100 * confidence:g} % "
+        f"confidence; {more:.1f} min more for {wished:g} (evenly: {evenly})"
+    )
+    return Support(rate, 0, more, (sentence,))
+
+
+def hours_by_pretension(cells: Cells) -> list[tuple[float, float]]:
+    """Return the mean force (N) and the time (h) of each pretension."""
+    return [
+        (float(cells.force[cells.group == g].mean()), float(cells.hours[cells.group == g].sum()))
+        for g in range(cells.groups)
+    ]

@@ -2,25 +2,27 @@
 
 A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics.md#contact-detector). Among
 the bounds with at most the allowed alarms, the best is the one that the lightest push exceeds (`least_load`).
+
+The shape of a bound is chosen on all cells, and on each half of them to be counted on the other half. A bound looks
+better than it is on the data that it was chosen on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
 
-from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect.alarm_level import Cells, level_for, rows_of
-from tendonfmu.detect.free_motion import FreeRun, Signal
+from tendonfmu.arrays import Flags, Indices, Numbers
+from tendonfmu.detect.alarm_level import Cells, Index, level_for, rows_of
+from tendonfmu.detect.free_motion import FreePart, FreeRun, Signal
 
-# Pairs (c_H, c_J) to try. A push makes the model jump and ends stiction, so large shares hide it:
-# docs/reference/commands/tune.md
-SHARES = ((0.4, 0.4),)
+# c_H and c_J. A push makes the model jump and ends stiction, so large shares hide it: docs/reference/commands/tune.md
+SHARES = (0.4, 0.4)
 TAILS = (4.0, 16.0)  # times the wished rate: the rates of the tails that shape a bound
 COMPARED = 12  # alarms at which bounds are compared, if fewer are allowed: single extremes tell little about a shape
 _LEAST = 0.02  # of a signal's rms: least value of the part of a bound that is not friction
@@ -28,7 +30,10 @@ WORTH_STUCK, WORTH_JUMP = 0.25, 5.0  # weights of H and J that a push has to exc
 _EVERY = 10  # one cell in so many for the mean logarithm
 _FACTORS = (0.9, 1.1)
 _NEAR = 0.4  # of a bound: cells below it cannot exceed a refined bound
-_FEW_ROUNDS, _ROUNDS = 2, 4  # rounds over all joints: for every pair of shares, and for the best one
+_FEW_ROUNDS, _ROUNDS = 2, 4  # rounds over all joints, the second time near the bound found by the first
+SECOND_SHARE = 4  # the residual, as second signal, gets one in so many of the allowed alarms
+_SCALES = np.geomspace(0.15, 3.0, 48)  # scales of a bound at which evidence is computed
+_FASTEST = 10.0  # growth of g: docs/reference/semantics.md#contact-detector
 
 
 @dataclass(frozen=True)
@@ -51,24 +56,6 @@ class Bound:
     def at_least(self, least: Numbers, force: float) -> Bound:
         """Raise the bases until base + per_force·f is at least `least` [n] (N·m) at and above a mean force."""
         return replace(self, base=np.maximum(self.base, least - force * self.per_force))
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A pair of shares that was tried, and the mean logarithm of `least_load` (N·m) at the allowed number of alarms."""
-
-    stuck_share: float
-    jump_share: float
-    mean_log: float
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The best bound of a subset of cells, and all pairs that were tried."""
-
-    bound: Bound
-    mean_log: float
-    tried: list[Tried]
 
 
 def least_load(whole: Numbers) -> Numbers:
@@ -112,10 +99,6 @@ class Search:
         if self.uncertain is not None:
             over = over - self.uncertain
         return np.ascontiguousarray(np.maximum.reduceat(over, self.cells.first, axis=1).T)
-
-    def statistic(self, bound: Bound) -> Numbers:
-        """Compute [c] the largest ratio over joints of the excess to base + per_force·f; above 1 is an alarm."""
-        return statistic(self.excess(bound.stuck_share, bound.jump_share), bound, self.cells.force)
 
     def sound(self, bound: Bound) -> Bound:
         """Raise a bound where its own part falls below `least` at a recorded force."""
@@ -171,84 +154,94 @@ def statistic(over: Signal, bound: Bound, force: Numbers) -> Numbers:
 # --- search -----------------------------------------------------------------------------------------------------------
 
 
-def choose(
-    search: Search, subsets: Sequence[Flags], allowed: Sequence[int], tick: Callable[[], None] | None = None
-) -> list[Choice]:
-    """Choose the best bound of every subset of cells [c], with at most `allowed` alarms in each."""
-    best: list[Choice | None] = [None] * len(subsets)
+@dataclass(frozen=True)
+class Line:
+    """One way to an alarm: a signal and its bound, at the number of alarms at which shapes are compared."""
 
-    def consider(pair: tuple[float, float]) -> None:
-        over = search.excess(*pair)
-        for k, (subset, most) in enumerate(zip(subsets, allowed, strict=True)):
-            found = _best_tail(search, pair, over[subset], subset, most)
-            found = _refined(search, found, over[subset], subset, most, _FEW_ROUNDS)
-            before = best[k]
-            tried = [*(before.tried if before else []), Tried(*pair, found.mean_log)]
-            better = before is None or found.mean_log < before.mean_log
-            best[k] = replace(found if better or before is None else before, tried=tried)
-        if tick is not None:
-            tick()
-
-    for pair in SHARES:
-        consider(pair)
-    done = zip([each for each in best if each is not None], subsets, allowed, strict=True)
-    return [_refined_whole(search, *each) for each in done]
+    bound: Bound  # chosen on all cells
+    halves: tuple[Bound, Bound]  # chosen on each half
+    statistic: Numbers  # [c] in sample
+    held: Numbers  # [c] by the bound of the other half
+    mean_log: float = 0.0  # mean logarithm of `least_load` (N·m) after the first rounds
+    least: float = 0.0  # smallest factor that keeps the bound sound
 
 
-def choose_at(search: Search, pair: tuple[float, float], subset: Flags, allowed: int) -> Choice:
-    """Choose the best bound of a subset of cells with given shares."""
-    return _refined_whole(
-        search, _best_tail(search, pair, search.excess(*pair)[subset], subset, allowed), subset, allowed
-    )
+def searched_line(search: Search, allowed: int) -> Line:
+    """Search the line of the first signal."""
+    return _line(search, SHARES, allowed, (_FEW_ROUNDS, _ROUNDS))
 
 
-def _best_tail(search: Search, pair: tuple[float, float], over: Signal, subset: Flags, allowed: int) -> Choice:
-    found: Choice | None = None
-    for tail in TAILS:
-        force, level = tail_levels(search.cells, over, subset, tail * search.rate)
-        shape = search.sound(Bound(*lines_through(force, np.maximum(level, search.least)), *pair))
-        bound, worth = _at_level(search, shape, over, subset, allowed)
-        if found is None or worth < found.mean_log:
-            found = Choice(bound, worth, [])
-    assert found is not None
-    return found
+def given_line(search: Search, shares: tuple[float, float], allowed: int) -> Line:
+    """Search a line beside the first one, with given shares."""
+    return _line(search, shares, allowed, (_ROUNDS,))
 
 
-def _at_level(search: Search, shape: Bound, over: Signal, subset: Flags, allowed: int) -> tuple[Bound, float]:
-    """Return a shape at the least level with the allowed alarms, and the mean logarithm of the lightest push found."""
-    level = level_for(statistic(over, shape, search.cells.force[subset]), search.cells.order[subset], allowed)
-    return _worth(search, shape.scaled(max(level, search.least_factor(shape))), subset)
+def _line(search: Search, shares: tuple[float, float], allowed: int, rounds: Sequence[int]) -> Line:
+    cells, over, fold = search.cells, search.excess(*shares), search.cells.fold
+    most = max(allowed, COMPARED)
+    everywhere = np.ones(len(fold), dtype=bool)
+    halves = [half if half.any() else everywhere for half in (fold == 0, fold == 1)]  # empty if too short for a block
+    choices = []
+    for subset, alarms in ((everywhere, most), (halves[0], most // 2), (halves[1], most // 2)):
+        trial = _Trial(search, over[subset], subset, alarms)
+        bound, mean_log = trial.best_tail(shares)
+        first_log = mean_log
+        for k, count in enumerate(rounds):
+            bound, mean_log = trial.refined(bound, mean_log, count)
+            first_log = mean_log if k == 0 else first_log
+        choices.append((bound, first_log))
+    (whole, mean_log), (first, _), (second, _) = choices
+    # the bound chosen on fold 0 is counted on fold 1
+    in_sample, of_first, of_second = (statistic(over, bound, cells.force) for bound in (whole, first, second))
+    held = np.where(fold == 1, of_first, of_second)
+    return Line(whole, (first, second), in_sample, held, mean_log, search.least_factor(whole))
 
 
-def _worth(search: Search, bound: Bound, subset: Flags) -> tuple[Bound, float]:
-    rows = np.flatnonzero(subset)[::_EVERY]
-    return bound, float(np.mean(np.log(least_load(search.in_the_way(bound, rows)))))
+@dataclass(frozen=True)
+class _Trial:
+    """A subset of cells, in which a bound may have a number of alarms."""
 
+    search: Search
+    over: Signal  # [k, n] excess in the cells of the subset
+    subset: Flags  # [c]
+    allowed: int
 
-def _refined_whole(search: Search, choice: Choice, subset: Flags, allowed: int) -> Choice:
-    over = search.excess(choice.bound.stuck_share, choice.bound.jump_share)[subset]
-    return _refined(search, choice, over, subset, allowed, _ROUNDS)
+    def best_tail(self, shares: tuple[float, float]) -> tuple[Bound, float]:
+        """Return the best bound by the shape of a tail, and the mean logarithm of the lightest push."""
+        search = self.search
+        tried = []
+        for tail in TAILS:
+            force, level = tail_levels(search.cells, self.over, self.subset, tail * search.rate)
+            shape = search.sound(Bound(*lines_through(force, np.maximum(level, search.least)), *shares))
+            tried.append(self.at_level(shape, self.over, np.flatnonzero(self.subset)))
+        return min(tried, key=lambda choice: choice[1])
 
+    def at_level(self, shape: Bound, over: Signal, cells: Indices) -> tuple[Bound, float]:
+        """Return a shape at the least level with the allowed alarms in some cells, and its mean logarithm."""
+        search = self.search
+        level = level_for(statistic(over, shape, search.cells.force[cells]), search.cells.order[cells], self.allowed)
+        bound = shape.scaled(max(level, search.least_factor(shape)))
+        rows = np.flatnonzero(self.subset)[::_EVERY]
+        return bound, float(np.mean(np.log(least_load(search.in_the_way(bound, rows)))))
 
-def _refined(search: Search, choice: Choice, over: Signal, subset: Flags, allowed: int, rounds: int) -> Choice:
-    """Raise or lower the bases of single joints as long as this finds lighter pushes."""
-    best = choice
-    # a cell far below the bound stays below all bounds near it
-    near = np.flatnonzero(statistic(over, choice.bound, search.cells.force[subset]) > _NEAR)
-    over, force, order = over[near], search.cells.force[subset][near], search.cells.order[subset][near]
-    for _ in range(rounds):
-        before = best.mean_log
-        for j, factor in product(range(over.shape[1]), _FACTORS):
-            scale = np.ones(over.shape[1])
-            scale[j] = factor
-            shape = replace(best.bound, base=scale * best.bound.base, per_force=scale * best.bound.per_force)
-            level = level_for(statistic(over, shape, force), order, allowed)
-            bound, worth = _worth(search, shape.scaled(max(level, search.least_factor(shape))), subset)
-            if worth < best.mean_log:
-                best = replace(best, bound=bound, mean_log=worth)
-        if before - best.mean_log < 1e-3:
-            break
-    return best
+    def refined(self, bound: Bound, mean_log: float, rounds: int) -> tuple[Bound, float]:
+        """Raise or lower the bases of single joints as long as this finds lighter pushes."""
+        # a cell far below the bound stays below all bounds near it
+        inside = np.flatnonzero(self.subset)
+        near = np.flatnonzero(statistic(self.over, bound, self.search.cells.force[inside]) > _NEAR)
+        over, cells = self.over[near], inside[near]
+        for _ in range(rounds):
+            before = mean_log
+            for j, factor in product(range(over.shape[1]), _FACTORS):
+                scale = np.ones(over.shape[1])
+                scale[j] = factor
+                shape = replace(bound, base=scale * bound.base, per_force=scale * bound.per_force)
+                other, worth = self.at_level(shape, over, cells)
+                if worth < mean_log:
+                    bound, mean_log = other, worth
+            if before - mean_log < 1e-3:
+                break
+        return bound, mean_log
 
 
 def tail_levels(cells: Cells, over: Signal, subset: Flags, rate: float) -> tuple[Numbers, Numbers]:
@@ -269,6 +262,73 @@ def lines_through(force: Numbers, level: Numbers) -> tuple[Numbers, Numbers]:
     if len(force) < 2:
         return level[0].astype(float), np.zeros(level.shape[1])
     columns = np.column_stack([np.ones_like(force), force])
-    found = np.array([nnls(columns / each[:, None], np.ones_like(force))[0] for each in level.T])
-    found[found * np.array([1.0, force.max()]) < 1e-9 * level.max()] = 0.0  # rounding
-    return found[:, 0], found[:, 1]
+    lines = np.array([nnls(columns / values[:, None], np.ones_like(force))[0] for values in level.T])
+    lines[lines * np.array([1.0, force.max()]) < 1e-9 * level.max()] = 0.0  # rounding
+    return lines[:, 0], lines[:, 1]
+
+
+# --- levels -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Level:
+    """Factor on the bound of a line."""
+
+    in_sample: float
+    held_out: float
+
+    @property
+    def factor(self) -> float:
+        """The larger factor, so that the rate also holds on data that the bound was not chosen on."""
+        return max(self.in_sample, self.held_out)
+
+
+def level_of(line: Line, cells: Cells, allowed: int, others: Index | None = None, held: Index | None = None) -> Level:
+    """Find the level of a line. `others` and `held` are cells in alarm by another line, in sample and held out."""
+    return Level(
+        in_sample=max(level_for(line.statistic, cells.order, allowed, others), line.least),
+        held_out=max(level_for(line.held, cells.order, allowed, held), line.least),
+    )
+
+
+# --- evidence ---------------------------------------------------------------------------------------------------------
+
+
+def evidence_line(search: Search, line: Line, parts: Sequence[FreePart], time: float) -> Line:
+    """Return the line of method `cusum`: the same bounds, exceeded when the evidence passes `time` (s)."""
+    step, force, start = _sample_steps(search.cells, parts)
+    scales = []
+    for bound in (line.bound, *line.halves):
+        critical = np.full(len(search.cells.order), _SCALES[0])
+        for scale, above in pairwise(_SCALES):
+            alarm = _evidence(search, bound.scaled(float(scale)), step, force, start) > time
+            if not alarm.any():
+                break
+            critical[alarm] = above  # at the next scale the cell has no alarm
+        scales.append(critical)
+    whole, first, second = scales
+    held = np.where(search.cells.fold == 1, first, second)
+    return replace(line, statistic=whole, held=held)
+
+
+def _sample_steps(cells: Cells, parts: Sequence[FreePart]) -> tuple[Numbers, Numbers, Index]:
+    """Return [N] the time since the previous counted sample (s), [N] the mean force (N), and the starts of parts."""
+    step = np.concatenate([part.seconds[rows] for part, rows in zip(parts, cells.rows, strict=True)])
+    force = np.concatenate([part.mean_force[rows] for part, rows in zip(parts, cells.rows, strict=True)])
+    lengths = [len(rows) for rows in cells.rows if len(rows)]
+    return step, force, np.cumsum([0, *lengths], dtype=np.int64)
+
+
+def _evidence(search: Search, bound: Bound, step: Numbers, force: Numbers, start: Index) -> Signal:
+    """Compute [c] the largest g of each cell over all joints (s; docs/reference/semantics.md#contact-detector)."""
+    largest = np.zeros(len(search.cells.order))
+    for j in range(len(search.signal)):
+        whole = bound.base[j] + bound.per_force[j] * force
+        whole += bound.stuck_share * search.stuck[j] + bound.jump_share * search.jump[j]
+        gain = step * np.minimum(_FASTEST, search.signal[j] / whole - 1.0)
+        evidence = np.empty_like(gain)
+        for begin, end in pairwise(start):
+            total = np.cumsum(gain[begin:end])
+            evidence[begin:end] = total - np.minimum(np.minimum.accumulate(total), 0.0)
+        largest = np.maximum(largest, np.maximum.reduceat(evidence, search.cells.first))
+    return np.asarray(largest)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Data, Numbers, rounded
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
 from tendonfmu.detect.free_motion import NEVER, FreePart
 from tendonfmu.files import counted
@@ -32,6 +32,7 @@ SLOWEST = 0.5  # of velocity_threshold.tendon: a faster motor moves, and its spa
 NOISE_LEVEL = 5.0  # σ: 100,000 independent averages per hour and joint exceed it once in 17 hours
 FOLDS = 5
 BEYOND = 1.2  # margin over the largest change if no alarm is allowed: the next hour may have a larger one
+_DIGITS = 4  # of a written bound
 _ROUNDS, _RAISE = 12, 1.1  # most steps, and the factor of each, until the running finger keeps the rate
 
 
@@ -74,31 +75,29 @@ class Bounds:
         return {
             "travel": travel,
             "settle_time": SETTLE_TIME,
-            "threshold": _rounded(self.threshold),
-            "creep": _rounded(self.creep),
-            "innovation": {"time": INNOVATION_TIME, "threshold": _rounded(self.sudden)},
+            "threshold": rounded(self.threshold, _DIGITS),
+            "creep": rounded(self.creep, _DIGITS),
+            "innovation": {"time": INNOVATION_TIME, "threshold": rounded(self.sudden, _DIGITS)},
         }
 
 
 def learn_rest(
-    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
+    data: Data, parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
 ) -> tuple[RestRule | None, list[str]]:
     """Learn the rule for a rate of false alarms per hour of rest."""
     if not all("tendon_position" in part.arrays for part in parts):
-        return None, [_left_out("there are no tendon positions")]
+        return None, [f"{LEFT_OUT}there are no tendon positions"]
     travel = standing_travel(data, parts)
     if travel is None:
-        return None, [_left_out(f"the motors never stand for {SETTLE_TIME:g} s")]
+        return None, [f"{LEFT_OUT}the motors never stand for {SETTLE_TIME:g} s"]
     joints = len(data["joints"])
     never = {"travel": travel, "settle_time": SETTLE_TIME, "threshold": [NEVER] * joints}
     rests = find_rests(data, parts, kinematics, never)
-    hours = sum(float(each.time[-1]) for each in rests) / 3600.0
+    hours = sum(float(rest.time[-1]) for rest in rests) / 3600.0
     if 60.0 * hours < LEAST_MINUTES or len(rests) < LEAST_RESTS:
         return None, [
-            _left_out(
-                f"{counted(len(rests), 'rest')} of {60.0 * hours:.2g} min in all; expected at least {LEAST_RESTS} of "
-                f"more than {LEAST_REST:g} s and {LEAST_MINUTES:g} min in all"
-            )
+            f"{LEFT_OUT}{counted(len(rests), 'rest')} of {60.0 * hours:.2g} min in all; expected at least "
+            f"{LEAST_RESTS} of more than {LEAST_REST:g} s and {LEAST_MINUTES:g} min in all"
         ]
     allowed = max(0, allowed_alarms(hours, rate, confidence))
     factor, held_out = level(rests, allowed)
@@ -109,24 +108,20 @@ def learn_rest(
             break
         bounds = bounds.scaled(_RAISE)
     limit = rate_limit(max(alarms, held_out), hours, confidence)
-    found = RestRule(bounds.keys(travel), len(rests), hours, held_out, alarms, limit)
+    rule = RestRule(bounds.keys(travel), len(rests), hours, held_out, alarms, limit)
     sentences = []
     if limit > rate:
         sentences.append(
             f"contact.rest: {counted(len(rests), 'rest')} of {60.0 * hours:.3g} min: at most {limit:.3g} false alarms "
             f"per hour of rest are supported at confidence {confidence:g}, not {rate:g}"
         )
-    return found, sentences
-
-
-def _left_out(why: str) -> str:
-    return f"{LEFT_OUT}{why}"
+    return rule, sentences
 
 
 # --- motors -----------------------------------------------------------------------------------------------------------
 
 
-def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float | None:
+def standing_travel(data: Data, parts: Sequence[FreePart]) -> float | None:
     """Return the travel (m) that a standing motor stays within; None if no motor ever stands."""
     spans, resolution = [], np.inf
     for part in parts:
@@ -149,11 +144,9 @@ def standing_travel(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float
 # --- torques ----------------------------------------------------------------------------------------------------------
 
 
-def find_rests(
-    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
-) -> list[Rest]:
+def find_rests(data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data) -> list[Rest]:
     """Find the rests of more than LEAST_REST in all parts, as the runtime defines them."""
-    found = []
+    rests = []
     for part, outputs in _runs(data, parts, kinematics, rule):
         change = outputs["contact_change"]
         standing = (change != 0.0).any(axis=1) & part.counted
@@ -162,8 +155,8 @@ def find_rests(
             time = part.time[begin:end] - part.time[begin]
             if time[-1] >= LEAST_REST:
                 inside = change[begin:end]
-                found.append(Rest(time, np.abs(inside), np.abs(_innovation(time, inside)), _noise(time, inside)))
-    return found
+                rests.append(Rest(time, np.abs(inside), np.abs(_innovation(time, inside)), _noise(time, inside)))
+    return rests
 
 
 def _innovation(time: Numbers, change: Numbers) -> Numbers:
@@ -185,15 +178,15 @@ def _noise(time: Numbers, change: Numbers) -> Numbers:
 
 def fit_bounds(rests: Sequence[Rest]) -> Bounds:
     """Fit the smallest bounds that no change of these rests exceeds, apart from noise."""
-    noise = NOISE_LEVEL * np.sqrt(2.0) * np.median([each.noise for each in rests], axis=0)
-    early = np.max([each.change[each.time <= SETTLE_TIME].max(axis=0) for each in rests], axis=0)
+    noise = NOISE_LEVEL * np.sqrt(2.0) * np.median([rest.noise for rest in rests], axis=0)
+    early = np.max([rest.change[rest.time <= SETTLE_TIME].max(axis=0) for rest in rests], axis=0)
     threshold = _above_zero(np.maximum(noise, early))
     creep = np.zeros_like(threshold)
-    for each in rests:
-        late = each.time > SETTLE_TIME
-        slope = (each.change[late] - threshold) / np.sqrt(each.time[late])[:, None]
+    for rest in rests:
+        late = rest.time > SETTLE_TIME
+        slope = (rest.change[late] - threshold) / np.sqrt(rest.time[late])[:, None]
         creep = np.maximum(creep, slope.max(axis=0, initial=0.0))
-    sudden = _above_zero(np.maximum(noise, np.max([each.sudden.max(axis=0) for each in rests], axis=0)))
+    sudden = _above_zero(np.maximum(noise, np.max([rest.sudden.max(axis=0) for rest in rests], axis=0)))
     return Bounds(threshold, creep, sudden)
 
 
@@ -212,8 +205,8 @@ def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
     """Return the factor, at least 1, on bounds fitted to all rests, and its alarms in rests held out in turn."""
     held = np.zeros(len(rests))
     for fold in range(FOLDS):
-        bounds = fit_bounds([each for k, each in enumerate(rests) if k % FOLDS != fold])
-        held[fold::FOLDS] = [excess(each, bounds) for each in rests[fold::FOLDS]]
+        bounds = fit_bounds([rest for k, rest in enumerate(rests) if k % FOLDS != fold])
+        held[fold::FOLDS] = [excess(rest, bounds) for rest in rests[fold::FOLDS]]
     largest = np.sort(held)[::-1]
     factor = max(1.0, float(largest[allowed]) if allowed < len(held) else 0.0)
     if not allowed:
@@ -221,7 +214,7 @@ def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
     return factor, int((held > factor).sum())
 
 
-def count_alarms(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]) -> int:
+def count_alarms(data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data) -> int:
     """Count the starts of `contact_at_rest` of the finger with this rule, in counted time."""
     count = 0
     for part, outputs in _runs(data, parts, kinematics, rule):
@@ -232,17 +225,13 @@ def count_alarms(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics:
 
 
 def _runs(
-    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, rule: Mapping[str, Any]
+    data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data
 ) -> list[tuple[FreePart, dict[str, NDArray[Any]]]]:
     contact = {**data["contact"], "rest": dict(rule)}
     finger = native.Instance.from_description(json.dumps({**data, "contact": contact}), kinematics)
-    begin, found = finger.save_state(), []
+    begin, runs = finger.save_state(), []
     for part in parts:
         finger.restore_state(begin)
         outputs = finger.run(part.arrays)
-        found.append((part, {name: outputs[name] for name in ("contact_change", "contact_at_rest")}))
-    return found
-
-
-def _rounded(values: Numbers) -> list[float]:
-    return [float(f"{value:.4g}") for value in values]
+        runs.append((part, {name: outputs[name] for name in ("contact_change", "contact_at_rest")}))
+    return runs

@@ -1,4 +1,4 @@
-"""Recordings of free motion to tune contact detection on: the check for contact, and the residuals of a finger."""
+"""Recordings of free motion to tune contact detection on: the check for contact, residuals, and alarms of a finger."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect.counting import sample_seconds
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, native, number_of
@@ -138,7 +138,7 @@ def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> N
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def run_free(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, clock: Clock) -> list[FreeRun]:
+def run_free(data: Data, parts: Sequence[FreePart], kinematics: int, clock: Clock) -> list[FreeRun]:
     """Run the finger over every part with contact detection switched off."""
     probe = _finger(_open_loop(data, clock), kinematics)
     plain = _finger(_without_uncertainty(_open_loop(data, clock)), kinematics) if _is_uncertain(data) else None
@@ -159,11 +159,11 @@ def run_free(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int
     return runs
 
 
-def _is_uncertain(data: Mapping[str, Any]) -> bool:
+def _is_uncertain(data: Data) -> bool:
     return (data.get("contact") or {}).get("uncertainty") is not None
 
 
-def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
+def _open_loop(data: Data, clock: Clock) -> dict[str, Any]:
     """Return the description with all signals of contact detection, and thresholds that are never exceeded."""
     never = [NEVER] * len(data["joints"])
     given = data["contact"].get("friction_bound") or {}
@@ -185,11 +185,11 @@ def _open_loop(data: Mapping[str, Any], clock: Clock) -> dict[str, Any]:
     return {**data, "contact": contact, "sensor_fault": None}
 
 
-def _without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
+def _without_uncertainty(data: Data) -> dict[str, Any]:
     return {**data, "contact": {key: value for key, value in data["contact"].items() if key != "uncertainty"}}
 
 
-def _finger(data: Mapping[str, Any], kinematics: int) -> native.Instance:
+def _finger(data: Data, kinematics: int) -> native.Instance:
     return native.Instance(native.image_from_json(json.dumps(data)), kinematics)
 
 
@@ -200,11 +200,57 @@ def _run(finger: native.Instance, part: FreePart) -> dict[str, NDArray[Any]]:
         raise InputError(f"{part.source}: {refused}") from None
 
 
-def closed_loop(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> list[Flags]:
+def closed_loop(data: Data, parts: Sequence[FreePart], kinematics: int) -> list[Flags]:
     """Return [N] `contact` of the finger as it is, for every part."""
     finger = _finger(data, kinematics)
-    begin, found = finger.save_state(), []
+    begin, contacts = finger.save_state(), []
     for part in parts:
         finger.restore_state(begin)
-        found.append(np.asarray(_run(finger, part)["contact"]).ravel().astype(bool))
-    return found
+        contacts.append(np.asarray(_run(finger, part)["contact"]).ravel().astype(bool))
+    return contacts
+
+
+@dataclass(frozen=True)
+class LoopAlarms:
+    """Alarms of one part."""
+
+    part: int
+    source: str
+    begins: list[float]
+    ends: list[float]
+    at_start: int
+    hours: float
+    seconds: float
+    alarm_seconds: float
+
+    @property
+    def alarms(self) -> int:
+        return len(self.begins)
+
+    @property
+    def longest(self) -> float:
+        """Longest alarm (s); 0 without alarms."""
+        return max((end - begin for begin, end in zip(self.begins, self.ends, strict=True)), default=0.0)
+
+
+def count_loop(data: Data, parts: Sequence[FreePart], kinematics: int) -> list[LoopAlarms]:
+    """Run the finger over every part from its start. An alarm counts if it begins in counted time."""
+    alarms = []
+    for k, (part, contact) in enumerate(zip(parts, closed_loop(data, parts, kinematics), strict=True)):
+        time = part.time - part.time[0]
+        spans = stretches(part.time, contact)
+        settled = time[spans[:, 0]] >= SETTLING if len(spans) else np.zeros(0, dtype=bool)
+        counted = spans[part.counted[spans[:, 0]]] if len(spans) else spans
+        alarms.append(
+            LoopAlarms(
+                part=k,
+                source=part.source,
+                begins=[float(time[begin]) for begin, _ in counted],
+                ends=[float(time[end] + part.seconds[end]) for _, end in counted],
+                at_start=int((~settled).sum()),
+                hours=part.hours,
+                seconds=float(part.seconds.sum()),
+                alarm_seconds=float(part.seconds[contact].sum()),
+            )
+        )
+    return alarms

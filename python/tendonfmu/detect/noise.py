@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, nnls
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.alarm_level import Cells, rows_of
 from tendonfmu.detect.bounds import Bound
 from tendonfmu.detect.free_motion import FreePart, FreeRun
@@ -49,7 +49,7 @@ def drift_variance(noise: float, noise_time: float, time: float) -> float:
     return noise**2 * noise_time / time**2
 
 
-def wanted_time(data: Mapping[str, Any], parts: Sequence[FreePart], bias_time: float | None) -> float:
+def wanted_time(data: Data, parts: Sequence[FreePart], bias_time: float | None) -> float:
     """Return the time constant of the bias (s): as asked for, else that of the description at the mean force."""
     if bias_time is not None:
         return bias_time
@@ -61,7 +61,7 @@ def wanted_time(data: Mapping[str, Any], parts: Sequence[FreePart], bias_time: f
     return time_constant(given.drift, noise, noise_time(data, parts))
 
 
-def noise_time(data: Mapping[str, Any], parts: Sequence[FreePart]) -> float:
+def noise_time(data: Data, parts: Sequence[FreePart]) -> float:
     """Return bias.noise_time (s), or the median step if the noise counts per sample."""
     given = bias_settings(data).noise_time
     return float(np.median([np.median(np.diff(part.time)) for part in parts])) if given is None else given
@@ -73,7 +73,7 @@ def mean_force(parts: Sequence[FreePart]) -> float:
     return sum(float((part.mean_force * part.seconds)[part.counted].sum()) / 3600.0 for part in parts) / total
 
 
-def bias_noise(data: Mapping[str, Any], runs: Sequence[FreeRun], cells: Cells, time: float) -> BiasNoise:
+def bias_noise(data: Data, runs: Sequence[FreeRun], cells: Cells, time: float) -> BiasNoise:
     """Estimate the noise from the spread of the residuals over the mean force, and the drift for a time constant."""
     parts = [run.part for run in runs]
     square = cells.mean(rows_of([run.residual for run in runs], cells) ** 2).mean(axis=1)
@@ -102,8 +102,8 @@ def _line(force: Numbers, value: Numbers) -> tuple[float, float]:
     if force.max() < 1.1 * force.min():
         return float(value.mean()), 0.0
     columns = np.column_stack([np.ones_like(force), force]) / value[:, None]
-    found, _ = nnls(columns, np.ones_like(force))
-    return float(found[0]), float(found[1])
+    (base, slope), _ = nnls(columns, np.ones_like(force))
+    return float(base), float(slope)
 
 
 # --- the estimate's standard deviation --------------------------------------------------------------------------------

@@ -5,36 +5,27 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event
-from tendonfmu.detect.run import Subject, Track
+from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
+from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Estimate, intervals
 
 FORMAT = "tendonfmu-score-1"
 
 
-@dataclass(frozen=True)
-class Scored:
-    """A finished score."""
-
-    subject: Subject  # what was scored
-    kinematics: int  # 1 tendon positions, 2 measured joint positions, 3 joint positions and velocities
-    labels: str  # column of the label
-    seed: int  # seed of the resampling
-    tracks: Sequence[Track]  # by recording
-    scores: Sequence[DetectionScore]
-    summaries: Sequence[Summary]
-    summary: Summary  # summary of all recordings together
-    roc: Sequence[RocPoint] | None  # points of the ROC, or None
-    no_roc: str | None  # why there is no ROC, or None
-    warnings: Sequence[str]  # sentences
+SIZES = (
+    1.5,
+    3.0,
+    6.0,
+    math.inf,
+)  # of pushes: times the rms of the joint's residual, at the joint with the largest ratio
 
 
 def build_report(scored: Scored) -> dict[str, Any]:
@@ -44,11 +35,11 @@ def build_report(scored: Scored) -> dict[str, Any]:
         "finger": scored.subject.finger.name,
         "model": str(scored.subject.path),
         "joints": scored.subject.finger.joint_names,
-        "kinematics": scored.kinematics,
-        "labels": scored.labels,
+        "kinematics": scored.options.kinematics,
+        "labels": LABEL if scored.options.labels is None else scored.options.labels,
         "definitions": {"merged_s": MERGED, "silent_s": SILENT, "grace_s": GRACE},
         "confidence": intervals.CONFIDENCE,
-        "seed": scored.seed,
+        "seed": scored.options.seed,
         "warnings": list(scored.warnings),
         **_summary(scored.summary),
         "roc": {
@@ -193,3 +184,34 @@ def _interval(found: Estimate) -> list[float] | None:
 
 def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:
     return None if values is None else [float(value) for value in values]
+
+
+def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:
+    """Count the pushes, and those found, by the torque of a reference sensor over the residual of free motion."""
+    # left: [n] rms of the residual (N·m)
+    sizes, hits = [], []
+    scale = np.maximum(np.array(left), 1e-12)
+    for track, score in zip(scored.tracks, scored.scores, strict=True):
+        if track.external is None:
+            return None
+        for event in score.events:
+            touched = (track.recording.time >= event.onset) & (track.recording.time <= event.end)
+            sizes.append(float((np.abs(track.external[touched]) / scale).max()))
+            hits.append(event.found)
+    low, rows = 0.0, []
+    for high in SIZES:
+        inside = [hit for size, hit in zip(sizes, hits, strict=True) if low <= size < high]
+        if inside:
+            share = intervals.share(sum(inside), len(inside))
+            rows.append(
+                {
+                    "from": low,
+                    "below": None if math.isinf(high) else high,
+                    "events": len(inside),
+                    "found": sum(inside),
+                    "share": share.value,
+                    "interval": [share.low, share.high],
+                }
+            )
+        low = high
+    return rows

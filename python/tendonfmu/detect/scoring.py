@@ -1,93 +1,178 @@
-"""The score of a finger on labelled recordings: what the command `tendonfmu score` computes."""
+"""The score of a finger, or its FMU, on labelled recordings: runs, decisions, and runs with other thresholds."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Sequence
+import zipfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from tendonfmu.detect.counting import DetectionScore, pooled
-from tendonfmu.detect.run import Subject, Track, read_subject, run_track, score_scaled
-from tendonfmu.detect.score_report import Scored
-from tendonfmu.detect.summary import FACTORS, RocPoint, roc, summarise
+import numpy as np
+from numpy.typing import NDArray
+
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
+from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
-from tendonfmu.files import check_output, check_output_folder, counted
-from tendonfmu.model import FingerSource
-from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
+from tendonfmu.files import counted
+from tendonfmu.fmu import check_model, outputs_of, run_fmu
+from tendonfmu.model import (
+    DEFAULTS,
+    RANGES,
+    Finger,
+    FingerSource,
+    finger_file,
+    inputs_used,
+    native,
+    read_finger,
+    watches_motors,
+)
+from tendonfmu.options import ScoreOptions
+from tendonfmu.recordings import (
+    GROUP_PER,
+    LABEL,
+    Recording,
+    RecordingSource,
+    gaps,
+    listed_sources,
+    model_alone,
+    read_recordings,
+)
 
 Progress = Callable[[int, int], None]
 
-NO_ROC_OF_FMU = "an FMU was scored: its thresholds are as packed; score FINGER.json for the ROC"
+USUAL = ScoreOptions()
+# the keys of `contact` that decide
+THRESHOLDS = ("threshold", "threshold_per_force")
+SHARES = ("stuck_share", "jump_share")
+REST_BOUNDS = (*THRESHOLDS, "creep")
+UNCERTAINTY_LEVEL = "uncertainty_level"
+LARGEST = {
+    **{key: RANGES[f"contact.friction_bound.{key}"][1] for key in SHARES},
+    UNCERTAINTY_LEVEL: RANGES[f"contact.{UNCERTAINTY_LEVEL}"][1],
+}
 
 
-def check_outputs(output: Path, figures: Path | None, inputs: Sequence[Path]) -> None:
-    """Check that the results can be written, before a long computation."""
-    if output.suffix.lower() != ".json":
-        raise InputError(f"{output}: expected a name that ends in .json")
-    check_output(output, *inputs)
-    if figures is not None:
-        check_output_folder(figures)
+@dataclass(frozen=True)
+class Subject:
+    """What is scored."""
+
+    path: Path  # file as given, or the name of a finger in memory
+    finger: Finger  # its description
+    packed: bool  # whether the file is an FMU; then the FMU runs
+
+
+@dataclass(frozen=True)
+class Track:
+    """A finger over a recording."""
+
+    recording: Recording  # the recording
+    label: Flags  # [N] label; False throughout if there is none
+    outputs: Mapping[str, NDArray[Any]]  # outputs of `native.Instance.run`
+    residual: Numbers  # [N, n] residual before the bias update, NaN where it is unknown (N·m)
+    force: Numbers | None  # [N] sensed force (N), or None
+
+    @property
+    def alarm(self) -> Flags:
+        """[N] whether the finger reports contact."""
+        return np.asarray(self.outputs["contact"].ravel().astype(bool))
+
+    @property
+    def external(self) -> Numbers | None:
+        """[N, n] torque of the reference sensor (N·m), or None."""
+        return self.recording.groups.get("external_torque")
+
+    def score(self) -> DetectionScore:
+        """Score the recording with all its signals."""
+        outputs = self.outputs
+        signals = Signals(
+            residual=self.residual,
+            compensated=outputs["compensated_torque"],
+            external=self.external,
+            force=self.force,
+            deviation=outputs.get("compensated_torque_std"),
+        )
+        return score_detection(self.recording.time, self.label, self.alarm, signals)
+
+    def decisions(self) -> DetectionScore:
+        """Score the decisions alone."""
+        return score_detection(self.recording.time, self.label, self.alarm)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A finished score."""
+
+    subject: Subject  # what was scored
+    options: ScoreOptions
+    tracks: Sequence[Track]  # by recording
+    scores: Sequence[DetectionScore]
+    summaries: Sequence[Summary]
+    summary: Summary  # summary of all recordings together
+    roc: Sequence[RocPoint] | None  # points of the ROC; None for an FMU
+    warnings: Sequence[str]  # sentences
+
+    @property
+    def no_roc(self) -> str | None:
+        """Why there is no ROC."""
+        if self.roc is not None:
+            return None
+        return "an FMU was scored: its thresholds are as packed; score FINGER.json for the ROC"
 
 
 def score_recordings(
     model: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
-    *,
-    labels: str | None = None,
-    force: str | None = None,
-    kinematics: int = 1,
-    seed: int = 0,
+    options: ScoreOptions = USUAL,
     progress: Progress | None = None,
 ) -> Scored:
     """Score a finger, or its FMU, on recordings."""
-    # force: (N)
     sources = listed_sources(recordings)
     check_given_once(sources, [])
     subject = read_subject(model)
-    column = LABEL if labels is None else labels
-    read = _read(sources, column, force)
+    column = LABEL if options.labels is None else options.labels
+    read = _read(sources, column, options.force)
     if not read:
         raise InputError("no recording; expected at least one")
-    warnings = [*_unlabelled(read, labels), *_without_force(read, force)]
-    total = len(read) + (0 if subject.packed else len(FACTORS) * len(read))
+    warnings = [*_unlabelled(read, options.labels), *_without_force(read, options.force)]
+    factors = () if subject.packed else FACTORS
+    done, total = 0, len(read) * (1 + len(factors))
+
+    def count(runs: int) -> None:
+        nonlocal done
+        done += runs
+        if progress is not None:
+            progress(done, total)
+
+    def score_at(factor: float) -> DetectionScore:
+        score = score_scaled(subject, tracks, options.kinematics, factor)
+        count(len(tracks))
+        return score
+
     tracks: list[Track] = []
     for recording in read:
-        tracks.append(run_track(subject, recording, kinematics, force))
+        tracks.append(run_track(subject, recording, options.kinematics, options.force))
         warnings += _gaps(recording)
-        if progress is not None:
-            progress(len(tracks), total)
+        count(1)
     scores = [track.score() for track in tracks]
-    summary = summarise(pooled(scores), seed)
-    no_roc = NO_ROC_OF_FMU if subject.packed else None
+    summary = summarise(pooled(scores), options.seed)
     return Scored(
         subject=subject,
-        kinematics=kinematics,
-        labels=column,
-        seed=seed,
+        options=options,
         tracks=tracks,
         scores=scores,
-        summaries=[summarise(score, seed) for score in scores],
+        summaries=[summarise(score, options.seed) for score in scores],
         summary=summary,
-        roc=None if no_roc else _roc(subject, tracks, kinematics, progress),
-        no_roc=no_roc,
+        roc=None if subject.packed else roc(score_at),
         warnings=[*warnings, *([] if summary.events else [f"no event in column {column}: false alarms only"])],
     )
 
 
-def _roc(subject: Subject, tracks: Sequence[Track], kinematics: int, progress: Progress | None) -> list[RocPoint]:
-    done = len(tracks)
-    total = len(tracks) * (1 + len(FACTORS))
-
-    def score_at(factor: float) -> DetectionScore:
-        nonlocal done
-        found = score_scaled(subject, tracks, kinematics, factor)
-        done += len(tracks)
-        if progress is not None:
-            progress(done, total)
-        return found
-
-    return roc(score_at)
+# --- recordings -------------------------------------------------------------------------------------------------------
 
 
 def _read(sources: Sequence[RecordingSource], labels: str, force: str | None) -> list[Recording]:
@@ -126,12 +211,133 @@ def _without_force(read: Sequence[Recording], force: str | None) -> list[str]:
 
 
 def _gaps(recording: Recording) -> list[str]:
-    found = gaps(recording.time)
-    if not found:
+    rows = gaps(recording.time)
+    if not rows:
         return []
-    first = found[0]
-    more = f", and {counted(len(found) - 1, 'more gap')}" if len(found) > 1 else ""
+    first = rows[0]
+    more = f", and {counted(len(rows) - 1, 'more gap')}" if len(rows) > 1 else ""
     return [
         f"{recording.path}: gap of {recording.time[first] - recording.time[first - 1]:.4g} s after row {first}"
         f"{more}: the finger runs over it like an FMU, and a gap is no free time"
     ]
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def read_subject(source: FingerSource) -> Subject:
+    """Read a finger, or an FMU with the description it was made of. Raises InputError."""
+    if not isinstance(source, str | os.PathLike):
+        finger = read_finger(source)
+        return Subject(finger.path, finger, packed=False)
+    model = finger_file(source)
+    check_model(model)
+    if model.suffix.lower() == ".json":
+        return Subject(model, read_finger(model), packed=False)
+    try:
+        with zipfile.ZipFile(model) as archive:
+            text = archive.read("resources/finger.json")
+    except (OSError, zipfile.BadZipFile):
+        raise InputError(f"{model}: not an FMU; expected FINGER.json or FINGER.fmu") from None
+    except KeyError:
+        raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`") from None
+    try:
+        return Subject(model, Finger(model, text, json.loads(text), native.image_from_json(text)), packed=True)
+    except ValueError as refused:
+        raise InputError(f"{model}: resources/finger.json: {refused}") from None
+
+
+def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
+    """Run the subject over a recording."""
+    # force: (N)
+    data = subject.finger.data
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
+    if subject.packed:
+        outputs = outputs_of(run_fmu(subject.path, recording, kinematics_source=kinematics))
+    else:
+        outputs = _run(subject.finger.image, recording, kinematics)
+    label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
+    sensed = None if force is None else recording.others.get(force)
+    if "residual" in outputs:  # `native.Instance.run` gives it, with 0 at the first sample
+        residual = outputs["residual"].copy()
+        residual[0] = np.nan
+    else:
+        residual = residual_of(data, recording, outputs, kinematics)
+    return Track(recording, label, outputs, residual, sensed)
+
+
+def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
+    try:
+        return native.Instance(image, kinematics).run(recording.arrays())
+    except native.NativeError as refused:
+        raise InputError(f"{recording.path}: {refused}") from None
+
+
+def residual_of(data: Data, recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int) -> Numbers:
+    """Compute the residual [N, n] before the bias update (N·m), NaN for the first sample of an FMU's outputs."""
+    # The bias holds what the update took from the residual: r = compensated + (b − b before), wherever the bias did not
+    # jump by itself. Where it jumped, at the start and the end of stiction, r = compensated/(1 − K). The gain K is
+    # interpolated between the neighbouring samples; in contact it is that of the last sample before.
+    whole = slice(0, len(recording))
+    jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
+    jumped = (jumps != 0).any(axis=1)
+    left, moved = outputs["compensated_torque"], np.diff(outputs["bias_torque"], axis=0, prepend=np.nan)
+    residual = left + moved
+    power = np.sum(residual**2, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gain = np.sum(residual * moved, axis=1) / power
+        gain[jumped] = np.nan
+        contact = np.asarray(outputs["contact"]).ravel().astype(bool)
+        near = np.where(contact, _last_known(gain, contact), _between_known(gain, ~contact))
+        residual[jumped] = (left / (1 - near[:, None]))[jumped]
+    residual[~np.isfinite(residual)] = np.nan
+    return np.asarray(residual)
+
+
+def _last_known(values: Numbers, chosen: Flags) -> Numbers:
+    """Return [N] the last finite value among the chosen samples so far; 0 before any."""
+    known = chosen & np.isfinite(values)
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(index >= 0, values[index], 0.0)
+
+
+def _between_known(values: Numbers, chosen: Flags) -> Numbers:
+    """Return [N] values interpolated between the finite ones of the chosen samples; NaN without any."""
+    known = np.flatnonzero(chosen & np.isfinite(values))
+    if not len(known):
+        return np.full(len(values), np.nan)
+    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
+
+
+# --- other thresholds -------------------------------------------------------------------------------------------------
+
+
+def scaled_detection(data: Data, factor: float) -> dict[str, Any]:
+    """Return the description with every bound that decides on contact times a factor, within the range of each key."""
+    contact = dict(data["contact"])
+    _scale(contact, THRESHOLDS, factor)
+    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES), ("rest", REST_BOUNDS)):
+        if contact.get(part) is not None:
+            contact[part] = dict(contact[part])
+            _scale(contact[part], keys, factor)
+    if contact.get("uncertainty") is not None:
+        contact.setdefault(UNCERTAINTY_LEVEL, DEFAULTS[f"contact.{UNCERTAINTY_LEVEL}"])
+        _scale(contact, (UNCERTAINTY_LEVEL,), factor)
+    return {**data, "contact": contact}
+
+
+def _scale(part: dict[str, Any], keys: Iterable[str], factor: float) -> None:
+    for key in keys:
+        value = part.get(key)
+        if isinstance(value, list | tuple):
+            part[key] = [None if each is None else factor * each for each in value]
+        elif value is not None:
+            part[key] = min(factor * value, LARGEST[key])
+
+
+def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
+    """Score all recordings again with scaled detection, pooled, with only what the ROC shows."""
+    image = native.image_from_json(json.dumps(scaled_detection(subject.finger.data, factor)))
+    runs = (replace(track, outputs=_run(image, track.recording, kinematics)) for track in tracks)
+    return pooled([run.decisions() for run in runs])

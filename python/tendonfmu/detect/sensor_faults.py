@@ -10,11 +10,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.model import DEFAULTS, native
 
@@ -41,7 +40,7 @@ class SensorRule:
     why: str
 
 
-def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int) -> SensorRule:
+def learn_sensors(data: Data, parts: Sequence[FreePart], kinematics: int) -> SensorRule:
     """Learn the rule for which the finger as it runs finds no fault in any part."""
     if not all("tendon_position" in part.arrays for part in parts):
         return SensorRule(None, np.nan, "there are no tendon positions")
@@ -71,9 +70,7 @@ def learn_sensors(data: Mapping[str, Any], parts: Sequence[FreePart], kinematics
     return SensorRule(None, largest, why)
 
 
-def finds_a_fault(
-    data: Mapping[str, Any], parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]
-) -> bool:
+def finds_a_fault(data: Data, parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]) -> bool:
     """Tell whether the finger with these keys finds a fault in counted time."""
     finger = native.Instance.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
     begin = finger.save_state()
@@ -110,15 +107,15 @@ class Gap:
         return float((high - low)[known.any(axis=1)].max(initial=0.0))
 
 
-def _gaps(data: Mapping[str, Any], part: FreePart, kinematics: int) -> Iterator[Gap]:
+def _gaps(data: Data, part: FreePart, kinematics: int) -> Iterator[Gap]:
     R = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=np.float64)
     k = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=np.float64)
     loops = np.array([bool(tendon.get("bidirectional")) for tendon in data["tendons"]])
     force, position = part.arrays["tendon_force"], part.arrays["tendon_position"]
     taut = (force > TAUT) | loops
-    w, told = _joint_side(R, position - force / k, part.arrays.get("joint_position"), kinematics)
+    w, is_known = _joint_side(R, position - force / k, part.arrays.get("joint_position"), kinematics)
     window = max(1, min(len(force), int(np.searchsorted(part.time, part.time[0] + WINDOW))))
-    for i in np.flatnonzero(told):
+    for i in np.flatnonzero(is_known):
         others = np.arange(len(k)) != i
         known = taut[:, others].all(axis=1) if kinematics == 1 else np.ones(len(force), dtype=bool)
         stretched = k[i] * (np.abs(np.diff(position[:, i])) + np.abs(np.diff(w[:, i])))
@@ -132,10 +129,10 @@ def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None, kinemati
         return angle @ R.T, np.ones(len(R), dtype=bool)
     inverse = np.linalg.pinv(R)
     leverage = np.einsum("ij,ji->i", R, inverse)
-    told = 1.0 - leverage >= LEAST_FREEDOM
+    is_known = 1.0 - leverage >= LEAST_FREEDOM
     all_together = spring_end @ inverse.T @ R.T
-    ratio = np.where(told, leverage / np.where(told, 1.0 - leverage, 1.0), 0.0)
-    return np.asarray(all_together - ratio * (spring_end - all_together)), np.asarray(told)
+    ratio = np.where(is_known, leverage / np.where(is_known, 1.0 - leverage, 1.0), 0.0)
+    return np.asarray(all_together - ratio * (spring_end - all_together)), np.asarray(is_known)
 
 
 def _resolution(arrays: Sequence[Numbers]) -> float:
@@ -148,5 +145,5 @@ def _resolution(arrays: Sequence[Numbers]) -> float:
             bend = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
             # 0.6745 σ is the median of |x|; three independent samples with weights 1, −2, 1
             noise = min(noise, float(np.median(bend, axis=0).min() / (0.6745 * np.sqrt(6.0))))
-    found = max(smallest if np.isfinite(smallest) else 0.0, NOISE_SHARE * noise if np.isfinite(noise) else 0.0)
-    return float(f"{found:.3g}")
+    resolution = max(smallest if np.isfinite(smallest) else 0.0, NOISE_SHARE * noise if np.isfinite(noise) else 0.0)
+    return float(f"{resolution:.3g}")

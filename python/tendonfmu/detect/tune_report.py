@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.detect.alarm_level import rate_limit
-from tendonfmu.detect.closed_loop import LoopAlarms
+from tendonfmu.detect.free_motion import LoopAlarms
 from tendonfmu.detect.tuning import ContactTuning
 from tendonfmu.files import finite
 from tendonfmu.statistics import intervals
@@ -21,13 +21,13 @@ FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases, for th
 
 def build_report(tuning: ContactTuning) -> dict[str, Any]:
     """Build the report of a tuning, in SI units with None for what is not known."""
-    found = {
+    report = {
         "format": FORMAT,
         "finger": tuning.description_.name,
         "joints": tuning.description_.joint_names,
-        "kinematics": tuning.kinematics,
+        "kinematics": tuning.options.kinematics,
         "method": tuning.method,
-        "false_alarms_per_hour": tuning.false_alarms_per_hour,
+        "false_alarms_per_hour": tuning.options.false_alarms_per_hour,
         "confidence": tuning.confidence,
         "tuned_for_per_hour": tuning.rate_,
         "more_minutes": tuning.more_minutes_,
@@ -49,7 +49,7 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "tried": _tried(tuning),
         "seconds": tuning.seconds_,
     }
-    return {key: finite(value) for key, value in found.items()}
+    return {key: finite(value) for key, value in report.items()}
 
 
 def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
@@ -77,12 +77,12 @@ def _flat(value: Any) -> str:
 def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
     """Return alarms, their rate (1/h) with its two-sided 95 % interval, and its limit at the confidence asked for."""
     span = tuning.hours_ if hours is None else hours
-    found = intervals.rate(alarms, span)
+    rate = intervals.rate(alarms, span)
     return {
         "alarms": alarms,
         "minutes": 60.0 * span,
-        "per_hour": found.value,
-        "interval": [found.low, found.high],
+        "per_hour": rate.value,
+        "interval": [rate.low, rate.high],
         "limit": rate_limit(alarms, span, tuning.confidence),
     }
 
@@ -113,36 +113,36 @@ def _level(tuning: ContactTuning, name: str) -> dict[str, Any]:
 
 
 def _loop(tuning: ContactTuning) -> dict[str, Any]:
-    alarms = sum(each.alarms for each in tuning.loop_)
-    seconds = sum(each.seconds for each in tuning.loop_)
+    alarms = sum(loop.alarms for loop in tuning.loop_)
+    seconds = sum(loop.seconds for loop in tuning.loop_)
     return {
         **_counted(tuning, alarms),
-        "longest_s": max(each.longest for each in tuning.loop_),
-        "share_in_alarm": sum(each.alarm_seconds for each in tuning.loop_) / seconds,
-        "at_start": sum(each.at_start for each in tuning.loop_),
-        "parts": [_part(each) for each in tuning.loop_],
+        "longest_s": max(loop.longest for loop in tuning.loop_),
+        "share_in_alarm": sum(loop.alarm_seconds for loop in tuning.loop_) / seconds,
+        "at_start": sum(loop.at_start for loop in tuning.loop_),
+        "parts": [_part(loop) for loop in tuning.loop_],
     }
 
 
-def _part(found: LoopAlarms) -> dict[str, Any]:
+def _part(loop: LoopAlarms) -> dict[str, Any]:
     return {
-        "path": found.source,
-        "minutes": 60.0 * found.hours,
-        "alarms": found.alarms,
-        "at_start": found.at_start,
-        "longest_s": found.longest,
-        "share_in_alarm": found.alarm_seconds / found.seconds,
-        "begins": found.begins,
-        "ends": found.ends,
+        "path": loop.source,
+        "minutes": 60.0 * loop.hours,
+        "alarms": loop.alarms,
+        "at_start": loop.at_start,
+        "longest_s": loop.longest,
+        "share_in_alarm": loop.alarm_seconds / loop.seconds,
+        "begins": loop.begins,
+        "ends": loop.ends,
     }
 
 
 def _pretension(tuning: ContactTuning, g: int) -> dict[str, Any]:
-    found = tuning.pretensions_[g]
+    pretension = tuning.pretensions_[g]
     return {
-        "mean_force": found.force,
-        "free_rms": found.rms,
-        **_counted(tuning, found.alarms, found.hours),
+        "mean_force": pretension.force,
+        "free_rms": pretension.rms,
+        **_counted(tuning, pretension.alarms, pretension.hours),
         "torque_std_mean_square": tuning.deviation_.square[g].tolist(),
     }
 
@@ -155,8 +155,5 @@ def _tried(tuning: ContactTuning) -> list[dict[str, Any]]:
     line = tuning.lines_.get("innovation")
     if line is None:
         return []
-    ordered = sorted(line.tried, key=lambda each: each.mean_log)
-    return [
-        {"stuck_share": each.stuck_share, "jump_share": each.jump_share, "least_load": math.exp(each.mean_log)}
-        for each in ordered
-    ]
+    bound = line.bound
+    return [{"stuck_share": bound.stuck_share, "jump_share": bound.jump_share, "least_load": math.exp(line.mean_log)}]

@@ -18,6 +18,7 @@ import numpy as np
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import (
     Choice,
+    FrictionFitOptions,
     Interrupted,
     Learned,
     Settings,
@@ -122,10 +123,8 @@ def learn_numbers(
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
     structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
     options = Settings(
-        prior=settings.prior,
-        max_passes=settings.max_passes,
-        tolerance=settings.tolerance,
-        threads=settings.threads,
+        FrictionFitOptions(prior=settings.prior, tolerance=settings.tolerance, threads=settings.threads),
+        passes=settings.max_passes,
         effective=False,  # a diagnosis has its own noise model (`whitening`)
     )
     try:

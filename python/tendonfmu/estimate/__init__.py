@@ -10,18 +10,33 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import fit_report, identifiability, verdicts
-    from .constructor_arguments import ConstructorArguments
-    from .coverage import EffectCoverage, coverage_of, durations
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate, residuals
-    from .files import check_given_once, check_outputs, check_unseen, with_uncertainty, with_values, write_unfinished
+    from .files import (
+        FIT_REPORT,
+        check_given_once,
+        check_outputs,
+        check_unseen,
+        read_previous_fit,
+        with_previous_values,
+        with_uncertainty,
+        with_values,
+        write_unfinished,
+    )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fitting import FitWarning, FrictionFit
-    from .identifiability import Judgement, Verdict, counts_by_kind, judge
-    from .laws import LawBands, LawCurve, asymmetric, numbers_of
-    from .methods import FitProgress, Interrupted, Learned, Settings, Watch, learn_batch, unknown_names
-    from .picture import FitPicture, FitSeries
-    from .previous_fit import read_previous_fit, with_previous_values
+    from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
+    from .methods import (
+        FitProgress,
+        FrictionFitOptions,
+        Interrupted,
+        Learned,
+        Settings,
+        Watch,
+        learn_batch,
+        unknown_names,
+    )
+    from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
     from .structure import MAGNITUDES, Choice, Structure, build_structure, described, get_number, own_copy, set_number
     from .uncertainty import parameter_uncertainty
     from .verdicts import Fitted

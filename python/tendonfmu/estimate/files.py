@@ -1,4 +1,4 @@
-"""The files of a fit: the fitted description, and the state that an interrupted fit leaves to continue from."""
+"""The files of a fit: the fitted description, the state of an interrupted fit, and an earlier fit as the prior."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.estimate.structure import Structure, own_copy, set_number
+from tendonfmu.estimate.structure import Structure, described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
-from tendonfmu.model import Finger, description_text, native
+from tendonfmu.model import Finger, description_text, native, read_finger
 from tendonfmu.recordings import Recording
 
+FIT_REPORT = "tendonfmu-fit-1"
 UNFINISHED = "tendonfmu-fit-unfinished-1"
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
@@ -44,7 +45,7 @@ def check_given_once(training: Iterable[object], compared: Iterable[object], rol
             if not isinstance(source, str | os.PathLike):
                 continue
             file = Path(source).resolve()
-            same = next((each for each in seen if each == file or _same_bytes(each, file)), None)
+            same = next((other for other in seen if other == file or _same_bytes(other, file)), None)
             if same is not None:
                 what = "" if same == file else f", as {same.name}"
                 if seen[same] and not trained:
@@ -63,11 +64,11 @@ def _same_bytes(one: Path, other: Path) -> bool:
 
 def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role: str = "a test") -> None:
     """Check that no test recording holds the samples of a recording that is trained on."""
-    known = [(each, _measured(each)) for each in training]
+    known = [(recording, _measured(recording)) for recording in training]
     for test in tests:
-        own = _measured(test)
+        tested = _measured(test)
         for other, measured in known:
-            if own.shape == measured.shape and np.array_equal(own, measured):
+            if np.array_equal(tested, measured):
                 raise InputError(
                     f"{test.path}: {role}, but trained on as well: the same samples as {other.path}; expected another "
                     "recording"
@@ -123,24 +124,19 @@ class Unfinished:
     description: Mapping[str, Any]  # description with the values of z
 
 
-def unfinished_path(output: Path) -> Path:
-    """Return the file to which an interrupted fit to `output` writes its state."""
-    return output.with_name(f"{output.stem}.unfinished.json")
-
-
-def write_unfinished(output: Path, found: Unfinished) -> Path:
+def write_unfinished(output: Path, state: Unfinished) -> Path:
     """Write the state of an interrupted fit next to its output."""
     content = {
         "format": UNFINISHED,
-        "finger": found.finger,
-        "method": found.method,
-        "cost": found.cost if np.isfinite(found.cost) else None,
-        "options": dict(found.options),
-        "unknowns": list(found.unknowns),
-        "z": [float(value) for value in found.z],
-        "description": dict(found.description),
+        "finger": state.finger,
+        "method": state.method,
+        "cost": state.cost if np.isfinite(state.cost) else None,
+        "options": dict(state.options),
+        "unknowns": list(state.unknowns),
+        "z": [float(value) for value in state.z],
+        "description": dict(state.description),
     }
-    path = unfinished_path(output)
+    path = output.with_name(f"{output.stem}.unfinished.json")
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
     return path
 
@@ -149,8 +145,8 @@ def read_unfinished(path: Path) -> Unfinished:
     """Read the state of an interrupted fit."""
     content = read_json(path, "the state of an interrupted fit")
     if not isinstance(content, dict) or content.get("format") != UNFINISHED:
-        found = content.get("format") if isinstance(content, dict) else None
-        raise InputError(f'{path}: format = {json.dumps(found)}; expected "{UNFINISHED}", that of an interrupted fit')
+        given = content.get("format") if isinstance(content, dict) else None
+        raise InputError(f'{path}: format = {json.dumps(given)}; expected "{UNFINISHED}", that of an interrupted fit')
     numbers, names, data = content.get("z"), content.get("unknowns"), content.get("description")
     if not isinstance(numbers, list) or not all(type(z) in (int, float) for z in numbers):
         raise InputError(f"{path}: z: expected a list of numbers")
@@ -171,12 +167,73 @@ def read_unfinished(path: Path) -> Unfinished:
 
 def resumed_start(path: Path, unknowns: Sequence[str]) -> Numbers:
     """Return [u] the unknowns to continue from. Raises InputError unless both fits estimate the same unknowns."""
-    found = read_unfinished(path)
-    if list(found.unknowns) == list(unknowns):
-        return found.z
-    other = sorted(set(found.unknowns) ^ set(unknowns))
+    state = read_unfinished(path)
+    if list(state.unknowns) == list(unknowns):
+        return state.z
+    other = sorted(set(state.unknowns) ^ set(unknowns))
     what = f"{other[0]} is not in both" if other else "in another order"
     raise InputError(
-        f"{path}: the interrupted fit has {len(found.unknowns)} unknowns, this fit has {len(unknowns)} ({what}); "
+        f"{path}: the interrupted fit has {len(state.unknowns)} unknowns, this fit has {len(unknowns)} ({what}); "
         "expected the same finger, --asymmetric, --only, --fix and --share"
     )
+
+
+# --- an earlier fit ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PreviousFit:
+    """Numbers of a previous fit."""
+
+    path: Path  # file of the report or of the description
+    values: Mapping[str, float]  # numbers of the description by path (SI)
+    names: Sequence[str]  # [k] unknowns with a known covariance; empty if the previous fit did not state it
+    covariance: Numbers  # [k, k] of these unknowns
+    share: float  # effective samples per sample of its residuals, the least of all joints; 1 if unknown
+
+
+def read_previous_fit(path: Path) -> PreviousFit:
+    """Read the report of a fit ("tendonfmu-fit-1"), or the description that a fit wrote."""
+    content = read_json(path, "a previous fit: its report, or the description that it wrote")
+    if isinstance(content, dict) and content.get("format") == FIT_REPORT:
+        return _of_report(path, content)
+    finger = read_finger(path)
+    values = {number.path: number.value for number in estimable_numbers(finger.data)}
+    return PreviousFit(path, values, (), np.zeros((0, 0)), 1.0)
+
+
+def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:
+    try:
+        values = {entry["path"]: float(entry["value"]) for entry in report["parameters"]}
+        correlation = report["correlation"]
+        errors = correlation.get("standard_errors")
+        names = correlation["paths"] if errors is not None else []
+        error = np.array(errors if errors is not None else [], dtype=np.float64)
+        matrix = np.array(correlation["matrix"], dtype=np.float64) if len(names) else np.zeros((0, 0))
+        worth = report["innovations"].get("effective") or {"samples": [1.0], "worth": [1.0]}
+        share = float(np.min(np.array(worth["worth"], dtype=float) / np.array(worth["samples"], dtype=float)))
+        covariance = matrix * np.outer(error, error)
+        sound = covariance.shape == (len(names), len(names)) and bool(np.isfinite(covariance).all())
+    except (KeyError, TypeError, ValueError, AttributeError) as wrong:
+        raise InputError(
+            f"{path}: {wrong}: expected a whole report of tendonfmu fit, with parameters, correlation and innovations"
+        ) from None
+    if not (sound and 0 < share <= 1):
+        raise InputError(f"{path}: correlation, innovations.effective: expected a finite number for each unknown")
+    return PreviousFit(path, values, list(names), covariance, share)
+
+
+def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
+    """Return the finger with the previous values of all numbers that both have."""
+    numbers = [number for number in estimable_numbers(finger.data) if number.path in previous.values]
+    if not numbers:
+        raise InputError(
+            f"{previous.path}: none of its {len(previous.values)} numbers is one of {finger.path}; expected the report "
+            "or the description of an earlier fit of the same finger"
+        )
+    data = own_copy(finger.data)
+    for number in numbers:
+        for path in (number.path, number.with_path):
+            if path is not None:
+                set_number(data, path, previous.values[number.path])
+    return described(finger, data)

@@ -11,25 +11,13 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
+from tendonfmu.estimate.files import FIT_REPORT
+from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.verdicts import Fitted
 from tendonfmu.files import finite
 from tendonfmu.model import Finger, native
 from tendonfmu.recordings import consistency, whiteness
 from tendonfmu.statistics import effective_samples
-
-FORMAT = "tendonfmu-fit-1"
-
-
-@dataclass(frozen=True)
-class Run:
-    """How the estimation went."""
-
-    method: str
-    converged: bool
-    iterations: int
-    passes: int
-    seconds: float
-    cost: float
 
 
 @dataclass(frozen=True)
@@ -37,50 +25,49 @@ class Outcome:
     """A finished fit, with all that its report contains."""
 
     fitted: Finger  # fitted description
-    run: Run  # how the estimation went
-    options: Mapping[str, Any]  # options that shape the result
+    learned: Learned  # the estimation
+    seconds: float  # time that it took (s)
+    options: Mapping[str, Any]  # options that shape the result, and `method`
     warnings: Sequence[str]  # sentences
     numbers: Sequence[Fitted]  # every estimated number, judged
     names: Sequence[str]  # [u] "path.role" of the unknowns
-    covariance: Numbers  # [u, u] of the unknowns
     innovations: Sequence[Numbers]  # by recording, [N, n] standardised innovations; NaN where not trained on
-    weights: Sequence[Numbers]  # by recording, [N, n] the weight of each sample
     training: Sequence[Evaluation]  # judged recordings
     comparisons: Sequence[Evaluation]
     uncertainty: Mapping[str, Any] | None  # uncertainty of the modelled friction torque; None if not asked for
 
 
-def build_report(found: Outcome) -> dict[str, Any]:
+def build_report(outcome: Outcome) -> dict[str, Any]:
     """Build the report of a finished fit; numbers that are not finite become None."""
-    run = found.run
-    units = {parameter.path: parameter.unit for parameter in native.Instance(found.fitted.image).parameters()}
+    learned, numbers = outcome.learned, outcome.numbers
+    units = {parameter.path: parameter.unit for parameter in native.Instance(outcome.fitted.image).parameters()}
     report = {
-        "format": FORMAT,
-        "finger": found.fitted.name,
-        "method": run.method,
-        "converged": run.converged,
+        "format": FIT_REPORT,
+        "finger": outcome.fitted.name,
+        "method": outcome.options["method"],
+        "converged": learned.converged,
         "finished": True,
-        "iterations": run.iterations,
-        "passes": run.passes,
-        "seconds": run.seconds,
-        "cost": run.cost,
-        "options": dict(found.options),
-        "warnings": list(found.warnings),
-        "recordings": [each.recording.entry() for each in found.training],
-        "parameters": [_parameter(number, units) for number in found.numbers],
+        "iterations": learned.iterations,
+        "passes": learned.passes,
+        "seconds": outcome.seconds,
+        "cost": learned.cost,
+        "options": dict(outcome.options),
+        "warnings": list(outcome.warnings),
+        "recordings": [evaluation.recording.entry() for evaluation in outcome.training],
+        "parameters": [_parameter(number, units) for number in numbers],
         "correlation": {
-            "paths": list(found.names),
-            "standard_errors": np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist(),
-            "matrix": _correlation(found.covariance),
+            "paths": list(outcome.names),
+            "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
+            "matrix": _correlation(learned.covariance),
         },
-        "identified": {"count": sum(number.identified for number in found.numbers), "of": len(found.numbers)},
+        "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
         "residual": {
-            "train": residual_entry(found.training, "train"),
-            "held_out": residual_entry(found.training, "held_out"),
-            "comparisons": [_comparison(each) for each in found.comparisons],
+            "train": residual_entry(outcome.training, "train"),
+            "held_out": residual_entry(outcome.training, "held_out"),
+            "comparisons": [_comparison(evaluation) for evaluation in outcome.comparisons],
         },
-        "innovations": _innovations(found),
-        "uncertainty": found.uncertainty,
+        "innovations": _innovations(outcome),
+        "uncertainty": outcome.uncertainty,
     }
     return {key: finite(value) for key, value in report.items()}
 
@@ -93,7 +80,7 @@ def report_text(report: Mapping[str, Any]) -> str:
             text = _lines(value)
         elif key == "correlation":
             keys = ("paths", "standard_errors", "matrix")
-            text = "{" + ",\n  ".join(f"{json.dumps(own)}: {_lines(value[own])}" for own in keys) + "}"
+            text = "{" + ",\n  ".join(f"{json.dumps(part)}: {_lines(value[part])}" for part in keys) + "}"
         else:
             text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         parts.append(f" {json.dumps(key)}: {text}")
@@ -119,21 +106,20 @@ def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _innovations(found: Outcome) -> dict[str, Any]:
+def _innovations(outcome: Outcome) -> dict[str, Any]:
     """Describe the residuals of the samples trained on, and how many independent samples they are worth."""
-    samples, worth = effective_samples(found.innovations, found.weights)
+    samples, worth = effective_samples(outcome.innovations, outcome.learned.weights)
     share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
     return {
-        "nis": consistency(found.innovations, share),
-        "whiteness": whiteness(found.innovations),
+        "nis": consistency(outcome.innovations, share),
+        "whiteness": whiteness(outcome.innovations),
         "effective": {"samples": samples.tolist(), "worth": worth.tolist()},
     }
 
 
-def _comparison(found: Evaluation) -> dict[str, Any]:
-    entry = found.recording.entry()
-    label = found.recording.path.stem
-    return {"label": label, **entry, **(residual_entry([found], "tracked") or {})}
+def _comparison(evaluation: Evaluation) -> dict[str, Any]:
+    recording = evaluation.recording
+    return {"label": recording.path.stem, **recording.entry(), **(residual_entry([evaluation], "tracked") or {})}
 
 
 def _correlation(covariance: Numbers) -> list[list[float]]:

@@ -19,28 +19,34 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
-from tendonfmu.estimate.files import with_values
-from tendonfmu.estimate.previous_fit import PreviousFit, known_information
+from tendonfmu.estimate.files import PreviousFit, with_values
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.files import counted
+from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
 Start = Callable[[Sequence[str]], Numbers]
 
 
+_LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 in a previous fit leave it
+
+
+@dataclass(frozen=True)
+class FrictionFitOptions(FitOptions):
+    """Options of `FrictionFit`."""
+
+    threads: int = option(0, Number(0, whole=True), "of a batch; 0: all cores")
+
+
 @dataclass(frozen=True)
 class Settings:
-    """Options of a fit, named as those of `FrictionFit`."""
+    """How a fit is made."""
 
-    prior: float = 1.0
-    max_passes: int = 60
-    tolerance: float = 0.3
-    threads: int = 0
-    parameter_drift: float = 0.0
+    options: FrictionFitOptions
+    passes: int  # most passes over the data
     effective: bool = True  # whether samples count for their share of an effective number
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
-    change: float = 0.0  # relative standard deviation of what may have changed since
     noise: float = 0.0  # torque noise of the description (N·m)
 
 
@@ -175,9 +181,9 @@ def learn_batch(
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
-    prior = settings.prior
+    prior = settings.options.prior
     if settings.previous is not None:
-        estimator.set_known(_known(estimator, settings))
+        estimator.set_known(_known_information(estimator, settings))
         prior = np.inf  # the known information contains the prior
     found = _fitted(estimator, begin, prior, settings, watch, "")
     steps, passes = found.steps, found.passes
@@ -204,11 +210,29 @@ def learn_batch(
     )
 
 
-def _known(estimator: Estimator, settings: Settings) -> Numbers:
-    """Return [u, u] the information of the previous fit."""
-    assert settings.previous is not None
-    names = unknown_names(estimator)
-    return known_information(estimator, names, settings.previous, settings.change, settings.prior, settings.noise)
+def _known_information(estimator: Estimator, settings: Settings) -> Numbers:
+    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start."""
+    # The prior of an unknown is a Gaussian about its previous value with covariance C + D. C is that of the previous
+    # fit, if its report has it. D is diagonal, (change · size)², for the change by wear, temperature or another
+    # instrument of the type since then.
+    previous = settings.previous
+    assert previous is not None
+    start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
+    size = np.maximum(np.abs(start), _LEAST * scale)
+    is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
+    size[is_bias] = np.maximum(size[is_bias], settings.noise)
+    has = np.array([unknown.path in previous.values for unknown in estimator.unknowns], dtype=bool)
+    variance = np.where(has, settings.options.change * size, settings.options.prior * scale) ** 2
+    place = {name: k for k, name in enumerate(previous.names)}
+    both = [k for k, name in enumerate(names) if name in place and has[k]]
+    before = [place[names[k]] for k in both]
+    covariance = np.diag(variance)
+    covariance[np.ix_(both, both)] += previous.covariance[np.ix_(before, before)]
+    # its correlations are rounded: no direction counts as known better than by a relative 1e-6
+    root = np.sqrt(np.diag(covariance))
+    value, turn = np.linalg.eigh(covariance / np.outer(root, root))
+    turned = turn / root[:, None]
+    return np.asarray((turned / np.maximum(value, 1e-6)) @ turned.T)
 
 
 def _fitted(
@@ -227,9 +251,9 @@ def _fitted(
         found = estimator.fit(
             begin,
             prior_std=prior,
-            max_passes=settings.max_passes,
-            tolerance=settings.tolerance,
-            threads=settings.threads,
+            max_passes=settings.passes,
+            tolerance=settings.options.tolerance,
+            threads=settings.options.threads,
             progress=show,
         )
     except KeyboardInterrupt:
@@ -254,15 +278,15 @@ def learn_ekf(
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)
     innovations: list[Numbers] = []
-    for number in range(1, settings.max_passes + 1):
+    for number in range(1, settings.passes + 1):
         if number > 1:
             learner.begin_pass()
         innovations = _filter_once(learner, estimator, recordings, watch, number)
     z, covariance = learner.z, learner.covariance
-    plain = np.diag(1 / (settings.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
+    plain = np.diag(1 / (settings.options.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective and settings.parameter_drift == 0:
+    if settings.effective and settings.options.drift == 0:
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
     if share < 1 or settings.previous is not None:
@@ -270,7 +294,7 @@ def learn_ekf(
         first = np.array([unknown.start for unknown in learner.unknowns])
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
-        known = plain if settings.previous is None else _known(estimator, settings)
+        known = plain if settings.previous is None else _known_information(estimator, settings)
         information = share * information
         covariance = np.asarray(np.linalg.inv(information + known), dtype=np.float64)
         z = _within(estimator, mean + covariance @ pull)
@@ -280,8 +304,8 @@ def learn_ekf(
         covariance=covariance,
         information=information,
         cost=float("nan"),
-        iterations=settings.max_passes,
-        passes=settings.max_passes,
+        iterations=settings.passes,
+        passes=settings.passes,
         converged=True,
         weights=weights,
         innovations=innovations,
@@ -339,7 +363,7 @@ def _learner(structure: Structure, estimator: Estimator, settings: Settings, sta
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
     try:
         return Learner(
-            image, structure.group, scale, prior_std=settings.prior, parameter_drift=settings.parameter_drift
+            image, structure.group, scale, prior_std=settings.options.prior, parameter_drift=settings.options.drift
         )
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

@@ -5,7 +5,7 @@ joint friction, joint load friction, cover; docs/reference/semantics.md#uncertai
 
 With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is that of the fit,
 with the information of the data reduced by the factor by which the residuals vary more than white noise
-(`estimate.scores`).
+(`estimate.evaluation.block_scores`).
 """
 
 from __future__ import annotations
@@ -16,18 +16,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Data, Indices, Numbers, rounded
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.evaluation import Evaluation
+from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
 from tendonfmu.estimate.methods import Learned
-from tendonfmu.estimate.scores import block_scores, sampled
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import native
 from tendonfmu.statistics import error_directions
-
-Rows = NDArray[np.intp]
 
 LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions
 WORST = 0.99  # quantile of the error that is reported
@@ -38,14 +34,6 @@ _CHUNK = 500_000  # numbers of a Jacobian in memory
 _STEP = 0.01  # s between samples that are evaluated separately; no result depends on it
 _ROUNDING = 1e-9  # of a variance: keeps a covariance positive in spite of rounding errors
 _NEVER = 1e9  # N·m, a contact threshold that is never exceeded
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """Uncertainty of a fitted finger: by joint up to four lists of m + 3 numbers, and the entry of the report."""
-
-    directions: list[list[list[float]]]
-    entry: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -79,13 +67,13 @@ class JointUncertainty:
 
 
 def parameter_uncertainty(
-    structure: Structure, learned: Learned, data: Mapping[str, Any], training: Sequence[Evaluation]
-) -> Uncertainty:
-    """Compute the uncertainty of the friction torque of a finished fit."""
+    structure: Structure, learned: Learned, data: Data, training: Sequence[Evaluation]
+) -> tuple[list[list[list[float]]], dict[str, Any]]:
+    """Compute the uncertainty of the friction torque: by joint up to four lists of m + 3 numbers, and the report."""
     known = known_of(learned.covariance, learned.information)
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
-    blocks = block_scores(estimator, learned.z, data, training, learned.weights)
-    scores = blocks.scores @ known.factor
+    scores, block_time = block_scores(estimator, learned.z, data, training, learned.weights)
+    scores = scores @ known.factor
     motion = Motion(estimator, learned.z, data, known)
     trained, held = ([np.flatnonzero(getattr(each.recording, which)) for each in training] for which in ROLES)
     seen = {"train": motion.look(training, trained), "loaded": motion.look(training, trained, LOAD)}
@@ -97,7 +85,7 @@ def parameter_uncertainty(
     ]
     entry = {
         "blocks": len(scores),
-        "block_time": blocks.block_time,
+        "block_time": block_time,
         "inflation": [joint.inflation for joint in joints],
         "directions": [len(joint.directions) for joint in joints],
         "captured": [joint.captured for joint in joints],
@@ -105,7 +93,7 @@ def parameter_uncertainty(
         "held_out": _stated(joints, "held_out") if "held_out" in seen else None,
         "loaded": _stated(joints, "loaded"),
     }
-    return Uncertainty([joint.directions for joint in joints], entry)
+    return [joint.directions for joint in joints], entry
 
 
 def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointUncertainty:
@@ -120,7 +108,7 @@ def _of_joint(seen: Mapping[str, Seen], known: Known, scores: Numbers) -> JointU
         np.concatenate([seen[which].parts / size[which] for which in size]),
         np.concatenate([slopes[which] / size[which] for which in size]),
     )
-    written = [[float(f"{value:.{DIGITS}g}") for value in row] for row in directions.tolist()]
+    written = [rounded(row, DIGITS) for row in directions]
     stated = {}
     for which, each in seen.items():
         error = np.abs(
@@ -153,9 +141,9 @@ def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
     """Compute by how much the sampling variance of the torque exceeds that of white residuals, on average."""
     if len(scores) < 2:
         return 1.0
-    found = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
+    observed = float(np.sum((slopes @ scores.T) ** 2)) * len(scores) / (len(scores) - 1)
     assumed = float(np.sum(error_directions.squares(slopes * np.sqrt(known.share))))
-    return found / assumed if assumed > 0 and found > 0 else 1.0
+    return observed / assumed if assumed > 0 and observed > 0 else 1.0
 
 
 # --- samples of the motion --------------------------------------------------------------------------------------------
@@ -167,10 +155,10 @@ class Motion:
 
     estimator: Estimator
     z: Numbers
-    data: Mapping[str, Any]
+    data: Data
     known: Known
 
-    def look(self, recordings: Sequence[Evaluation], rows: Sequence[Rows], load: float = 1.0) -> Seen:
+    def look(self, recordings: Sequence[Evaluation], rows: Sequence[Indices], load: float = 1.0) -> Seen:
         """Evaluate every k-th of the rows of each recording, at `load` times the recorded tendon forces."""
         joints, tendons, unknowns = len(self.data["joints"]), len(self.data["tendons"]), len(self.z)
         most = min(_SAMPLES, max(_SIZE // (joints * unknowns), _SAMPLES // 10))
@@ -195,7 +183,7 @@ class Motion:
         return self.estimator.jacobian(number, self.z, 0, len(arrays["time"]))[2]
 
 
-def friction_parts(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> Numbers:
+def friction_parts(data: Data, arrays: Mapping[str, Numbers]) -> Numbers:
     """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m)."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints

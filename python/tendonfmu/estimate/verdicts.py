@@ -4,52 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.coverage import EffectCoverage
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.estimation import Unknown as FittedUnknown
 from tendonfmu.estimate.fisher_information import Unknown
-from tendonfmu.estimate.identifiability import LIMIT, PRIOR, Verdict, explain, unvisited
+from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
+from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
 
 CAUSES = {
+    **CAUSES_OF_A_MOTION,
     "never_moves": "never slides at all",
     "side": "never slides to that side",
-    "working_point": "never slides near that working point",
-    "slow": "never slides as slowly as its Stribeck velocity",
-    "noise": "too little torque compared with noise and drift, even if all else is known",
-    "combination": "visible, but only in combination with others",
 }
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
-
-
-class FittedUnknown(Protocol):
-    """The attributes of `estimation.Unknown` that are read here."""
-
-    @property
-    def path(self) -> str: ...
-    @property
-    def role(self) -> str: ...
-    @property
-    def parameters(self) -> tuple[int, ...]: ...
-    @property
-    def lower(self) -> float: ...
-    @property
-    def upper(self) -> float: ...
-    @property
-    def scale(self) -> float: ...
-
-
-class Estimates(Protocol):
-    """The attributes of `estimation.Estimator` that are read here."""
-
-    @property
-    def unknowns(self) -> Sequence[FittedUnknown]: ...
-    def values(self, z: Numbers) -> Numbers: ...
 
 
 @dataclass(frozen=True)
@@ -79,7 +52,7 @@ class Fitted:
 class Knowledge:
     """What a fit knows."""
 
-    estimator: Estimates  # unknowns, and their conversion into numbers of the description
+    estimator: Estimator  # unknowns, and their conversion into numbers of the description
     z: Numbers  # [u] estimate
     covariance: Numbers  # [u, u] of z, prior included
     information: Numbers  # [u, u] of the data alone
@@ -88,7 +61,7 @@ class Knowledge:
     noise: float  # torque noise (N·m); a bias.initial_torque counts as at least that large
 
 
-def slopes(estimator: Estimates, z: Numbers) -> Numbers:
+def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
     # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
     base = np.asarray(estimator.values(z))
@@ -111,15 +84,15 @@ def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted],
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     size = np.array([_size(number, known.noise) for number in numbers])
     columns = _columns(structure, known.estimator)
-    deputies = _deputies(numbers, columns, known.coverage)
-    verdicts = _verdicts(numbers, deputies, known, matrix, covariance, size)
+    representatives = _representatives(numbers, columns, known.coverage)
+    verdicts = _verdicts(numbers, representatives, known, matrix, covariance, size)
     by_path = {cover.effect.path: cover for cover in known.coverage}
-    found = []
+    judged = []
     for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
         cover = by_path[number.effect.path] if number.effect is not None else None
         cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else ""
-        found.append(
+        judged.append(
             Fitted(
                 number=number,
                 start=before.value,
@@ -130,7 +103,7 @@ def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted],
                 advice=_advice(cause, verdict, cover, known.fitted) if cause else "",
             )
         )
-    return found, covariance
+    return judged, covariance
 
 
 def _size(number: Unknown, noise: float) -> float:
@@ -148,7 +121,7 @@ def _bound(unknown: FittedUnknown, value: float) -> str | None:
 # --- one number for each unknown --------------------------------------------------------------------------------------
 
 
-def _columns(structure: Structure, estimator: Estimates) -> list[int]:
+def _columns(structure: Structure, estimator: Estimator) -> list[int]:
     """Return [numbers] the unknown of each: for a static friction its drop, for a Stribeck velocity its rate."""
     by_parameter: dict[int, int] = {}
     for column, unknown in enumerate(estimator.unknowns):
@@ -157,7 +130,9 @@ def _columns(structure: Structure, estimator: Estimates) -> list[int]:
     return [by_parameter[structure.index[number.path]] for number in structure.numbers]
 
 
-def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]) -> list[int]:
+def _representatives(
+    numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]
+) -> list[int]:
     """Return [unknowns] a number that represents all that share its value, if possible one that the motion visits."""
     by_path = {cover.effect.path: cover for cover in coverage}
     first: dict[int, int] = {}
@@ -171,20 +146,22 @@ def _deputies(numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequ
 
 def _verdicts(
     numbers: Sequence[Unknown],
-    deputies: Sequence[int],
+    representatives: Sequence[int],
     known: Knowledge,
     matrix: Numbers,
     covariance: Numbers,
     size: Numbers,
 ) -> list[Verdict]:
-    """Judge [unknowns] by their deputies: `error` from all numbers, `error_alone` with all others known."""
-    own = covariance[np.ix_(deputies, deputies)]
-    error = np.sqrt(np.maximum(np.diag(own), 1e-300))
-    inverse = np.linalg.inv(matrix[deputies])
-    seen = np.diag(inverse.T @ known.information @ inverse) * size[deputies] ** 2
+    """Judge [unknowns] by their representatives: `error` from all numbers, `error_alone` with all others known."""
+    chosen = covariance[np.ix_(representatives, representatives)]
+    error = np.sqrt(np.maximum(np.diag(chosen), 1e-300))
+    inverse = np.linalg.inv(matrix[representatives])
+    seen = np.diag(inverse.T @ known.information @ inverse) * size[representatives] ** 2
     alone = 1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2)
-    correlation = own / np.outer(error, error)
-    return explain([numbers[k] for k in deputies], error / size[deputies], alone, correlation, known.coverage)
+    correlation = chosen / np.outer(error, error)
+    return explain(
+        [numbers[k] for k in representatives], error / size[representatives], alone, correlation, known.coverage
+    )
 
 
 # --- advice -----------------------------------------------------------------------------------------------------------

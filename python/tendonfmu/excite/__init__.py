@@ -1,7 +1,6 @@
 """Which training motion shows the friction of a finger, and what it tells about each number (`tendonfmu excite`).
 
-`excitation` plans strokes of all joints, `tension_plan` plans the internal tensions, and `training_motion` combines
-them and judges the result.
+`excitation` plans strokes of all joints and the internal tensions, and `training_motion` judges the result.
 """
 
 from typing import TYPE_CHECKING

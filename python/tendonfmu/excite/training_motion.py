@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import (
     EffectCoverage,
@@ -30,11 +31,10 @@ from tendonfmu.estimate import (
     sensitivities,
     unknowns,
 )
-from tendonfmu.excite.excitation import Excitation, Plan, plan_excitation
-from tendonfmu.excite.joint_coverage import JointCoverage, joint_coverage
-from tendonfmu.excite.tension_plan import Variation
+from tendonfmu.excite.excitation import SLOW, Excitation, Plan, Stroke, Variation, plan_excitation
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, balanced_forces, native, pretension_vector, read_finger
+from tendonfmu.options import ExciteOptions
 
 RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
@@ -64,6 +64,20 @@ class Subject:
 
 
 @dataclass(frozen=True)
+class JointCoverage:
+    """How one joint moves."""
+
+    lowest: float  # angles (rad)
+    highest: float
+    fastest: float  # greatest speed (rad/s)
+    strokes: int  # their numbers
+    reversals: int
+    slow_reversals: int  # number of reversals between two strokes of at most `SLOW` of the greatest speed
+    rests: int  # number of rests between strokes
+    resting: float  # time at rest between strokes (s)
+
+
+@dataclass(frozen=True)
 class ExciteResult:
     """A motion and what it excites."""
 
@@ -88,17 +102,17 @@ def read_subject(path: Path) -> Subject:
         return Subject(read_finger(path), None)
     finger: Any = data.get("finger")
     if isinstance(finger, str):
-        found = read_finger(path.parent / finger)
+        described = read_finger(path.parent / finger)
     else:
         text = json.dumps(finger).encode()
         try:
-            found = Finger(path, text, finger, native.image_from_json(text))
+            described = Finger(path, text, finger, native.image_from_json(text))
         except native.NativeError as refused:
             raise InputError(f"{path}: finger: {refused}") from None
-    return Subject(found, _limits(path, data, len(found.joint_names)))
+    return Subject(described, _limits(path, data, len(described.joint_names)))
 
 
-def _limits(path: Path, data: Mapping[str, Any], joints: int) -> list[tuple[float, float]] | None:
+def _limits(path: Path, data: Data, joints: int) -> list[tuple[float, float]] | None:
     links = (data.get("physics") or {}).get("links") or []
     if len(links) != joints:
         raise InputError(f"{path}: physics.links: {counted(len(links), 'link')}; expected one per joint, {joints}")
@@ -158,28 +172,29 @@ def find_variation(
     for option, value in (("--pretension", pretension), ("--alternate", alternate)):
         if value:
             raise InputError(f"--vary-tension {given}: with {option}; expected one of the two")
-    low_text, _, high_text = given.partition(":")
-    try:
-        low, high = float(low_text), float(high_text)
-    except ValueError:
-        low, high = math.nan, math.nan
+    low, high = _span(given)
     if not 0.0 < low < high <= STRONGEST:
         raise InputError(f"--vary-tension {given}: expected LOW:HIGH in N, 0 < LOW < HIGH, at most {STRONGEST:g}")
     return Variation(low, high, every)
 
 
-def as_array(ranges: Sequence[Range]) -> NDArray[np.float64]:
+def as_array(ranges: Sequence[Range]) -> Numbers:
     """Return low and high of the ranges [n, 2] (rad)."""
     return np.array([[span.low, span.high] for span in ranges])
 
 
+def _span(text: str) -> tuple[float, float]:
+    """Read LOW:HIGH; NaN if it is none."""
+    low, _, high = text.partition(":")
+    try:
+        return float(low), float(high)
+    except ValueError:
+        return math.nan, math.nan
+
+
 def _parse_range(text: str, names: list[str]) -> tuple[int, tuple[float, float]]:
     joint, _, span = text.rpartition("=")
-    low_text, _, high_text = span.partition(":")
-    try:
-        low, high = float(low_text), float(high_text)
-    except ValueError:
-        low, high = math.nan, math.nan
+    low, high = _span(span)
     if not -1e3 <= low <= high <= 1e3:
         raise InputError(f"--range {text}: expected JOINT=LOW:HIGH in rad, LOW <= HIGH")
     if joint in names:
@@ -189,7 +204,7 @@ def _parse_range(text: str, names: list[str]) -> tuple[int, tuple[float, float]]
     raise InputError(f"--range {text}: no joint {joint!r}; expected 1 to {len(names)} or one of {', '.join(names)}")
 
 
-def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[float, float] | None) -> Range:
+def _default_range(data: Data, j: int, name: str, limits: tuple[float, float] | None) -> Range:
     edges = [(tendon.get("edge_friction") or [])[j + 1 : j + 2] for tendon in data["tendons"]]
     angles = [angle for edge in edges for law in edge if law is not None for angle in law.get("angles") or []]
     if limits is not None:
@@ -204,6 +219,22 @@ def _default_range(data: Mapping[str, Any], j: int, name: str, limits: tuple[flo
     rest = float((data["joints"][j].get("cover") or {}).get("rest_angle") or 0.0)
     source = f"nothing is known: {UNKNOWN_RANGE:g} rad either side of the rest angle {rest:g}"
     return Range(name, rest - UNKNOWN_RANGE, rest + UNKNOWN_RANGE, source, guessed=True)
+
+
+def plan_for(subject: Subject, ranges: Sequence[Range], options: ExciteOptions) -> Plan:
+    """Return what the motion of a finger should be like."""
+    vary = find_variation(options.vary_tension, options.vary_every, options.pretension, options.alternate)
+    return Plan(
+        as_array(ranges),
+        options.max_speed,
+        options.duration,
+        find_pretensions(subject, options.pretension),
+        options.alternate,
+        options.rate,
+        options.seed,
+        vary,
+        options.max_acceleration,
+    )
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------
@@ -237,6 +268,33 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
         noise=noise,
         slack=slack.tolist(),
         judgement=judge(numbers, known, coverage),
+    )
+
+
+def joint_coverage(motion: Excitation, max_speed: float) -> list[JointCoverage]:
+    """Return the coverage of every joint. max_speed: rad/s, of the plan."""
+    return [
+        _joint(strokes, motion.joint_position[:, j], motion.joint_velocity[:, j], max_speed)
+        for j, strokes in enumerate(motion.strokes)
+    ]
+
+
+def _joint(strokes: list[Stroke], position: Numbers, velocity: Numbers, max_speed: float) -> JointCoverage:
+    turns = [
+        (before, after)
+        for before, after in pairwise(strokes)
+        if (before.target - before.start) * (after.target - after.start) < 0
+    ]
+    rests = [after.begin - before.end for before, after in pairwise(strokes) if after.begin > before.end]
+    return JointCoverage(
+        lowest=float(position.min()),
+        highest=float(position.max()),
+        fastest=float(np.abs(velocity).max()),
+        strokes=len(strokes),
+        reversals=len(turns),
+        slow_reversals=sum(max(before.speed, after.speed) <= SLOW * max_speed for before, after in turns),
+        rests=len(rests),
+        resting=float(sum(rests)),
     )
 
 

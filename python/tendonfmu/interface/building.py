@@ -6,19 +6,18 @@ import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import are, check_output, counted
 from tendonfmu.fmu import build_fmu
-from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_file, read_finger
+from tendonfmu.options import BuildOptions
 
 if TYPE_CHECKING:
-    from tendonfmu.recordings import Recording, RecordingSource
+    from tendonfmu.recordings import RecordingSource
 
 
-@with_checked_options
 def build(
     finger: FingerSource,
     output: str | os.PathLike[str],
@@ -64,24 +63,28 @@ def build(
     InputWarning
         The recording does not belong to the finger, as `tendonfmu check` finds it, or has gaps.
     """
+    options = BuildOptions.of(locals())
     target = Path(output)
-    folder = None if binaries is None else Path(binaries)
-    sets = [Path(each) for each in (ssv if isinstance(ssv, Sequence) and not isinstance(ssv, str) else [ssv])]
+    folder = None if options.binaries is None else Path(options.binaries)
+    sets = [Path(file) for file in options.ssv]
     others = [*sets, *([Path(reference)] if isinstance(reference, str | os.PathLike) else [])]
     if isinstance(finger, str | os.PathLike):
         from tendonfmu.simulate import is_rig
 
         file = finger_file(finger)
         if is_rig(file):
-            return _build_plant(file, target, folder, others, fmi, alone=reference is None and not sets)
+            return _build_plant(file, target, folder, others, options.fmi, alone=reference is None and not sets)
         others.insert(0, file)
     check_output(target, *others)
     _check_suffix(target)
     model = read_finger(finger)
-    related = _related(model, reference, sets, fmi) if reference is not None or sets else _Related({}, None, [])
-    for sentence in related.doubts:
-        warnings.warn(sentence, InputWarning, stacklevel=3)  # at the call of tendonfmu.build
-    return build_fmu(model, target, binaries=folder, extra=related.files, fmi=fmi, experiment=related.experiment)
+    files: dict[str, bytes] = {}
+    experiment = None
+    if reference is not None or sets:
+        files, experiment, doubts = _related(model, reference, sets, options.fmi)
+        for sentence in doubts:
+            warnings.warn(sentence, InputWarning, stacklevel=2)  # at the call of tendonfmu.build
+    return build_fmu(model, target, binaries=folder, extra=files, fmi=options.fmi, experiment=experiment)
 
 
 def _build_plant(
@@ -103,38 +106,25 @@ def _check_suffix(output: Path) -> None:
         raise InputError(f"{output}: expected a name that ends in .fmu, as importing tools want it")
 
 
-class _Related(NamedTuple):
-    """What belongs to a recording and to parameter sets. Of the doubts each is a line."""
-
-    files: dict[str, bytes]
-    experiment: dict[str, float] | None
-    doubts: list[str]
-
-
-def _related(finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int) -> _Related:
-    """Return what belongs to them. What reads recordings is imported here: most FMUs are packed without one."""
-    from tendonfmu.fmu import parameter_sets, reference_run, related_members
-    from tendonfmu.recordings import read_recording
+def _related(
+    finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int
+) -> tuple[dict[str, bytes], dict[str, float] | None, list[str]]:
+    """Return files and experiment of a recording and parameter sets, and a sentence for each doubt about them."""
+    # what reads recordings is imported here: most FMUs are packed without one
+    from tendonfmu.fmu import bridged_rows, parameter_sets, reference_run, related_members
+    from tendonfmu.recordings import belongs, read_recording
 
     files = parameter_sets(sets, finger)
     if reference is None:
-        return _Related(related_members(files), None, [])
+        return related_members(files), None, []
     recording = read_recording(reference)
     run = reference_run(finger, recording, arrays=fmi == 3)
-    return _Related(related_members([*run.files, *files]), run.experiment, _doubts(finger, recording))
-
-
-def _doubts(finger: Finger, recording: Recording) -> list[str]:
-    """Return what speaks against a recording as a reference, one line each."""
-    from tendonfmu.fmu import bridged_rows
-    from tendonfmu.recordings import belongs
-
-    found = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
+    doubts = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
     rows, invented = bridged_rows(recording)
     if invented:
-        found.append(
+        doubts.append(
             f"{recording.path}: gaps, over which {invented} of {counted(rows, 'row')} of the reference "
             f"{are(invented)} interpolated; expected "
             "a recording without gaps, such as a part of this one"
         )
-    return found
+    return related_members([*run.files, *files]), run.experiment, doubts

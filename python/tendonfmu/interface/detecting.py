@@ -15,8 +15,8 @@ from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_repo
 from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
 from tendonfmu.files import counted, write_text
 from tendonfmu.interface.notebook import html_of
-from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource
+from tendonfmu.options import ScoreOptions, TuneOptions
 from tendonfmu.recordings import RecordingSource, flagged_stretches
 from tendonfmu.report import score_text, tune_text
 
@@ -80,7 +80,6 @@ class TuneResult:
         return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning), self.warnings)
 
 
-@with_checked_options
 def tune(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -133,18 +132,8 @@ def tune(
     TuneWarning
         Remarks on the recordings and the result; also in `TuneResult.warnings`.
     """
-    tuning = ContactTuning(
-        finger,
-        false_alarms_per_hour=false_alarms_per_hour,
-        confidence=confidence,
-        method=method,
-        bias_time=bias_time,
-        release_time=release_time,
-        kinematics=kinematics,
-        strict=strict,
-        progress=progress,
-    )
-    return TuneResult(tuning.tune(recordings))
+    options = TuneOptions.of(locals())
+    return TuneResult(ContactTuning(finger, progress=progress, **vars(options)).tune(recordings))
 
 
 class ScoreWarning(UserWarning):
@@ -229,7 +218,6 @@ class ScoreResult:
         return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored), self.warnings)
 
 
-@with_checked_options
 def score(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -274,9 +262,7 @@ def score(
     ScoreWarning
         Remarks on the recordings; also in `ScoreResult.warnings`.
     """
-    found = score_recordings(
-        finger, recordings, labels=labels, force=force, kinematics=kinematics, seed=seed, progress=progress
-    )
-    for sentence in found.warnings:
-        warnings.warn(sentence, ScoreWarning, stacklevel=3)  # at the call of tendonfmu.score
-    return ScoreResult(found)
+    scored = score_recordings(finger, recordings, ScoreOptions.of(locals()), progress)
+    for sentence in scored.warnings:
+        warnings.warn(sentence, ScoreWarning, stacklevel=2)  # at the call of tendonfmu.score
+    return ScoreResult(scored)

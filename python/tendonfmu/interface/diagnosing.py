@@ -15,8 +15,8 @@ from tendonfmu.diagnosis import diagnose as find
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import check_given_once
 from tendonfmu.interface.notebook import html_of
-from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, finger_from_data
+from tendonfmu.options import DiagnoseOptions
 from tendonfmu.recordings import RecordingSource, listed_sources
 from tendonfmu.report import diagnosis_report, diagnosis_sheets, diagnosis_text, write_diagnosis
 from tendonfmu.statistics import Interval
@@ -111,7 +111,7 @@ class Diagnosis:
         plotly.graph_objects.Figure
             The figures of diagnosis.html.
         """
-        sheets = [each for each in diagnosis_sheets(self.found) if residuals or each.section != "views"]
+        sheets = [sheet for sheet in diagnosis_sheets(self.found) if residuals or sheet.section != "views"]
         return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:
@@ -119,7 +119,6 @@ class Diagnosis:
         return html_of(repr(self)[1:-1], tables, lines, self.warnings)
 
 
-@with_checked_options
 def diagnose(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -173,21 +172,12 @@ def diagnose(
     DiagnosisWarning
         Remarks on the recordings and the result; also in `Diagnosis.warnings`.
     """
+    options = DiagnoseOptions.of(locals())
     now, tests = listed_sources(recordings), listed_sources(test)
     before = [] if reference is None else listed_sources(reference)
     check_given_once(now, tests, "a test")
     check_given_once([*now, *tests], before, "the reference")
-    found = find(
-        finger,
-        now,
-        tests,
-        kinematics=kinematics,
-        least_gain=least_gain,
-        seed=seed,
-        jobs=jobs,
-        reference=before or None,
-        progress=progress,
-    )
-    for sentence in found.warnings:
-        warnings.warn(sentence, DiagnosisWarning, stacklevel=3)  # at the call of tendonfmu.diagnose
-    return Diagnosis(found)
+    diagnosis = find(finger, now, tests, reference=before or None, progress=progress, **vars(options))
+    for sentence in diagnosis.warnings:
+        warnings.warn(sentence, DiagnosisWarning, stacklevel=2)  # at the call of tendonfmu.diagnose
+    return Diagnosis(diagnosis)

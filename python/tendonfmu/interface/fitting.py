@@ -13,11 +13,10 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
-from tendonfmu.files import frame_of
 from tendonfmu.fmu import SetParameter, write_parameter_set
 from tendonfmu.interface.notebook import html_of
-from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import Finger, FingerSource, native
+from tendonfmu.options import FitOptions
 from tendonfmu.recordings import RecordingSource
 from tendonfmu.report import fit_text, law_sheets, torque_sheets
 
@@ -61,12 +60,14 @@ class FitResult:
         Columns `unit`, `start`, `value`, `standard_error`, `identified`, `at_bound`, `reason` and `advice`: value
         before and after the fit, whether the standard error is at most 30 % of the value, and if not, why.
         """
-        rows = self.report["parameters"]
+        import pandas as pd
+
         names = ("unit", "start", "value", "standard_error", "identified", "at_bound", "reason", "advice")
+        rows = self.report["parameters"]
+        index = pd.Index([row["path"] for row in rows], name="path", dtype=object)
         columns = {name: np.array([row[name] for row in rows], dtype=_TYPES.get(name, object)) for name in names}
-        found = frame_of({"path": np.array([row["path"] for row in rows], dtype=object), **columns})
-        by_path: pd.DataFrame = found.set_index("path")
-        return by_path
+        table: pd.DataFrame = pd.DataFrame(columns, index=index)
+        return table
 
     @property
     def residual_rms(self) -> Numbers:
@@ -76,8 +77,8 @@ class FitResult:
     @property
     def held_out_rms(self) -> Numbers | None:
         """The same on the samples held out; None without `holdout`."""
-        found = self.report["residual"]["held_out"]
-        return None if found is None else np.array(found["rms"], dtype=float)
+        residual = self.report["residual"]["held_out"]
+        return None if residual is None else np.array(residual["rms"], dtype=float)
 
     @property
     def report(self) -> Mapping[str, Any]:
@@ -113,11 +114,11 @@ class FitResult:
     def _set_parameters(self) -> list[SetParameter]:
         """Return the estimated numbers, and static friction that is equal to an estimated Coulomb friction."""
         finger = native.Instance(self.finger.image)
-        known = {each.path for each in finger.parameters()}
+        known = {parameter.path for parameter in finger.parameters()}
         return [
-            SetParameter(path, finger.get(path), each.standard_error, each.identified)
-            for each in self.estimator.numbers_
-            for path in (each.number.path, each.number.with_path)
+            SetParameter(path, finger.get(path), fitted.standard_error, fitted.identified)
+            for fitted in self.estimator.numbers_
+            for path in (fitted.number.path, fitted.number.with_path)
             if path in known
         ]
 
@@ -139,7 +140,6 @@ class FitResult:
 _TYPES: Mapping[str, Any] = {"start": float, "value": float, "standard_error": float, "identified": bool}
 
 
-@with_checked_options
 def fit(
     finger: FingerSource,
     recordings: RecordingSource | Sequence[RecordingSource],
@@ -221,28 +221,8 @@ def fit(
     FitWarning
         Remarks on the recordings and the fit; also in `FitResult.warnings`.
     """
-    estimator = FrictionFit(
-        finger,
-        method,
-        kinematics=kinematics,
-        holdout=holdout,
-        holdout_block=holdout_block,
-        sides="given" if asymmetric is None else "asymmetric" if asymmetric else "symmetric",
-        only=only,
-        fix=fix,
-        share=share,
-        prior=prior,
-        scale=scale,
-        previous=previous,
-        change=change,
-        effective_samples=effective_samples,
-        max_passes=passes,
-        tolerance=tolerance,
-        parameter_drift=drift,
-        uncertainty=uncertainty,
-        start=resume,
-        progress=progress,
-    )
+    options = FitOptions.of(locals())
+    estimator = FrictionFit(finger, progress=progress, **vars(options))
     try:
         estimator.fit(recordings, compare=compare)
     except KeyboardInterrupt:

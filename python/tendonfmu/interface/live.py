@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.interface.options import read_option
-from tendonfmu.model import FingerSource, inputs_used, native, read_finger, watches_motors
+from tendonfmu.model import FingerSource, native, read_finger
+from tendonfmu.options import RunOptions
 
 _INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
 _MASKED = np.ma.MaskedArray
@@ -97,11 +97,9 @@ class Runner:
     """
 
     def __init__(self, finger: FingerSource, kinematics: int = 1) -> None:
-        kinematics = read_option("kinematics", kinematics)
+        self.kinematics = RunOptions(kinematics).kinematics
         self.finger = read_finger(finger)
-        self.kinematics = kinematics
-        self._instance = native.Instance(self.finger.image, kinematics)
-        self._needed = inputs_used(kinematics, watches_motors(self.finger.data))
+        self._instance = native.Instance(self.finger.image, self.kinematics)
         self._sample = Sample(self._instance.step_outputs())
         self._take = self._instance.step
 

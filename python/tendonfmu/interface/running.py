@@ -14,8 +14,8 @@ from tendonfmu.files import frame_of, write_table
 from tendonfmu.fmu import columns_of, run_model
 from tendonfmu.fmu import summary as summary_of
 from tendonfmu.interface.notebook import html_of
-from tendonfmu.interface.options import with_checked_options
 from tendonfmu.model import FingerSource, finger_file
+from tendonfmu.options import RunOptions
 from tendonfmu.recordings import Recording, RecordingSource, flagged_stretches, read_recording
 
 if TYPE_CHECKING:
@@ -97,7 +97,6 @@ class RunResult:
         return html_of(f"{self.recording.path}", [("in N·m and rad", headings, rows)], [self.summary])
 
 
-@with_checked_options
 def run(
     finger: FingerSource,
     recording: RecordingSource,
@@ -130,6 +129,7 @@ def run(
     InputError
         The finger or the recording is refused, or they do not fit.
     """
+    options = RunOptions.of(locals())
     samples = read_recording(recording)
     model = finger_file(finger) if isinstance(finger, str) else finger
-    return RunResult(samples, run_model(model, samples, kinematics_source=kinematics, progress=progress))
+    return RunResult(samples, run_model(model, samples, kinematics_source=options.kinematics, progress=progress))

@@ -1,0 +1,223 @@
+"""How a function becomes a command: its options from their dataclass, `-` for standard input, repeated values.
+
+Every command takes `--json` and `--quiet`; a command with options shared by several takes them from
+`tendonfmu.options`, or from the annotations here.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from pathlib import Path, PosixPath, WindowsPath
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+from typer.core import TyperCommand
+
+from tendonfmu.cli.console import DASH, PRINTED
+from tendonfmu.errors import InputError
+from tendonfmu.options import Number, Option, Options, Several
+
+if TYPE_CHECKING:
+    SystemPath = Path
+else:
+    SystemPath = PosixPath if os.name == "posix" else WindowsPath
+
+REPEATED = ("--test", "--pushes")  # `--test A B` means `--test A --test B`
+# how a file begins -> its suffix; what is none of these is a table in text
+_BEGINNINGS = {
+    b"PK\x03\x04": ".fmu",
+    b"PAR1": ".parquet",
+    b"MATLAB": ".mat",
+    b"\x89HDF": ".h5",
+    b"\x89MCAP": ".mcap",
+    b"\x1f\x8b": ".csv.gz",
+    b"{": ".json",
+    b"[": ".json",
+}
+
+# --- arguments and options of several commands ------------------------------------------------------------------------
+
+FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description; its structure is kept")]
+ExtendedFinger = Annotated[
+    Path,
+    typer.Argument(metavar="FINGER.json", help="finger description; it is kept, and extended by the causes found"),
+]
+Model = Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="finger description, or its FMU")]
+FreeRecordings = Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")]
+FreeAtPretensions = Annotated[
+    list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")
+]
+Subject = Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")]
+Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")]
+Report = Annotated[Path | None, typer.Option(metavar="R.json", help="report with all results, as JSON")]
+Progress = Annotated[
+    bool | None, typer.Option("--progress/--no-progress", help="show progress [default: on a terminal]")
+]
+
+
+def _set_quiet(wanted: bool) -> None:
+    PRINTED.quiet = wanted
+
+
+def _set_json(wanted: bool) -> None:
+    PRINTED.json = wanted
+
+
+# what these set is read by `console`, so no command takes them
+_OF_ALL = {
+    "as_json": Annotated[bool, typer.Option("--json", callback=_set_json, help="print the result as one JSON object")],
+    "quiet": Annotated[bool, typer.Option("-q", "--quiet", callback=_set_quiet, help="print errors only")],
+}
+
+
+# --- from function to command -----------------------------------------------------------------------------------------
+
+
+def command(
+    options: type[Options] | None = None, *, reads: Sequence[str] = (), after: Mapping[str, str] | None = None
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorate the function of a command.
+
+    options: class whose options stand on the command line in place of the parameter `options`. reads: arguments in
+    which `-` is standard input. after: parameter -> option that it follows in the help, if it stands between options.
+    """
+
+    def decorate(function: Callable[..., None]) -> Callable[..., None]:
+        parameters = _parameters(function, options, after or {})
+
+        @wraps(function)
+        def run(**given: Any) -> None:
+            arguments = {name: value for name, value in given.items() if name not in _OF_ALL}
+            if options is not None:
+                taken = {name: arguments.pop(name) for name in options.each()}
+                # typer has None where nothing was given
+                arguments["options"] = options(**{name: value for name, value in taken.items() if value is not None})
+            with _standard_input(arguments, reads) as read:
+                function(**read)
+
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return run
+
+    return decorate
+
+
+def _parameters(
+    function: Callable[..., None], options: type[Options] | None, after: Mapping[str, str]
+) -> list[inspect.Parameter]:
+    """Return the parameters that typer reads, in the order of the help."""
+    hints = get_type_hints(function, include_extras=True)
+    found: dict[str, inspect.Parameter] = {}
+    moved = {name: [other for other, before in after.items() if before == name] for name in after.values()}
+    given = {
+        name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=parameter.default, annotation=hints[name])
+        for name, parameter in inspect.signature(function).parameters.items()
+    }
+    for name, parameter in given.items():
+        if name == "options" and options is not None:
+            for field, option in options.each().items():
+                found[field] = _option(field, option, options.defaults()[field])
+                found |= {other: given[other] for other in moved.get(field, ())}
+        elif name not in after:
+            found[name] = parameter
+    for name, annotation in _OF_ALL.items():
+        found[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
+    return list(found.values())
+
+
+def _option(name: str, option: Option, default: Any) -> inspect.Parameter:
+    """Make the parameter of an option."""
+    values = option.values
+    item = values.item if isinstance(values, Several) else values
+    limits: dict[str, float] = {}
+    if isinstance(item, Number):
+        limits = {"min": item.least} | ({"max": item.most} if math.isfinite(item.most) else {})
+    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **limits)  # type: ignore[arg-type]
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None if isinstance(values, Several) else default,
+        annotation=Annotated[values.type, shown],
+    )
+
+
+class SeveralValues(TyperCommand):
+    """Command that takes several values for each of its options in `REPEATED`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        valued = {name for each in self.params if not getattr(each, "is_flag", False) for name in each.opts}
+        return super().parse_args(ctx, several_values(args, valued))
+
+
+def several_values(args: Sequence[str], valued: set[str]) -> list[str]:
+    """Repeat an option in `REPEATED` before each of its values."""
+    repeated: list[str] = []
+    free, option = 0, ""  # count of arguments without an option so far; the option of the next word
+    rest = list(args)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        name, equals, _ = word.partition("=")
+        if word.startswith("-") and word != "-":
+            repeated.append(word)
+            if name in valued and not equals and rest:
+                repeated.append(rest.pop(0))
+            option = name if name in REPEATED and name in valued and free > 1 else ""
+        elif option:
+            repeated += [option, word]
+        else:
+            repeated.append(word)
+            free += 1
+    return repeated + rest
+
+
+# --- standard input ---------------------------------------------------------------------------------------------------
+
+
+class StandardInput(SystemPath):
+    """A temporary file with what standard input held. As text it is its name alone, such as `standard_input.csv`."""
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __fspath__(self) -> str:
+        return super().__str__()
+
+
+@contextmanager
+def _standard_input(arguments: Mapping[str, Any], reads: Sequence[str]) -> Iterator[Mapping[str, Any]]:
+    """Put a file with standard input in the place of `-` in the arguments in `reads`, one file or several."""
+    files = {name: _files(arguments[name]) for name in reads}
+    uses = [name for name in reads for file in files[name] if file == DASH]
+    if not uses:
+        yield arguments
+        return
+    if len(uses) > 1:
+        where = " and ".join(dict.fromkeys(uses))
+        raise InputError(f"-: given {len(uses)} times, for {where}; standard input can be read once")
+    (name,) = uses
+    with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
+        kept = _kept(sys.stdin.buffer.read(), Path(folder))
+        several = [kept if file == DASH else file for file in files[name]]
+        yield {**arguments, name: several if isinstance(arguments[name], list) else kept}
+
+
+def _files(value: Any) -> list[Path]:
+    return value if isinstance(value, list) else [] if value is None else [value]
+
+
+def _kept(content: bytes, folder: Path) -> Path:
+    """Write the content of standard input to a file whose suffix says what it is."""
+    if not content.strip():
+        raise InputError("-: standard input is empty; expected a finger description (JSON), an FMU or a recording")
+    start = content[:100].lstrip(b"\xef\xbb\xbf \t\r\n")
+    suffix = next((suffix for begin, suffix in _BEGINNINGS.items() if start.startswith(begin)), ".csv")
+    file = StandardInput(folder, f"standard_input{suffix}")
+    file.write_bytes(content)
+    return file

@@ -1,0 +1,426 @@
+"""The options of the commands: name, default, values and a line of help of each, once.
+
+`tendonfmu.cli` makes the command line of a command from its class, and the functions of Python check their options with
+it. Both pass the object on. An option means the same in every command.
+"""
+
+# ruff: noqa: RUF009 (`option` makes a field)
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+from numbers import Integral, Real
+from pathlib import Path
+from reprlib import Repr
+from typing import Any, ClassVar, TypeVar
+
+from tendonfmu.errors import InputError
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+
+Taken = TypeVar("Taken", bound="Options")
+Made = TypeVar("Made", bound="Configured")
+
+
+class KinematicsSource(IntEnum):
+    """Where the motion of the joints comes from."""
+
+    TENDON_POSITIONS = 1
+    MEASURED_JOINT_POSITIONS = 2
+    JOINT_POSITIONS_AND_VELOCITIES = 3
+
+
+# --- which values an option takes -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number from `least` to `most`; both are allowed."""
+
+    least: float
+    most: float = math.inf
+    whole: bool = False
+    optional: bool = False
+
+    def __str__(self) -> str:
+        kind = "a whole number" if self.whole else "a number"
+        reach = f"{self.least:.16g} to {self.most:.16g}" if self.most < math.inf else f"{self.least:.16g} or more"
+        return f"{kind}, {reach}" + (", or None" if self.optional else "")
+
+    @property
+    def type(self) -> Any:
+        """Type on the command line."""
+        kind: Any = int if self.whole else float
+        return kind | None if self.optional else kind
+
+    def read(self, value: Any) -> float | int | None:
+        """Return the value as a plain number. Raises ValueError if it is none of these."""
+        if value is None and self.optional:
+            return None
+        if isinstance(value, bool) or not isinstance(value, Real) or (self.whole and not isinstance(value, Integral)):
+            raise ValueError
+        number = int(value) if isinstance(value, Integral) and self.whole else float(value)
+        if not self.least <= number <= self.most:
+            raise ValueError
+        return number
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several texts."""
+
+    texts: tuple[str, ...]
+    type: ClassVar[Any] = str
+
+    def __str__(self) -> str:
+        return " or ".join(self.texts)
+
+    def read(self, value: Any) -> str:
+        """Return the value. Raises ValueError if it is none of the texts."""
+        if not (isinstance(value, str) and value in self.texts):
+            raise ValueError
+        return value
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A value of one of `types`; the first is the type on the command line."""
+
+    words: str
+    types: tuple[Any, ...]
+    optional: bool = False
+
+    def __str__(self) -> str:
+        return self.words + (" or None" if self.optional else "")
+
+    @property
+    def type(self) -> Any:
+        """Type on the command line."""
+        return self.types[0] | None if self.optional else self.types[0]
+
+    def read(self, value: Any) -> Any:
+        """Return the value. Raises ValueError if it has another type."""
+        if bool in self.types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
+            return bool(value)
+        if not (isinstance(value, self.types) or (value is None and self.optional)):
+            raise ValueError
+        return value
+
+
+@dataclass(frozen=True)
+class Several:
+    """One value or several; on the command line an option that may be repeated."""
+
+    words: str
+    item: Kind | Number
+
+    def __str__(self) -> str:
+        return self.words
+
+    @property
+    def type(self) -> Any:
+        """Type on the command line."""
+        return list[self.item.type] | None  # type: ignore[name-defined]
+
+    def read(self, value: Any) -> list[Any]:
+        """Return a list. Raises ValueError if there is anything else in it."""
+        alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
+        return [self.item.read(item) for item in ([value] if alone else value)]
+
+
+File = str | os.PathLike[str]
+_COLUMN = Kind("the name of a column", (str,), optional=True)
+_PATH = Kind("a path", (Path, str, os.PathLike), optional=True)
+_TEXTS = Several("a text or a list of texts", Kind("a text", (str,)))
+_PATHS = Several("a path or a list of paths", Kind("a path", (Path, str, os.PathLike)))
+_YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,), optional=True)
+
+
+# --- an option, and the options of a command --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Option:
+    """What an option takes, and how the command line shows it."""
+
+    values: Number | Choice | Kind | Several
+    help: str | None = None
+    metavar: str | None = None
+    names: tuple[str, ...] = ()  # on the command line, where that of the field is not enough
+
+
+def option(default: Any, values: Number | Choice | Kind | Several, help: str | None = None, **shown: Any) -> Any:
+    """Make the field of an option."""
+    return field(default=default, metadata={"option": Option(values, help, **shown)})
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of the options of a command. Raises InputError that names an option whose value is refused."""
+
+    def __post_init__(self) -> None:
+        for name, each in self.each().items():
+            object.__setattr__(self, name, checked(name, getattr(self, name), each.values))
+
+    @classmethod
+    def each(cls) -> dict[str, Option]:
+        """Return the options by name."""
+        return {each.name: each.metadata["option"] for each in fields(cls)}
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Return the defaults by name."""
+        return {each.name: each.default for each in fields(cls)}
+
+    @classmethod
+    def of(cls: type[Taken], arguments: Mapping[str, Any]) -> Taken:
+        """Take the options out of the arguments of a function, and check its `progress`."""
+        progress = arguments.get("progress")
+        if not (progress is None or callable(progress)):
+            raise InputError(f"progress: {_SHORT.repr(progress)}; expected a function or None")
+        return cls(**{name: arguments[name] for name in cls.each() if name in arguments})
+
+
+def checked(name: str, value: Any, values: Number | Choice | Kind | Several) -> Any:
+    """Return the value of an option as a plain one."""
+    try:
+        return values.read(value)
+    except ValueError:
+        raise InputError(f"{name}: {_SHORT.repr(value)}; expected {values}") from None
+
+
+class Configured:
+    """Base of an estimator as in scikit-learn, which keeps its finger, its options and the function of its progress."""
+
+    Options: ClassVar[type[Options]]
+
+    def __init__(self, finger: Any, *, progress: Callable[..., Any] | None = None, **options: Any) -> None:
+        unknown = set(options) - set(self.Options.each())
+        if unknown:
+            raise TypeError(f"{type(self).__name__}: unexpected options {', '.join(sorted(unknown))}")
+        self.finger, self.progress = finger, progress
+        self.options = self.Options(**options)
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return the constructor arguments by name."""
+        return {"finger": self.finger, **vars(self.options), "progress": self.progress}
+
+    def set_params(self: Made, **params: Any) -> Made:
+        """Set constructor arguments by name and return the object itself."""
+        known = self.get_params()
+        for name in params:
+            if name not in known:
+                raise ValueError(f"no parameter {name!r}; expected one of {', '.join(known)}")
+        Configured.__init__(self, **{**known, **params})
+        return self
+
+    def __repr__(self) -> str:
+        usual = {**vars(self.Options()), "progress": None}
+        given = {name: value for name, value in self.get_params().items() if name not in usual or value != usual[name]}
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+
+
+# --- options of several commands --------------------------------------------------------------------------------------
+
+
+def _kinematics() -> Any:
+    words = (f"{source}: {source.name.lower().replace('_', ' ')}" for source in KinematicsSource)
+    return option(1, Number(1, 3, whole=True), ", ".join(words), metavar="1|2|3")
+
+
+def _seed() -> Any:
+    return option(0, Number(0, 2**53, whole=True), "seed of the random numbers", metavar="N")
+
+
+def _jobs() -> Any:
+    return option(1, Number(1, 1024, whole=True), "processor cores to use; no effect on the result", metavar="N")
+
+
+def _false_alarms() -> Any:
+    return option(6.0, Number(1e-3, 3600.0), "highest rate accepted in free motion like yours", metavar="RATE")
+
+
+def _confidence() -> Any:
+    return option(0.9, Number(0.5, 0.9999), "probability that RATE is not exceeded", metavar="P")
+
+
+# --- the commands -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class BuildOptions(Options):
+    """Options of `build`."""
+
+    ssv: Sequence[File] = option((), _PATHS, "parameter set that the FMU carries; may be repeated", metavar="SET.ssv")
+    binaries: File | None = option(
+        None, _PATH, "folder of binaries by FMI platform [default: those installed]", metavar="DIR"
+    )
+    fmi: int = option(2, Number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
+
+
+@dataclass(frozen=True)
+class RunOptions(Options):
+    """Options of `run`."""
+
+    kinematics: int = _kinematics()
+
+
+@dataclass(frozen=True)
+class ExciteOptions(Options):
+    """Options of `excite`."""
+
+    duration: float = option(400.0, Number(1.0, 1e5), "per pretension, in all with --alternate", metavar="SECONDS")
+    max_speed: float = option(1.0, Number(1e-3, 100.0), "limit for every joint", metavar="RAD/S")
+    range_: Sequence[str] = option(
+        (),
+        _TEXTS,
+        "joint range in rad, by number or name; may be repeated",
+        metavar="JOINT=LOW:HIGH",
+        names=("--range",),
+    )
+    pretension: Sequence[float] = option(
+        (),
+        Several("a number or a list of numbers, 0.001 to 1000000", Number(1e-3, 1e6)),
+        "mean tendon force; may be repeated [default: 10]",
+        metavar="NEWTON",
+    )
+    alternate: float | None = option(
+        None, Number(1.0, optional=True), "time between changes of the pretension", metavar="SECONDS"
+    )
+    vary_tension: str | None = option(
+        None,
+        Kind("a text", (str,), optional=True),
+        "in N; vary the tension of each tendon in turn, without a pretension",
+        metavar="LOW:HIGH",
+    )
+    vary_every: float = option(10.0, Number(2.0, 1e5), "time between changes of the tensions", metavar="SECONDS")
+    max_acceleration: float = option(10.0, Number(0.1, 1e4), "limit for every joint", metavar="RAD/S²")
+    rate: float = option(100.0, Number(20.0, 10000.0), "rows per second", metavar="HZ")
+    seed: int = _seed()
+
+
+@dataclass(frozen=True)
+class FitOptions(Options):
+    """Options of `fit`."""
+
+    method: str = option("batch", Choice(("batch", "ekf")), "maximum likelihood or Kalman filter", metavar="batch|ekf")
+    holdout: float = option(0.0, Number(0.0, 0.9), "share of the time not used in the fit", metavar="SHARE")
+    holdout_block: float = option(10.0, Number(1.0), "longest block left out", metavar="SECONDS")
+    kinematics: int = _kinematics()
+    # patterns of paths: which numbers are estimated, kept, and share one value
+    only: Sequence[str] = option((), _TEXTS, "estimate only these numbers; may be repeated", metavar="PATTERN")
+    fix: Sequence[str] = option((), _TEXTS, "keep these numbers fixed; may be repeated", metavar="PATTERN")
+    share: Sequence[str] = option(
+        (), _TEXTS, "laws that share one set of values; may be repeated", metavar="tendons|pulleys|PATTERN"
+    )
+    asymmetric: bool | None = option(
+        None,
+        _YES_OR_NONE,
+        "fit the two sides of a law apart, or as one",
+        names=("--asymmetric/--symmetric",),
+    )
+    prior: float = option(1.0, Number(1e-6, 1e6), "prior: standard deviation / expected magnitude", metavar="RATIO")
+    scale: Sequence[str] = option(
+        (), _TEXTS, "expected magnitude, instead of the description's", metavar="PATTERN=VALUE"
+    )
+    previous: File | None = option(
+        None,
+        _PATH,
+        "report or description of an earlier fit, as the prior",
+        metavar="PREVIOUS.json",
+        names=("--from",),
+    )
+    # docs/evidence/recalibration.md shows the effect of larger and smaller values
+    change: float = option(
+        0.02, Number(1e-6, 10.0), "with --from: expected relative change of the numbers since", metavar="SHARE"
+    )
+    effective_samples: bool | None = option(
+        None, _YES_OR_NONE, "count correlated residuals as fewer samples [default: with --from]"
+    )
+    passes: int | None = option(
+        None,
+        Number(1, whole=True, optional=True),
+        "most passes over the data [default: 60; ekf: 2]",
+        metavar="N",
+    )
+    tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
+    drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
+    uncertainty: bool = option(
+        True,
+        _YES,
+        "write the uncertainty of the friction, for detection",
+        names=("--uncertainty/--no-uncertainty",),
+    )
+    resume: File | None = option(None, _PATH, "continue an interrupted fit", metavar="FITTED.unfinished.json")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.drift and self.method != "ekf":
+            raise InputError(
+                f"drift = {self.drift!r}: expected 0 with method {self.method}; only method ekf lets parameters drift"
+            )
+
+
+@dataclass(frozen=True)
+class CalibrateOptions(Options):
+    """Options of `calibrate`."""
+
+    false_alarms_per_hour: float = _false_alarms()
+    confidence: float = _confidence()
+    kinematics: int = _kinematics()
+    seed: int = _seed()
+    jobs: int = _jobs()
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions(Options):
+    """Options of `diagnose`."""
+
+    kinematics: int = _kinematics()
+    least_gain: float = option(
+        0.03, Number(0.0, 0.5), "least drop of the rms on unseen data for a cause", metavar="SHARE"
+    )
+    seed: int = _seed()
+    jobs: int = _jobs()
+
+
+@dataclass(frozen=True)
+class TuneOptions(Options):
+    """Options of `tune`."""
+
+    false_alarms_per_hour: float = _false_alarms()
+    confidence: float = _confidence()
+    method: str = option(
+        "innovation",
+        Choice(("innovation", "cusum", "threshold")),
+        "contact.method; threshold is that of the paper",
+        metavar="innovation|cusum|threshold",
+    )
+    bias_time: float | None = option(
+        None,
+        Number(1e-3, 1e4, optional=True),
+        "time constant of the bias [default: unchanged]",
+        metavar="SECONDS",
+    )
+    release_time: float = option(
+        2.0, Number(0.0), "time in contact until the bias is tracked again; inf: never", metavar="SECONDS"
+    )
+    kinematics: int = _kinematics()
+    strict: bool = option(
+        False, _YES, "write no file and exit with 1 if FREE is too short for RATE", names=("--strict",)
+    )
+
+
+@dataclass(frozen=True)
+class ScoreOptions(Options):
+    """Options of `score`."""
+
+    labels: str | None = option(None, _COLUMN, "1 in contact, else 0 [default: contact, if present]", metavar="COLUMN")
+    force: str | None = option(None, _COLUMN, "sensed force in N, reported at each alarm and drawn", metavar="COLUMN")
+    kinematics: int = _kinematics()
+    seed: int = _seed()
