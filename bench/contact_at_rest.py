@@ -80,12 +80,12 @@ def measure(data: Mapping[str, Any], free: Sequence[Arrays], other: Sequence[Arr
     """Learns from `free`, counts alarms in `other` and pushes found; a row of the table."""
     finger = described(data)
     parts, others = ([part for a in each for part in free_parts(finger, recording(a), 1)[0]] for each in (free, other))
-    rule, sentences = learn_rest(data, parts, 1, RATE, CONFIDENCE)
+    rule, sentences = learn_rest(data, parts, RATE, CONFIDENCE)
     if rule is None:
         return f"no rule: {sentences}"
     never = {**rule.keys, "threshold": [1e9] * len(data["joints"]), "creep": None, "innovation": None}
-    minutes = sum(float(rest.time[-1]) for rest in find_rests(data, others, 1, never)) / 60.0
-    alarms = count_alarms(data, others, 1, rule.keys)
+    minutes = sum(float(rest.time[-1]) for rest in find_rests(data, others, never)) / 60.0
+    alarms = count_alarms(data, others, rule.keys)
     image = described({**data, "contact": {"threshold": [1e9] * len(data["joints"]), "rest": dict(rule.keys)}}).image
     counts = Counts()
     for push in pushes:

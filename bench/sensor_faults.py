@@ -95,7 +95,7 @@ def learned(data: Mapping[str, Any], arrays: Sequence[Mapping[str, Numbers]]) ->
         settled = each["time"] - each["time"][0] >= SETTLING
         force = np.abs(each["tendon_force"]).mean(axis=1)
         parts.append(FreePart("training", each, force, settled, np.gradient(each["time"])))
-    rule = learn_sensors(data, parts, 1)
+    rule = learn_sensors(data, parts)
     say(f"  sensor_fault: {rule}")
     return {**data, "sensor_fault": rule.keys}
 

@@ -71,7 +71,7 @@ def learned(*recordings: dict[str, Array]) -> tuple[Any, list[str]]:
                              np.full(len(arrays["time"]), 1.0 / RATE))
         for arrays in recordings
     ]  # fmt: skip
-    rule, sentences = tuning.learn_rest(FINGER, parts, 1, 6.0, 0.9)
+    rule, sentences = tuning.learn_rest(FINGER, parts, 6.0, 0.9)
     return rule, sentences
 
 

@@ -53,7 +53,7 @@ def changed(each: FreePart, tendon: int, values: Array | float, name: str = "ten
 
 
 def test_resolutions_and_margin() -> None:
-    rule = learn_sensors(FINGER, [part(1), part(2)], 1)
+    rule = learn_sensors(FINGER, [part(1), part(2)])
     assert rule.keys is not None and not rule.why
     assert rule.keys["force_resolution"] == pytest.approx(0.5 * NOISE, rel=0.1)
     assert rule.keys["position_resolution"] == pytest.approx(QUANTUM)
@@ -62,41 +62,41 @@ def test_resolutions_and_margin() -> None:
 
 
 def test_sound_motion_that_was_not_learned_from_has_no_fault() -> None:
-    rule = learn_sensors(FINGER, [part(1)], 1)
+    rule = learn_sensors(FINGER, [part(1)])
     assert rule.keys is not None
-    assert not finds_a_fault(FINGER, [part(seed) for seed in range(10, 14)], 1, rule.keys)
+    assert not finds_a_fault(FINGER, [part(seed) for seed in range(10, 14)], rule.keys)
 
 
 @pytest.mark.parametrize("tendon", range(4))
 def test_a_failing_sensor_is_found(tendon: int) -> None:
-    rule = learn_sensors(FINGER, [part(1)], 1)
+    rule = learn_sensors(FINGER, [part(1)])
     assert rule.keys is not None
     sound = part(3)
     half = len(sound.time) // 2
     for name in ("tendon_force", "tendon_position"):
-        assert finds_a_fault(FINGER, [changed(sound, tendon, sound.arrays[name][half, tendon], name)], 1, rule.keys)
-    assert finds_a_fault(FINGER, [changed(sound, tendon, 0.0)], 1, rule.keys)
+        assert finds_a_fault(FINGER, [changed(sound, tendon, sound.arrays[name][half, tendon], name)], rule.keys)
+    assert finds_a_fault(FINGER, [changed(sound, tendon, 0.0)], rule.keys)
 
 
 def test_slow_recordings_hold_for_longer() -> None:
-    rule = learn_sensors(FINGER, [part(1, rate=20.0)], 1)
+    rule = learn_sensors(FINGER, [part(1, rate=20.0)])
     assert rule.keys is not None and rule.keys["hold_time"] == pytest.approx(HOLD_SAMPLES / 20.0)
 
 
 def test_springs_that_are_softer_widen_the_margin() -> None:
-    plain, soft = (learn_sensors(FINGER, [part(1, softer=softer)], 1) for softer in (1.0, 0.6))
+    plain, soft = (learn_sensors(FINGER, [part(1, softer=softer)]) for softer in (1.0, 0.6))
     assert plain.keys is not None and soft.keys is not None
     assert soft.keys["jump_margin"] > 2.0 * plain.keys["jump_margin"]
 
 
 def test_a_sensor_that_fails_in_free_motion_leaves_the_key_out() -> None:
     """A margin wide enough for a force that reads 0 would be none."""
-    rule = learn_sensors(FINGER, [changed(part(1), 0, 0.0)], 1)
+    rule = learn_sensors(FINGER, [changed(part(1), 0, 0.0)])
     assert rule.keys is None and rule.why.startswith("a sensor seems to fail in free motion")
 
 
 def test_springs_that_are_not_as_described_leave_the_key_out() -> None:
-    rule = learn_sensors(FINGER, [part(1, softer=0.2)], 1)
+    rule = learn_sensors(FINGER, [part(1, softer=0.2)])
     assert rule.keys is None and rule.why.startswith("forces differ from their springs by up to")
 
 
@@ -112,7 +112,7 @@ def test_why_it_is_left_out(data: dict[str, object], drop: str, why: str) -> Non
     arrays = {key: value for key, value in each.arrays.items() if key != drop}
     if not drop:
         arrays |= {key: arrays[key][:, 1:3] for key in ("tendon_force", "tendon_position")}
-    rule = learn_sensors(data, [FreePart("made", arrays, each.mean_force, each.counted, each.seconds)], 1)
+    rule = learn_sensors(data, [FreePart("made", arrays, each.mean_force, each.counted, each.seconds)])
     assert rule.keys is None and rule.why == why
 
 

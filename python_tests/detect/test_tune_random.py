@@ -66,7 +66,7 @@ def check(seed: int, method: str, longest: float) -> bool:
     # the own part of each bound is above 0 wherever the finger was, and no alarm lasts beyond those allowed
     _, recordings = random_free_case(seed, longest)
     parts = [part for each in recordings for part in free_parts(tuning.start_, each, 1)[0]]
-    for part, flags, counted in zip(parts, closed_loop(data, parts, 1), tuning.loop_, strict=True):
+    for part, flags, counted in zip(parts, closed_loop(data, parts), tuning.loop_, strict=True):
         force = part.mean_force[part.counted]
         for key in (contact, contact.get("innovation", contact)):
             own = np.outer(force, key.get("threshold_per_force", 0.0)) + key["threshold"]

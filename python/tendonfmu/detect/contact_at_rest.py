@@ -6,20 +6,18 @@ change at rest. Bounds are fitted to some of the rests, and scaled until the oth
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.arrays import Data, Numbers, rounded
+from tendonfmu.arrays import Array, Data, Numbers, rounded
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
-from tendonfmu.detect.free_motion import NEVER, FreePart
+from tendonfmu.detect.free_motion import NEVER, FreePart, runs_of
 from tendonfmu.files import counted
-from tendonfmu.model import DEFAULTS, native, number_of
+from tendonfmu.model import DEFAULTS, number_of
 
 SETTLE_TIME = DEFAULTS["contact.rest.settle_time"]  # s
 INNOVATION_TIME = 0.5  # s; a touch rises within this time, creep hardly changes
@@ -82,7 +80,7 @@ class Bounds:
 
 
 def learn_rest(
-    data: Data, parts: Sequence[FreePart], kinematics: int, rate: float, confidence: float
+    data: Data, parts: Sequence[FreePart], rate: float, confidence: float
 ) -> tuple[RestRule | None, list[str]]:
     """Learn the rule for a rate of false alarms per hour of rest."""
     if not all("tendon_position" in part.arrays for part in parts):
@@ -92,7 +90,7 @@ def learn_rest(
         return None, [f"{LEFT_OUT}the motors never stand for {SETTLE_TIME:g} s"]
     joints = len(data["joints"])
     never = {"travel": travel, "settle_time": SETTLE_TIME, "threshold": [NEVER] * joints}
-    rests = find_rests(data, parts, kinematics, never)
+    rests = find_rests(data, parts, never)
     hours = sum(float(rest.time[-1]) for rest in rests) / 3600.0
     if 60.0 * hours < LEAST_MINUTES or len(rests) < LEAST_RESTS:
         return None, [
@@ -103,7 +101,7 @@ def learn_rest(
     factor, held_out = level(rests, allowed)
     bounds = fit_bounds(rests).scaled(factor)
     for _ in range(_ROUNDS):
-        alarms = count_alarms(data, parts, kinematics, bounds.keys(travel))
+        alarms = count_alarms(data, parts, bounds.keys(travel))
         if alarms <= allowed:
             break
         bounds = bounds.scaled(_RAISE)
@@ -144,10 +142,10 @@ def standing_travel(data: Data, parts: Sequence[FreePart]) -> float | None:
 # --- torques ----------------------------------------------------------------------------------------------------------
 
 
-def find_rests(data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data) -> list[Rest]:
+def find_rests(data: Data, parts: Sequence[FreePart], rule: Data) -> list[Rest]:
     """Find the rests of more than LEAST_REST in all parts, as the runtime defines them."""
     rests = []
-    for part, outputs in _runs(data, parts, kinematics, rule):
+    for part, outputs in _runs(data, parts, rule):
         change = outputs["contact_change"]
         standing = (change != 0.0).any(axis=1) & part.counted
         edges = np.flatnonzero(np.diff(np.concatenate([[0], standing.astype(int), [0]])))
@@ -214,24 +212,15 @@ def level(rests: Sequence[Rest], allowed: int) -> tuple[float, int]:
     return factor, int((held > factor).sum())
 
 
-def count_alarms(data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data) -> int:
+def count_alarms(data: Data, parts: Sequence[FreePart], rule: Data) -> int:
     """Count the starts of `contact_at_rest` of the finger with this rule, in counted time."""
     count = 0
-    for part, outputs in _runs(data, parts, kinematics, rule):
+    for part, outputs in _runs(data, parts, rule):
         alarm = outputs["contact_at_rest"].ravel().astype(int)
         begins = np.diff(alarm, prepend=0) > 0
         count += int((begins & part.counted).sum())
     return count
 
 
-def _runs(
-    data: Data, parts: Sequence[FreePart], kinematics: int, rule: Data
-) -> list[tuple[FreePart, dict[str, NDArray[Any]]]]:
-    contact = {**data["contact"], "rest": dict(rule)}
-    finger = native.Instance.from_description(json.dumps({**data, "contact": contact}), kinematics)
-    begin, runs = finger.save_state(), []
-    for part in parts:
-        finger.restore_state(begin)
-        outputs = finger.run(part.arrays)
-        runs.append((part, {name: outputs[name] for name in ("contact_change", "contact_at_rest")}))
-    return runs
+def _runs(data: Data, parts: Sequence[FreePart], rule: Data) -> Iterator[tuple[FreePart, dict[str, Array]]]:
+    return runs_of({**data, "contact": {**data["contact"], "rest": dict(rule)}}, parts)

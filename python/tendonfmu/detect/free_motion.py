@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, native, number_of
+from tendonfmu.options import KinematicsSource
 from tendonfmu.recordings import Held, Recording, prepare
 
 Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
@@ -35,6 +36,7 @@ class FreePart:
     mean_force: Numbers  # [N] mean tendon force (N)
     counted: Flags  # [N] samples after settling, without a stuck sensor
     seconds: Numbers  # [N] time that each sample stands for (s)
+    kinematics: KinematicsSource = KinematicsSource.TENDON_POSITIONS
 
     @property
     def time(self) -> Numbers:
@@ -86,7 +88,8 @@ def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[l
         settled = time - time[0] >= SETTLING
         arrays = prepared.arrays(rows)
         counted = settled & ~prepared.faulty[rows]
-        parts.append(FreePart(str(recording.path), arrays, force[rows], counted, sample_seconds(time)))
+        seconds, source = sample_seconds(time), KinematicsSource(kinematics)
+        parts.append(FreePart(str(recording.path), arrays, force[rows], counted, seconds, source))
     sentences = [sentence.replace("are fitted as", "count as") for sentence in prepared.warnings]
     return parts, sentences
 
@@ -138,23 +141,18 @@ def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> N
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def run_free(data: Data, parts: Sequence[FreePart], kinematics: int, clock: Clock) -> list[FreeRun]:
+def run_free(data: Data, parts: Sequence[FreePart], clock: Clock) -> list[FreeRun]:
     """Run the finger over every part with contact detection switched off."""
-    probe = _finger(_open_loop(data, clock), kinematics)
-    plain = _finger(_without_uncertainty(_open_loop(data, clock)), kinematics) if _is_uncertain(data) else None
-    begin, plain_begin = probe.save_state(), None if plain is None else plain.save_state()
+    probe = _open_loop(data, clock)
+    plain = runs_of(_without_uncertainty(probe), parts) if _is_uncertain(data) else repeat((None, None))
     runs = []
-    for part in parts:
-        probe.restore_state(begin)
-        found = _run(probe, part)
-        known = found["compensated_torque_std"]
+    for (part, outputs), (_, of_bias) in zip(runs_of(probe, parts), plain, strict=False):
+        known = outputs["compensated_torque_std"]
         uncertain = np.zeros_like(known)
-        if plain is not None and plain_begin is not None:
-            plain.restore_state(plain_begin)
-            of_bias = _run(plain, part)["compensated_torque_std"]
-            uncertain = np.sqrt(np.maximum(known**2 - of_bias**2, 0.0))
+        if of_bias is not None:
+            uncertain = np.sqrt(np.maximum(known**2 - of_bias["compensated_torque_std"] ** 2, 0.0))
         names = ("residual", "innovation", "drift", "stuck_friction", "friction_jump")
-        arrays = [*(found[name] for name in names), known, uncertain]
+        arrays = [*(outputs[name] for name in names), known, uncertain]
         runs.append(FreeRun(part, *(values.astype(np.float32) for values in arrays)))
     return runs
 
@@ -189,25 +187,22 @@ def _without_uncertainty(data: Data) -> dict[str, Any]:
     return {**data, "contact": {key: value for key, value in data["contact"].items() if key != "uncertainty"}}
 
 
-def _finger(data: Data, kinematics: int) -> native.Instance:
-    return native.Instance(native.image_from_json(json.dumps(data)), kinematics)
-
-
-def _run(finger: native.Instance, part: FreePart) -> dict[str, NDArray[Any]]:
-    try:
-        return finger.run(part.arrays)
-    except native.NativeError as refused:
-        raise InputError(f"{part.source}: {refused}") from None
-
-
-def closed_loop(data: Data, parts: Sequence[FreePart], kinematics: int) -> list[Flags]:
-    """Return [N] `contact` of the finger as it is, for every part."""
-    finger = _finger(data, kinematics)
-    begin, contacts = finger.save_state(), []
+def runs_of(data: Data, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, dict[str, Array]]]:
+    """Run a finger over every part, each from its start."""
+    finger = native.Instance.from_description(data, parts[0].kinematics)
+    begin = finger.save_state()
     for part in parts:
         finger.restore_state(begin)
-        contacts.append(np.asarray(_run(finger, part)["contact"]).ravel().astype(bool))
-    return contacts
+        try:
+            yield part, finger.run(part.arrays)
+        except native.NativeError as refused:
+            raise InputError(f"{part.source}: {refused}") from None
+
+
+def closed_loop(data: Data, parts: Sequence[FreePart]) -> Iterator[Flags]:
+    """Yield [N] `contact` of the finger as it is, for every part."""
+    for _, outputs in runs_of(data, parts):
+        yield np.asarray(outputs["contact"]).ravel().astype(bool)
 
 
 @dataclass(frozen=True)
@@ -233,10 +228,10 @@ class LoopAlarms:
         return max((end - begin for begin, end in zip(self.begins, self.ends, strict=True)), default=0.0)
 
 
-def count_loop(data: Data, parts: Sequence[FreePart], kinematics: int) -> list[LoopAlarms]:
+def count_loop(data: Data, parts: Sequence[FreePart]) -> list[LoopAlarms]:
     """Run the finger over every part from its start. An alarm counts if it begins in counted time."""
     alarms = []
-    for k, (part, contact) in enumerate(zip(parts, closed_loop(data, parts, kinematics), strict=True)):
+    for k, (part, contact) in enumerate(zip(parts, closed_loop(data, parts), strict=True)):
         time = part.time - part.time[0]
         spans = stretches(part.time, contact)
         settled = time[spans[:, 0]] >= SETTLING if len(spans) else np.zeros(0, dtype=bool)

@@ -7,15 +7,15 @@ fault.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.model import DEFAULTS, native
+from tendonfmu.detect.free_motion import FreePart, runs_of
+from tendonfmu.model import DEFAULTS
+from tendonfmu.options import KinematicsSource
 
 # s, and a number of samples for slow rates. Shorter than the default of sensor_fault.hold_time: the check on free
 # motion shows that channels that are read at different times raise no fault.
@@ -40,11 +40,11 @@ class SensorRule:
     why: str
 
 
-def learn_sensors(data: Data, parts: Sequence[FreePart], kinematics: int) -> SensorRule:
+def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
     """Learn the rule for which the finger as it runs finds no fault in any part."""
     if not all("tendon_position" in part.arrays for part in parts):
         return SensorRule(None, np.nan, "there are no tendon positions")
-    gaps = [gap for part in parts for gap in _gaps(data, part, kinematics)]
+    gaps = [gap for part in parts for gap in _gaps(data, part)]
     if not any(each.known.any() for each in gaps):
         return SensorRule(None, np.nan, "no tendon's length follows from the others")
     largest = max(max(each.jump(), each.span()) for each in gaps)
@@ -58,7 +58,7 @@ def learn_sensors(data: Data, parts: Sequence[FreePart], kinematics: int) -> Sen
     }
     widest = WIDEST * min(float(part.mean_force.mean()) for part in parts)
     while keys["jump_margin"] <= widest:
-        if not finds_a_fault(data, parts, kinematics, keys):
+        if not finds_a_fault(data, parts, keys):
             return SensorRule(keys, largest, "")
         keys["jump_margin"] = float(f"{RAISE * keys['jump_margin']:.3g}")
     why = f"a sensor seems to fail in free motion, by more than {widest:.2g} N"
@@ -70,15 +70,10 @@ def learn_sensors(data: Data, parts: Sequence[FreePart], kinematics: int) -> Sen
     return SensorRule(None, largest, why)
 
 
-def finds_a_fault(data: Data, parts: Sequence[FreePart], kinematics: int, keys: Mapping[str, float]) -> bool:
+def finds_a_fault(data: Data, parts: Sequence[FreePart], keys: Mapping[str, float]) -> bool:
     """Tell whether the finger with these keys finds a fault in counted time."""
-    finger = native.Instance.from_description(json.dumps({**data, "sensor_fault": dict(keys)}), kinematics)
-    begin = finger.save_state()
-    for part in parts:
-        finger.restore_state(begin)
-        if finger.run(part.arrays)["sensor_fault"][part.counted].any():
-            return True
-    return False
+    runs = runs_of({**data, "sensor_fault": dict(keys)}, parts)
+    return any(outputs["sensor_fault"][part.counted].any() for part, outputs in runs)
 
 
 @dataclass(frozen=True)
@@ -107,25 +102,33 @@ class Gap:
         return float((high - low)[known.any(axis=1)].max(initial=0.0))
 
 
-def _gaps(data: Data, part: FreePart, kinematics: int) -> Iterator[Gap]:
+def _gaps(data: Data, part: FreePart) -> Iterator[Gap]:
     R = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=np.float64)
     k = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=np.float64)
     loops = np.array([bool(tendon.get("bidirectional")) for tendon in data["tendons"]])
     force, position = part.arrays["tendon_force"], part.arrays["tendon_position"]
     taut = (force > TAUT) | loops
-    w, is_known = _joint_side(R, position - force / k, part.arrays.get("joint_position"), kinematics)
+    w, is_known = _joint_side(
+        R,
+        position - force / k,
+        None if part.kinematics == KinematicsSource.TENDON_POSITIONS else part.arrays.get("joint_position"),
+    )
     window = max(1, min(len(force), int(np.searchsorted(part.time, part.time[0] + WINDOW))))
     for i in np.flatnonzero(is_known):
         others = np.arange(len(k)) != i
-        known = taut[:, others].all(axis=1) if kinematics == 1 else np.ones(len(force), dtype=bool)
+        known = (
+            taut[:, others].all(axis=1)
+            if part.kinematics == KinematicsSource.TENDON_POSITIONS
+            else np.ones(len(force), dtype=bool)
+        )
         stretched = k[i] * (np.abs(np.diff(position[:, i])) + np.abs(np.diff(w[:, i])))
         gap = k[i] * (position[:, i] - w[:, i]) - force[:, i]
         yield Gap(force[:, i], gap, stretched, known & taut[:, i] & part.counted, window)
 
 
-def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None, kinematics: int) -> tuple[Numbers, Flags]:
+def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None) -> tuple[Numbers, Flags]:
     """Return [N, m] R q of each tendon (m), from the others or the measured angles, and [m] whether it is known."""
-    if kinematics != 1 and angle is not None:
+    if angle is not None:
         return angle @ R.T, np.ones(len(R), dtype=bool)
     inverse = np.linalg.pinv(R)
     leverage = np.einsum("ij,ji->i", R, inverse)

@@ -177,9 +177,9 @@ class ContactTuning(Configured):
         self._run(parts)
         self._choose()
         self.rest_: RestRule | None
-        self.rest_, sentences = learn_rest(self.start_.data, parts, self.options.kinematics, wished, confidence)
+        self.rest_, sentences = learn_rest(self.start_.data, parts, wished, confidence)
         self.warnings_ += sentences
-        self.sensors_: SensorRule = learn_sensors(self.start_.data, parts, self.options.kinematics)
+        self.sensors_: SensorRule = learn_sensors(self.start_.data, parts)
         self._close_the_loop(parts)
         self.pretensions_ = self._by_pretension()
         self.seconds_ = perf_counter() - begin
@@ -221,10 +221,10 @@ class ContactTuning(Configured):
         if self.method != "threshold" and self._slides():
             data["contact"] = {**data["contact"], "friction_bound": {**given, "stuck_presliding": True}}
         for _ in range(2):
-            self.runs_: list[FreeRun] = run_free(data, parts, self.options.kinematics, clock)
+            self.runs_: list[FreeRun] = run_free(data, parts, clock)
             self.bias_: BiasNoise = bias_noise(data, self.runs_, self.cells_, time)
             data = {**data, "bias": {**(data.get("bias") or {}), **self.bias_.keys()}}
-        self.runs_ = run_free(data, parts, self.options.kinematics, clock)
+        self.runs_ = run_free(data, parts, clock)
         self._data = data
 
     def _slides(self) -> bool:
@@ -296,7 +296,7 @@ class ContactTuning(Configured):
             main = self.bounds_.get("innovation", self.bounds_["residual"])
             self.deviation_: Deviation = deviation(self.runs_, self.cells_, main)
             data = self._tuned()
-            self.loop_: list[LoopAlarms] = count_loop(data, parts, self.options.kinematics)
+            self.loop_: list[LoopAlarms] = count_loop(data, parts)
             if sum(loop.alarms for loop in self.loop_) <= self.allowed_:
                 break
             raised *= _STEP

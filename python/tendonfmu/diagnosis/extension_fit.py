@@ -7,7 +7,6 @@ judged one by one here, so that a selection can fit many times.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,7 +29,7 @@ from tendonfmu.estimate import (
     verdicts,
     with_values,
 )
-from tendonfmu.model import Finger, description_text, moment_arms, native
+from tendonfmu.model import Finger, description_text, law_path, moment_arms, native
 from tendonfmu.recordings import FitRecording
 
 if TYPE_CHECKING:
@@ -40,8 +39,6 @@ if TYPE_CHECKING:
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
 BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it
 NEW = 3.0  # times its start: prior standard deviation of a new number
-_SIDE = re.compile(r"\.(positive|negative)(?=\.|$)")
-_POINT = re.compile(r"\.laws\[\d+\]")
 
 
 @dataclass(frozen=True)
@@ -226,6 +223,15 @@ def _described(data: Mapping[str, Any], path: Path) -> Finger:
         raise InputError(f"{path}: {refused}") from None
 
 
+def _coarser(path: str) -> list[str]:
+    """Return the path of a number, without its side, and without its working point."""
+    law = law_path(path)
+    if law is None or law.number is None:
+        return [path]
+    point = law.effect if law.point is None else f"{law.effect}.laws[{law.point}]"
+    return [path, f"{point}.{law.number}", f"{law.effect}.{law.number}"]
+
+
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
     """Set the expected magnitudes of the numbers."""
     scale = structure.scale.copy()
@@ -233,7 +239,7 @@ def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
         for path in (number.path, number.with_path):
             if path is None or not np.isnan(scale[structure.index[path]]):
                 continue
-            for known in (path, _SIDE.sub("", path), _SIDE.sub("", _POINT.sub("", path))):
+            for known in _coarser(path):
                 value = _number_or_none(given, known)
                 if value:
                     scale[structure.index[path]] = abs(value)

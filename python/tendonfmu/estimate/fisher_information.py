@@ -23,6 +23,7 @@ from tendonfmu.model import (
     friction_probe,
     native,
     number_of,
+    steps_of,
     working_point_weights,
 )
 
@@ -142,8 +143,8 @@ def _bundles(numbers: Sequence[Unknown]) -> list[_Bundle]:
 
 def _joint_of(number: Unknown) -> int | None:
     """Return the joint, from 0, whose own friction or cover the number belongs to, else None."""
-    path = number.path
-    return int(path[len("joints[") : path.index("]")]) - 1 if path.startswith("joints[") else None
+    owner, index, *_ = steps_of(number.path)
+    return index if owner == "joints" and isinstance(index, int) else None
 
 
 def _sign(number: Unknown) -> int:

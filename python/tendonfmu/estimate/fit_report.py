@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.files import FIT_REPORT
-from tendonfmu.estimate.methods import Learned
+from tendonfmu.estimate.methods import Learned, unknown_names
 from tendonfmu.estimate.verdicts import Fitted
 from tendonfmu.files import finite
 from tendonfmu.model import Finger, native
@@ -20,54 +19,48 @@ from tendonfmu.recordings import consistency, whiteness
 from tendonfmu.statistics import effective_samples
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A finished fit, with all that its report contains."""
-
-    fitted: Finger  # fitted description
-    learned: Learned  # the estimation
-    seconds: float  # time that it took (s)
-    options: Mapping[str, Any]  # options that shape the result, and `method`
-    warnings: Sequence[str]  # sentences
-    numbers: Sequence[Fitted]  # every estimated number, judged
-    names: Sequence[str]  # [u] "path.role" of the unknowns
-    innovations: Sequence[Numbers]  # by recording, [N, n] standardised innovations; NaN where not trained on
-    training: Sequence[Evaluation]  # judged recordings
-    comparisons: Sequence[Evaluation]
-    uncertainty: Mapping[str, Any] | None  # uncertainty of the modelled friction torque; None if not asked for
-
-
-def build_report(outcome: Outcome) -> dict[str, Any]:
+def build_report(
+    *,
+    fitted: Finger,
+    learned: Learned,
+    seconds: float,  # time of the estimation (s)
+    options: Mapping[str, Any],  # options that shape the result, and `method`
+    warnings: Sequence[str],
+    numbers: Sequence[Fitted],
+    innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
+    training: Sequence[Evaluation],
+    comparisons: Sequence[Evaluation],
+    uncertainty: Mapping[str, Any] | None,  # of the modelled friction torque; None if not asked for
+) -> dict[str, Any]:
     """Build the report of a finished fit; numbers that are not finite become None."""
-    learned, numbers = outcome.learned, outcome.numbers
-    units = {parameter.path: parameter.unit for parameter in native.Instance(outcome.fitted.image).parameters()}
+    units = {parameter.path: parameter.unit for parameter in native.Instance(fitted.image).parameters()}
     report = {
         "format": FIT_REPORT,
-        "finger": outcome.fitted.name,
-        "method": outcome.options["method"],
+        "finger": fitted.name,
+        "method": options["method"],
         "converged": learned.converged,
         "finished": True,
         "iterations": learned.iterations,
         "passes": learned.passes,
-        "seconds": outcome.seconds,
+        "seconds": seconds,
         "cost": learned.cost,
-        "options": dict(outcome.options),
-        "warnings": list(outcome.warnings),
-        "recordings": [evaluation.recording.entry() for evaluation in outcome.training],
+        "options": dict(options),
+        "warnings": list(warnings),
+        "recordings": [evaluation.recording.entry() for evaluation in training],
         "parameters": [_parameter(number, units) for number in numbers],
         "correlation": {
-            "paths": list(outcome.names),
+            "paths": unknown_names(learned.estimator),
             "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
             "matrix": _correlation(learned.covariance),
         },
         "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
         "residual": {
-            "train": residual_entry(outcome.training, "train"),
-            "held_out": residual_entry(outcome.training, "held_out"),
-            "comparisons": [_comparison(evaluation) for evaluation in outcome.comparisons],
+            "train": residual_entry(training, "train"),
+            "held_out": residual_entry(training, "held_out"),
+            "comparisons": [_comparison(evaluation) for evaluation in comparisons],
         },
-        "innovations": _innovations(outcome),
-        "uncertainty": outcome.uncertainty,
+        "innovations": _innovations(innovations, learned.weights),
+        "uncertainty": uncertainty,
     }
     return {key: finite(value) for key, value in report.items()}
 
@@ -106,13 +99,13 @@ def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _innovations(outcome: Outcome) -> dict[str, Any]:
+def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> dict[str, Any]:
     """Describe the residuals of the samples trained on, and how many independent samples they are worth."""
-    samples, worth = effective_samples(outcome.innovations, outcome.learned.weights)
+    samples, worth = effective_samples(innovations, weights)
     share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
     return {
-        "nis": consistency(outcome.innovations, share),
-        "whiteness": whiteness(outcome.innovations),
+        "nis": consistency(innovations, share),
+        "whiteness": whiteness(innovations),
         "effective": {"samples": samples.tolist(), "worth": worth.tolist()},
     }
 

@@ -26,7 +26,7 @@ from tendonfmu.estimate.files import (
     with_uncertainty,
     with_values,
 )
-from tendonfmu.estimate.fit_report import Outcome, build_report
+from tendonfmu.estimate.fit_report import build_report
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.methods import (
     FrictionFitOptions,
@@ -41,7 +41,7 @@ from tendonfmu.estimate.methods import (
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
-from tendonfmu.estimate.verdicts import Fitted, Knowledge, judge_numbers
+from tendonfmu.estimate.verdicts import Fitted, judge_numbers
 from tendonfmu.files import counted
 from tendonfmu.model import FingerSource, description_text, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
@@ -230,7 +230,7 @@ class FrictionFit(Configured):
     def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str]) -> None:
         self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
         self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
-        self.numbers_, self.covariance_ = judge_numbers(self.structure_, self._knowledge(learned))
+        self.numbers_, self.covariance_ = self._judged(learned)
         self.parameters_ = {number.number.path: number.value for number in self.numbers_}
         self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
         start, fitted = self.start_.data, self.description_.data
@@ -242,19 +242,16 @@ class FrictionFit(Configured):
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
         self.report_ = build_report(
-            Outcome(
-                fitted=self.description_,
-                learned=learned,
-                seconds=self.seconds_,
-                options=_reported(self.options),
-                warnings=self.warnings_,
-                numbers=self.numbers_,
-                names=unknown_names(learned.estimator),
-                innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
-                training=self.training_,
-                comparisons=self.comparisons_,
-                uncertainty=uncertainty,
-            )
+            fitted=self.description_,
+            learned=learned,
+            seconds=self.seconds_,
+            options=_reported(self.options),
+            warnings=self.warnings_,
+            numbers=self.numbers_,
+            innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
+            training=self.training_,
+            comparisons=self.comparisons_,
+            uncertainty=uncertainty,
         )
         self.warnings_ += _noise_sentences(self.report_["innovations"])
         self.report_["warnings"] = list(self.warnings_)
@@ -267,16 +264,10 @@ class FrictionFit(Configured):
         self.description_ = with_uncertainty(self.description_, directions, level)
         return entry
 
-    def _knowledge(self, learned: Learned) -> Knowledge:
-        return Knowledge(
-            estimator=learned.estimator,
-            z=learned.z,
-            covariance=learned.covariance,
-            information=learned.information,
-            fitted=self.description_,
-            coverage=with_laws_of(self.description_.data, self.coverage_),
-            noise=bias_settings(self.description_.data).noise,
-        )
+    def _judged(self, learned: Learned) -> tuple[list[Fitted], Numbers]:
+        data = self.description_.data
+        coverage = with_laws_of(data, self.coverage_)
+        return judge_numbers(self.structure_, learned, self.description_, coverage, bias_settings(data).noise)
 
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 

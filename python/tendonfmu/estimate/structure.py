@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
-from tendonfmu.model import LEFT_OUT, Finger, effects, native, sides, steps_of
+from tendonfmu.model import LEFT_OUT, Finger, effects, law_path, native, sides, steps_of
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 FIXED = -1
-
-_INDEX = re.compile(r"\[(\d+)\]")
 
 
 @dataclass(frozen=True)
@@ -248,10 +246,9 @@ def _shared_keys(
     """Yield per option [numbers] a key, equal where values are shared and None where nothing is shared."""
     for asked in share:
         if asked == "tendons":  # the same place of every tendon
-            keys = [_place(number, keep=1) if number.path.startswith("tendons[") else None for number in numbers]
+            keys = [_place(number, "tendon") for number in numbers]
         elif asked == "pulleys":  # all pulleys of a tendon
-            is_pulley = [".pulley_friction[" in number.path for number in numbers]
-            keys = [_place(n, keep=0) if pulley else None for n, pulley in zip(numbers, is_pulley, strict=True)]
+            keys = [_place(number, "joint", "pulley_friction") for number in numbers]
         else:
             match = matcher(asked).fullmatch
             found = [match(number.path) for number in numbers]
@@ -261,11 +258,13 @@ def _shared_keys(
         yield keys
 
 
-def _place(number: Unknown, keep: int) -> str:
-    """Return the path without the tendon (keep 1) or without the joint (keep 0); working points by their angle."""
-    path = _by_angle(number)
-    start, end = [match.span() for match in _INDEX.finditer(path)][1 - keep]
-    return path[:start] + path[end:]
+def _place(number: Unknown, left_out: str, only: str | None = None) -> str | None:
+    """Name where along a tendon a number is, without its tendon or its joint; working points by their angle."""
+    law = law_path(number.path)
+    if law is None or law.tendon is None or law.kind != (only or law.kind):
+        return None
+    parts = {"tendon": law.tendon, "kind": law.kind, "joint": law.joint, "side": law.side, "number": law.number}
+    return repr([*(part for name, part in parts.items() if name != left_out), law.point and _angle(number)])
 
 
 def _rest(number: Unknown, rest: str) -> str:
@@ -275,10 +274,6 @@ def _rest(number: Unknown, rest: str) -> str:
 
 def _angle(number: Unknown) -> str:
     return repr(number.effect.angles[number.point]) if number.effect is not None and number.effect.angles else ""
-
-
-def _by_angle(number: Unknown) -> str:
-    return re.sub(r"\.laws\[\d+\]", f".laws@{_angle(number)}", number.path)
 
 
 def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:

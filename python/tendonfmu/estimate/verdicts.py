@@ -13,6 +13,7 @@ from tendonfmu.estimate.estimation import Unknown as FittedUnknown
 from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
+from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
 
@@ -48,19 +49,6 @@ class Fitted:
         return not self.cause
 
 
-@dataclass(frozen=True)
-class Knowledge:
-    """What a fit knows."""
-
-    estimator: Estimator  # unknowns, and their conversion into numbers of the description
-    z: Numbers  # [u] estimate
-    covariance: Numbers  # [u, u] of z, prior included
-    information: Numbers  # [u, u] of the data alone
-    fitted: Finger  # description with the values at z
-    coverage: Sequence[EffectCoverage]  # what the recorded motion covers
-    noise: float  # torque noise (N·m); a bias.initial_torque counts as at least that large
-
-
 def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
     # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
@@ -75,18 +63,32 @@ def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     return np.column_stack(columns)
 
 
-def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted], Numbers]:
-    """Judge every estimated number."""
-    # returns [p, p] of their values
-    numbers = values_of(structure, known.fitted)
-    matrix = slopes(known.estimator, known.z)[[structure.index[number.path] for number in numbers]]
-    covariance = matrix @ known.covariance @ matrix.T
+def judge_numbers(
+    structure: Structure, learned: Learned, finger: Finger, coverage: Sequence[EffectCoverage], noise: float
+) -> tuple[list[Fitted], Numbers]:
+    """Judge every number of a fitted finger by what the motion covers; return the covariance [p, p] of the values."""
+    # noise: of the torque (N·m); a bias.initial_torque counts as at least that large
+    estimator, z = learned.estimator, learned.z
+    numbers = values_of(structure, finger)
+    matrix = slopes(estimator, z)[[structure.index[number.path] for number in numbers]]
+    covariance = matrix @ learned.covariance @ matrix.T
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    size = np.array([_size(number, known.noise) for number in numbers])
-    columns = _columns(structure, known.estimator)
-    representatives = _representatives(numbers, columns, known.coverage)
-    verdicts = _verdicts(numbers, representatives, known, matrix, covariance, size)
-    by_path = {cover.effect.path: cover for cover in known.coverage}
+    size = np.array([_size(number, noise) for number in numbers])
+    columns = _columns(structure, estimator)
+    representatives = _representatives(numbers, columns, coverage)
+    # `error` from all numbers, `error_alone` with all others known
+    chosen = covariance[np.ix_(representatives, representatives)]
+    deviation = np.sqrt(np.maximum(np.diag(chosen), 1e-300))
+    inverse = np.linalg.inv(matrix[representatives])
+    seen = np.diag(inverse.T @ learned.information @ inverse) * size[representatives] ** 2
+    verdicts = explain(
+        [numbers[k] for k in representatives],
+        deviation / size[representatives],
+        1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2),
+        chosen / np.outer(deviation, deviation),
+        coverage,
+    )
+    by_path = {cover.effect.path: cover for cover in coverage}
     judged = []
     for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
@@ -97,10 +99,10 @@ def judge_numbers(structure: Structure, known: Knowledge) -> tuple[list[Fitted],
                 number=number,
                 start=before.value,
                 standard_error=float(error[k]),
-                at_bound=_bound(known.estimator.unknowns[columns[k]], float(known.z[columns[k]])),
+                at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
                 reason=verdict.reason if cause else "",
-                advice=_advice(cause, verdict, cover, known.fitted) if cause else "",
+                advice=_advice(cause, verdict, cover, finger) if cause else "",
             )
         )
     return judged, covariance
@@ -142,26 +144,6 @@ def _representatives(
     for k, column in enumerate(columns):
         first.setdefault(column, k)
     return [first[column] for column in sorted(first)]
-
-
-def _verdicts(
-    numbers: Sequence[Unknown],
-    representatives: Sequence[int],
-    known: Knowledge,
-    matrix: Numbers,
-    covariance: Numbers,
-    size: Numbers,
-) -> list[Verdict]:
-    """Judge [unknowns] by their representatives: `error` from all numbers, `error_alone` with all others known."""
-    chosen = covariance[np.ix_(representatives, representatives)]
-    error = np.sqrt(np.maximum(np.diag(chosen), 1e-300))
-    inverse = np.linalg.inv(matrix[representatives])
-    seen = np.diag(inverse.T @ known.information @ inverse) * size[representatives] ** 2
-    alone = 1 / np.sqrt(np.maximum(seen, 0.0) + 1 / PRIOR**2)
-    correlation = chosen / np.outer(error, error)
-    return explain(
-        [numbers[k] for k in representatives], error / size[representatives], alone, correlation, known.coverage
-    )
 
 
 # --- advice -----------------------------------------------------------------------------------------------------------

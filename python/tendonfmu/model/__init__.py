@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     )
     from .description_defaults import DEFAULTS, EFFECT_NUMBERS, LIMITS, RANGES
     from .description_numbers import number_of
-    from .description_path import steps_of
+    from .description_path import law_path, steps_of
     from .description_text import description_text
     from .extensions import LEFT_OUT, MAGNITUDES, extended_row, extension_numbers, extension_rows, place_of
     from .findings import Finding

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from tendonfmu.errors import InputError
@@ -15,12 +16,42 @@ from tendonfmu.model.native import Instance
 Step = str | int  # a key, or an index from 0
 
 _PATH = re.compile(r"[a-z_]+(\[[1-9][0-9]*\])*(\.[a-z_]+(\[[1-9][0-9]*\])*)*")
+_LAW = re.compile(
+    r"(?P<effect>joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"
+    r"|tendons\[(?P<tendon>\d+)\]\.(?P<along>edge_friction|pulley_friction)\[(?P<at>\d+)\])"
+    r"(?:\.laws\[(?P<point>\d+)\])?(?:\.(?P<side>positive|negative))?(?:\.(?P<number>[a-z_]+))?"
+)
 _PADDED = ("pulley_friction", "edge_friction")  # short lists stand for lists with null at the end
+
+
+@dataclass(frozen=True)
+class LawPath:
+    """The parts of the path of a friction law, or of a number in one; indices count from 1."""
+
+    effect: str  # path of the effect, such as `tendons[1].edge_friction[2]`
+    kind: str  # friction, load_friction, edge_friction or pulley_friction
+    joint: int
+    tendon: int | None
+    point: int | None  # which of its `laws`, by the angle
+    side: str | None  # positive or negative
+    number: str | None
 
 
 def steps_of(path: str) -> list[Step]:
     """Split a path into keys and indices."""
     return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]
+
+
+def law_path(path: str) -> LawPath | None:
+    """Split the path of a law or of a number in one; None if it is another path."""
+    found = _LAW.fullmatch(path)
+    if found is None:
+        return None
+    tendon, point = (None if found[name] is None else int(found[name]) for name in ("tendon", "point"))
+    joint = int(found["joint"] or found["at"])
+    return LawPath(
+        found["effect"], found["own"] or found["along"], joint, tendon, point, found["side"], found["number"]
+    )
 
 
 def with_values_at(data: dict[str, Any], values: Mapping[str, Any], instance: Instance) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,15 +13,8 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.hypotheses import EVERYWHERE, HERE, SHARED, SOMEWHERE, Hypothesis
 from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
-from tendonfmu.model import native
+from tendonfmu.model import law_path, native, steps_of
 
-_LAW = re.compile(
-    r"(?:joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"
-    r"|tendons\[(?P<tendon>\d+)\]\.(?P<along>edge_friction|pulley_friction)\[(?P<at>\d+)\])"
-    r"(?:\.laws\[\d+\])?(?:\.(?P<side>positive|negative))?\.(?P<number>[a-z_]+)"
-)
-_COVER = re.compile(r"joints\[(\d+)\]\.cover\.stiffness")
-_ROW = re.compile(r"extensions\[(\d+)\]\.([a-z_]+)")
 _OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
 _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
 
@@ -62,15 +54,16 @@ def _number(data: Data, index: int, unknown: Unknown) -> Number:
 
 def _owner(data: Data, path: str) -> tuple[str, Place, int]:
     """Return effect, place and side of a number."""
-    if law := _LAW.fullmatch(path):
-        side = {"positive": 1, "negative": -1}.get(law["side"], 0)
-        effect = _OF_NUMBER.get(law["number"]) or _OF_LAW.get(law["own"] or "") or law["along"]
-        joint, tendon = (int(law["joint"]), None) if law["joint"] else (int(law["at"]), int(law["tendon"]))
-        return effect, Place(joint, tendon), side
-    if cover := _COVER.fullmatch(path):
-        return "cover_stiffness", Place(int(cover[1])), 0
-    if matched := _ROW.fullmatch(path):
-        row = data["extensions"][int(matched[1]) - 1]
+    law = law_path(path)
+    if law is not None and law.number is not None:
+        side = {"positive": 1, "negative": -1}.get(law.side or "", 0)
+        effect = _OF_NUMBER.get(law.number) or _OF_LAW.get(law.kind, law.kind)
+        return effect, Place(law.joint, law.tendon), side
+    owner, index, *key = steps_of(path)
+    if owner == "joints" and key == ["cover", "stiffness"]:
+        return "cover_stiffness", Place(int(index) + 1), 0
+    if owner == "extensions" and len(key) == 1:
+        row = data["extensions"][index]
         return row["effect"], Place(row.get("joint"), row.get("tendon")), 0
     return path, Place(), 0
 

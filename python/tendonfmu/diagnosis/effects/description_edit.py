@@ -6,22 +6,17 @@ sides or several working points starts with equal sides and equal laws. Paths ar
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tendonfmu.arrays import Data
 from tendonfmu.estimate import MAGNITUDES, get_number, own_copy, set_number
+from tendonfmu.model import law_path
 
 ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in their order
 _NEXT_TO_NONE = 1e-15  # of the force, or N·m
 _ORDER = (ABSENT, POINTS, SIDES, COVER)
-_LAW = re.compile(
-    r"(?P<law>joints\[\d+\]\.(?:load_)?friction|tendons\[\d+\]\.(?:edge|pulley)_friction\[\d+\])"
-    r"(?:\.laws\[(?P<point>\d+)\])?(?:\.(?P<side>positive|negative))?\.(?P<number>[a-z_]+)"
-)
-_TENDON_LAW = re.compile(r"tendons\[(\d+)\]\.((?:edge|pulley)_friction)\[(\d+)\]")
 
 
 @dataclass(frozen=True)
@@ -50,15 +45,15 @@ def apply_edits(
 
 def _add_law(data: dict[str, Any], edit: Edit) -> None:
     law = {"static": _NEXT_TO_NONE, "coulomb": _NEXT_TO_NONE, "stribeck_velocity": 1.0, "viscous": 0.0}
-    matched = _TENDON_LAW.fullmatch(edit.path)
-    if matched is None:
+    place = law_path(edit.path)
+    if place is None or place.tendon is None:
         set_number(data, edit.path, law)  # type: ignore[arg-type]
         return
-    tendon, kind, joint = data["tendons"][int(matched[1]) - 1], matched[2], int(matched[3])
-    entries = list(tendon.get(kind) or [])
-    entries += [None] * (joint - len(entries))
-    entries[joint - 1] = law
-    tendon[kind] = entries
+    tendon = data["tendons"][place.tendon - 1]
+    entries = list(tendon.get(place.kind) or [])
+    entries += [None] * (place.joint - len(entries))
+    entries[place.joint - 1] = law
+    tendon[place.kind] = entries
 
 
 def _add_points(data: dict[str, Any], edit: Edit) -> None:
@@ -114,26 +109,27 @@ def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple
 
 def finer_paths(data: Data, path: str) -> list[str]:
     """Return the numbers of an edited description that make up a number of the one before."""
-    matched = _LAW.fullmatch(path)
-    if matched is None:
+    place = law_path(path)
+    if place is None or place.number is None:
         return [path]
-    entry = get_number(data, matched["law"])
+    entry = get_number(data, place.effect)
     laws = entry.get("laws")
-    numbers = [matched["point"]] if matched["point"] else [None] if laws is None else range(1, len(laws) + 1)
+    numbers = [place.point] if place.point else [None] if laws is None else range(1, len(laws) + 1)
     found = []
     for k in numbers:
-        at = matched["law"] if k is None else f"{matched['law']}.laws[{k}]"
-        law = entry if k is None else laws[int(k) - 1]
-        sides = [matched["side"]] if matched["side"] else [None]
-        if law.get("positive") is not None and not matched["side"]:
+        at = place.effect if k is None else f"{place.effect}.laws[{k}]"
+        law = entry if k is None else laws[k - 1]
+        sides = [place.side]
+        if law.get("positive") is not None and place.side is None:
             sides = ["positive", "negative"]
-        found += [f"{at}.{matched['number']}" if side is None else f"{at}.{side}.{matched['number']}" for side in sides]
+        found += [f"{at}.{place.number}" if side is None else f"{at}.{side}.{place.number}" for side in sides]
     return found
 
 
 def is_law_number(path: str) -> bool:
     """Return whether a path is that of a number of a friction law."""
-    return _LAW.fullmatch(path) is not None
+    place = law_path(path)
+    return place is not None and place.number is not None
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
@@ -141,8 +137,8 @@ def is_law_number(path: str) -> bool:
 
 def add_to_number(data: dict[str, Any], path: str, value: float) -> None:
     """Add a value to a number in place; `coulomb` of a law moves `static` along."""
-    matched = _LAW.fullmatch(path)
-    if matched is not None and matched["number"] == "coulomb":
+    place = law_path(path)
+    if place is not None and place.number == "coulomb":
         static = f"{path.rsplit('.', 1)[0]}.static"
         set_number(data, static, float(get_number(data, static)) + value)
     before = data_number(data, path)
