@@ -24,7 +24,6 @@ from repository_paths import ROOT
 from tendonfmu.files.tables import read_table, write_table
 
 INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
-COMMANDS = ("check", "build", "run", "simulate", "convert", "demo")
 
 
 def refused(answer: Answer, status: int = 2) -> str:
@@ -60,15 +59,6 @@ def finger(tmp_path: Path) -> tuple[Path, Path, dict[str, Any], dict[str, Any]]:
 
 
 # --- usage ------------------------------------------------------------------------------------------------------------
-
-
-def test_help_everywhere(call: Call) -> None:
-    answer = call("--help")
-    assert answer.status == 0
-    assert all(command in answer.out for command in COMMANDS)
-    for command in COMMANDS:
-        answer = call(command, "--help")
-        assert answer.status == 0 and "Usage" in answer.out and answer.err == ""
 
 
 def test_help_needs_no_heavy_import() -> None:
@@ -227,16 +217,6 @@ def test_run_gives_every_sample_at_its_own_time(
     assert few_left_out([result])
 
 
-def test_an_fmu_gives_what_its_description_gives(
-    call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path
-) -> None:
-    path, recording_path, *_ = finger
-    assert call("build", path, "-o", "finger.fmu").status == 0
-    assert call("run", path, recording_path, "-o", "a.csv").status == 0
-    assert call("run", "finger.fmu", recording_path, "-o", "b.csv").status == 0
-    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-
-
 def test_measured_joints_are_used_only_when_asked_for(
     call: Call, finger: tuple[Path, Path, dict[str, Any], dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -334,15 +314,6 @@ def test_a_negative_time_and_a_late_start(
     for name, shifted in (("late", late), ("early", early)):
         assert call("run", path, recorded(tmp_path, shifted, f"{name}.csv"), "-o", f"{name}_out.csv").status == 0
         assert np.array_equal(outputs_of(tmp_path / f"{name}_out.csv")["time"], shifted["time"])
-
-
-# --- demo -------------------------------------------------------------------------------------------------------------
-
-
-def test_demo_into_a_place_that_cannot_be(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("x")
-    assert "file" in refused(call("demo", "-o", "file"))
-    assert "file" in refused(call("demo", "-o", "file/folder"))
 
 
 # --- nothing that a command reads is lost -----------------------------------------------------------------------

@@ -421,16 +421,3 @@ def test_a_bias_without_a_time_constant_needs_one() -> None:
     data["bias"]["drift_variance"] = 0.0
     with pytest.raises(InputError, match="drift_variance = 0"):
         ContactTuning(data, false_alarms_per_hour=WISHED).tune([FREE, FREE_X4])
-
-
-def test_parameters_in_the_manner_of_scikit_learn() -> None:
-    tuning = ContactTuning(INDEX, method="cusum").set_params(confidence=0.8)
-    assert (tuning.get_params()["method"], tuning.get_params()["confidence"]) == ("cusum", 0.8)
-    with pytest.raises(ValueError, match="no parameter 'rate'"):
-        tuning.set_params(rate=1.0)
-
-
-def test_every_option_is_on_the_page(call: Call) -> None:
-    page = (ROOT / "docs" / "reference" / "commands" / "tune.md").read_text(encoding="utf-8")
-    options = set(re.findall(r"--[a-z][a-z-]+", call("tune", "--help").out)) - {"--help", "--output"}
-    assert len(options) >= 7 and {option for option in options if option not in page} == set()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -90,35 +89,6 @@ def test_the_report_is_as_its_schema_says(call: Call, files: tuple[Path, Path]) 
     jsonschema.validate(json.loads(Path("r.json").read_text()), schema)
 
 
-def test_every_option_is_on_the_page(call: Call) -> None:
-    page = (ROOT / "docs" / "reference" / "commands" / "fit.md").read_text(encoding="utf-8")
-    shown = call("fit", "--help").out
-    options = set(re.findall(r"--[a-z][a-z-]+", shown)) - {"--help"}
-    assert len(options) > 15
-    assert {option for option in options if option not in page} == {"--output"}
-    assert "default: 60" in shown
-
-
-def test_the_filter_does_the_same(call: Call, files: tuple[Path, Path]) -> None:
-    finger, recording = files
-    answer = call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--method", "ekf", *FIT)
-    assert answer.status == 0
-    assert "ekf: converged" in answer.out and answer.err.startswith("f.json: 70 numbers estimated\n")
-    report = json.loads(Path("r.json").read_text())
-    assert (report["method"], report["passes"], report["cost"]) == ("ekf", 2, None)
-    assert call("check", "f.json").status == 0
-
-
-def test_a_report_holds_no_nan(call: Call, files: tuple[Path, Path]) -> None:
-    finger, recording = files
-    assert call("fit", finger, recording, "-o", "f.json", "--report", "r.json", "--passes", "1", *FIT).status == 0
-
-    def refuse(constant: str) -> None:
-        raise AssertionError(constant)
-
-    json.loads(Path("r.json").read_text(), parse_constant=refuse)
-
-
 def test_a_fit_that_does_not_converge_says_so(call: Call, files: tuple[Path, Path]) -> None:
     answer = call("fit", *files, "-o", "f.json", "--passes", "2", *FIT)
     assert answer.status == 0
@@ -135,19 +105,7 @@ def test_what_was_warned_of_is_in_the_report(call: Call, files: tuple[Path, Path
     assert any("joint 2 (tip) never moves" in line for line in warned)
 
 
-def test_other_recordings_are_compared(call: Call, files: tuple[Path, Path], tmp_path: Path) -> None:
-    other = write_recording(made_recording(seed=5), tmp_path / "other.csv")
-    assert call("fit", *files, "-o", "f.json", "--report", "r.json", "--compare", other, *FIT).status == 0
-    (entry,) = json.loads(Path("r.json").read_text())["residual"]["comparisons"]
-    assert entry["label"] == "other" and entry["rms"][0] < entry["bias_only_rms"][0]
-
-
-def test_patterns_choose_what_is_estimated(call: Call, files: tuple[Path, Path]) -> None:
-    answer = call(
-        "fit", *files, "-o", "f.json", "--kinematics", "3", "--only", "joints[*].*friction", "--fix", "*.viscous"
-    )
-    assert answer.status == 0
-    assert answer.err.endswith("f.json: 6 numbers estimated\n")
+def test_two_sides_are_fitted_apart(call: Call, files: tuple[Path, Path]) -> None:
     answer = call("fit", *files, "-o", "f.json", "--asymmetric", "--only", "joints[1].friction", "--kinematics", "3")
     assert answer.err.endswith("f.json: 8 numbers estimated\n")
     assert "positive" in json.loads(Path("f.json").read_text())["joints"][0]["friction"]
@@ -161,10 +119,7 @@ def test_patterns_choose_what_is_estimated(call: Call, files: tuple[Path, Path])
         (("-o", "f.csv"), "f.csv: expected a name that ends in .json"),
         (("-o", "f.json", "--figures", "finger.json"), "finger.json: a file; expected a folder"),
         (("-o", "nowhere/f.json"), "no folder nowhere"),
-        (("-o", "f.json", "--method", "magic"), "method = 'magic': expected batch"),
-        (("-o", "f.json", "--kinematics", "4"), "--kinematics"),
-        (("-o", "f.json", "--holdout", "1"), "--holdout"),
-        (("-o", "f.json", "--fix", "*.colour"), "--fix *.colour: matches none"),
+        (("-o", "f.json", "--method", "magic"), "method: 'magic'; expected batch or ekf"),
         (
             ("-o", "f.json", "--resume", "finger.json"),
             'finger.json: format = "tendonfmu-finger-1"; expected "tendonfmu-fit',
@@ -175,7 +130,7 @@ def test_patterns_choose_what_is_estimated(call: Call, files: tuple[Path, Path])
         (("-o", "f.json", "--compare", "rec.parquet"), "rec.parquet: compared with, but trained on as well"),
         (("-o", "left.json", "--resume", "left.json"), "left.json: the same file as the input left.json"),
         (("-o", "f.json", "--figures", "finger.json/figures"), "finger.json is a file; expected a folder"),
-        (("-o", "f.json", "--drift", "0.1"), "parameter_drift = 0.1: expected 0 with method batch"),
+        (("-o", "f.json", "--drift", "0.1"), "drift = 0.1: expected 0 with method batch"),
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
@@ -197,14 +152,6 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_fit(
     answer = call("fit", *files, *place, *FIT)
     assert answer.status == 2 and not answer.out
     assert f"{place[-1]}: cannot be written" in answer.err and answer.err.count("\n") == 1
-    assert not Path("f.json").exists()
-
-
-def test_a_recording_of_three_samples_is_refused(call: Call, files: tuple[Path, Path]) -> None:
-    lines = write_recording(made_recording(), Path("long.csv")).read_text().splitlines()
-    Path("short.csv").write_text("\n".join(lines[:4]) + "\n")
-    answer = call("fit", files[0], "short.csv", "-o", "f.json")
-    assert answer.status == 2 and "short.csv: 3 samples" in answer.err
     assert not Path("f.json").exists()
 
 

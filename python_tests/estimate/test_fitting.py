@@ -380,11 +380,6 @@ def test_friction_that_starts_at_0_is_found_with_a_scale(method: str) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"method": "magic"}, "method: 'magic'; expected batch or ekf"),
-        ({"sides": "both"}, "sides: 'both'"),
-        ({"holdout": 1.0}, "holdout: 1.0; expected a number, 0 to 0.9"),
-        ({"prior": 0.0}, "prior: 0.0; expected a number, 1e-06"),
-        ({"kinematics": 4}, "kinematics: 4;"),
         ({"only": ["tendons[9]"]}, "--only tendons[9]: matches none of the 70 numbers"),
         ({"fix": ["*.colour"]}, "--fix *.colour: matches none"),
         ({"fix": ["*"]}, "no number is left"),
@@ -444,11 +439,6 @@ def test_the_page_s_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         write_recording(made_recording(seed=seed), Path(f"{day}.parquet"))
     exec(compile(code, "fit.md", "exec"), {})
     assert native.image_from_json(Path("fitted.json").read_bytes())
-
-
-def test_warnings_are_warnings() -> None:
-    with pytest.warns(FitWarning, match="never moves"):
-        shared(max_passes=2).fit(made_recording(still=1))
 
 
 @pytest.mark.parametrize("cost", [np.inf, np.nan])

@@ -143,9 +143,3 @@ def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_p
         assert first.startswith(f"tendonfmu: warning: {file}: ignored columns: 'current', 'phase'; a recording has ")
         assert not [line for line in rest if "warning" in line]
     assert call("run", FINGER, file, "-o", tmp_path / "out.csv", "--quiet").err == ""
-
-
-@pytest.mark.parametrize(("command", "extends"), [("diagnose", True), ("calibrate", True), ("fit", False)])
-def test_help_says_whether_the_structure_is_kept(command: str, extends: bool, call: Call) -> None:
-    page = " ".join(call(command, "--help").out.split())
-    assert ("extended by the causes found" in page) is extends and ("its structure is kept" in page) is not extends

@@ -135,16 +135,6 @@ def test_runner_saves_restores_and_resets() -> None:
             runner.restore(wrong)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kinematics", [0, 4, "1"])
-def test_kinematics_are_checked(frame: pd.DataFrame, kinematics: Any) -> None:
-    for function in (
-        lambda: tf.Runner(INDEX, kinematics=kinematics),
-        lambda: tf.run(INDEX, frame, kinematics=kinematics),
-    ):
-        with pytest.raises(tf.InputError, match=r"kinematics: .*; expected a whole number, 1 to 3"):
-            function()
-
-
 def test_what_does_not_fit_is_refused(frame: pd.DataFrame) -> None:
     with pytest.raises(tf.InputError, match=r"DataFrame: 8 columns tendon_force\[...\], expected 4"):
         tf.run(ROOT / "examples/demo_recording/two_joints.json", frame)

@@ -114,7 +114,7 @@ def _parameters(
 ) -> list[inspect.Parameter]:
     """Return the parameters that typer reads, in the order of the help."""
     hints = get_type_hints(function, include_extras=True)
-    found: dict[str, inspect.Parameter] = {}
+    parameters: dict[str, inspect.Parameter] = {}
     moved = {name: [other for other, before in after.items() if before == name] for name in after.values()}
     given = {
         name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=parameter.default, annotation=hints[name])
@@ -123,13 +123,13 @@ def _parameters(
     for name, parameter in given.items():
         if name == "options" and options is not None:
             for field, option in options.each().items():
-                found[field] = _option(field, option, options.defaults()[field])
-                found |= {other: given[other] for other in moved.get(field, ())}
+                parameters[field] = _option(field, option, options.defaults()[field])
+                parameters |= {other: given[other] for other in moved.get(field, ())}
         elif name not in after:
-            found[name] = parameter
+            parameters[name] = parameter
     for name, annotation in _OF_ALL.items():
-        found[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
-    return list(found.values())
+        parameters[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
+    return list(parameters.values())
 
 
 def _option(name: str, option: Option, default: Any) -> inspect.Parameter:

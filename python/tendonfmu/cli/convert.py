@@ -129,23 +129,23 @@ def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
         if output.suffix.lower() != ".json":
             raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
         check_output(output, file)
-    found = inspect_log(file)
-    proposal = propose(found)
-    _print_inspection(found, proposal)
-    for note in found.notes:
+    inspection = inspect_log(file)
+    proposal = propose(inspection)
+    _print_inspection(inspection, proposal)
+    for note in inspection.notes:
         warn(note)
     if output is not None:
         write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
         left = f'; "?" is left to you: {", ".join(proposal.undecided)}' if proposal.undecided else ""
         say(f"{output}: a map of {counted(len(proposal.lines), 'column')}{left}")
-    return inspection_document(found, proposal)
+    return inspection_document(inspection, proposal)
 
 
-def _print_inspection(found: Inspection, proposal: Proposal) -> None:
+def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
     from tendonfmu.recordings import clock_line, field_rows, proposal_rows, time_factor
 
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
-    for topic in found.topics:
+    for topic in inspection.topics:
         line = clock_line(topic, time_factor(proposal, topic))
         print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]

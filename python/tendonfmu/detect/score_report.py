@@ -86,36 +86,36 @@ def _flat(value: Any) -> str:
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _summary(found: Summary) -> dict[str, Any]:
-    contact = found.contact
+def _summary(summary: Summary) -> dict[str, Any]:
+    contact = summary.contact
     return {
-        "events": found.events,
-        "found": found.found,
-        "missed": found.events - found.found,
-        "missed_in_alarm": found.masked,
-        "found_share": _estimate(found.found_share),
-        "false_alarms": found.false_alarms,
-        "false_alarms_interval": _interval(found.false_alarm_count),
-        "false_alarms_per_minute": _estimate(found.false_alarms_per_minute),
-        "free_minutes": found.free_minutes,
-        "free_alarm_share": _estimate(found.free_alarm_share),
-        "median_delay_s": found.delay["median"].value,
-        "delay_s": {name: _estimate(each) for name, each in found.delay.items()},
-        "held": found.held,
-        "held_share": _estimate(found.held_share),
+        "events": summary.events,
+        "found": summary.found,
+        "missed": summary.events - summary.found,
+        "missed_in_alarm": summary.masked,
+        "found_share": _estimate(summary.found_share),
+        "false_alarms": summary.false_alarms,
+        "false_alarms_interval": _interval(summary.false_alarm_count),
+        "false_alarms_per_minute": _estimate(summary.false_alarms_per_minute),
+        "free_minutes": summary.free_minutes,
+        "free_alarm_share": _estimate(summary.free_alarm_share),
+        "median_delay_s": summary.delay["median"].value,
+        "delay_s": {name: _estimate(each) for name, each in summary.delay.items()},
+        "held": summary.held,
+        "held_share": _estimate(summary.held_share),
         "overhang": {
-            "events": found.overhang_events,
-            "seconds": found.overhang_seconds,
-            "longest_s": found.longest_overhang,
-            "per_event_s": _estimate(found.overhang),
+            "events": summary.overhang_events,
+            "seconds": summary.overhang_seconds,
+            "longest_s": summary.longest_overhang,
+            "per_event_s": _estimate(summary.overhang),
         },
         "at_alarm": {
-            "force": None if found.force_at_alarm is None else _estimate(found.force_at_alarm),
-            "external_torque": _estimates(found.external_at_alarm),
-            "compensated_torque": _estimates(found.compensated_at_alarm),
+            "force": None if summary.force_at_alarm is None else _estimate(summary.force_at_alarm),
+            "external_torque": _estimates(summary.external_at_alarm),
+            "compensated_torque": _estimates(summary.compensated_at_alarm),
         },
-        "free_rms": [each.value for each in found.free_rms],
-        "free_rms_interval": [_interval(each) for each in found.free_rms],
+        "free_rms": [each.value for each in summary.free_rms],
+        "free_rms_interval": [_interval(each) for each in summary.free_rms],
         "contact_torque_rms_error": None if contact is None else [each.value for each in contact.rms],
         "contact_torque_rms_error_interval": None if contact is None else [_interval(each) for each in contact.rms],
         "contact_torque_correlation": None if contact is None else _estimates(contact.correlation),
@@ -170,16 +170,16 @@ def _point(point: RocPoint) -> dict[str, Any]:
     }
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    return {"value": found.value, "interval": _interval(found)}
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    return {"value": estimate.value, "interval": _interval(estimate)}
 
 
-def _estimates(found: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
-    return None if found is None else [_estimate(each) for each in found]
+def _estimates(estimates: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
+    return None if estimates is None else [_estimate(each) for each in estimates]
 
 
-def _interval(found: Estimate) -> list[float] | None:
-    return None if math.isnan(found.low) or math.isnan(found.high) else [found.low, found.high]
+def _interval(estimate: Estimate) -> list[float] | None:
+    return None if math.isnan(estimate.low) or math.isnan(estimate.high) else [estimate.low, estimate.high]
 
 
 def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:

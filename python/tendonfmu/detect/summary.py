@@ -86,8 +86,8 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
     )
 
 
-def _force(found: Sequence[Event], seed: int) -> Estimate | None:
-    known = np.array([event.force for event in found if not math.isnan(event.force)], dtype=float)
+def _force(events: Sequence[Event], seed: int) -> Estimate | None:
+    known = np.array([event.force for event in events if not math.isnan(event.force)], dtype=float)
     return intervals.quantile(known, 0.5, seed) if len(known) else None
 
 

@@ -91,8 +91,8 @@ def _flags(use: Array | None) -> NDArray[np.uint8] | None:
 
 
 def _unknowns(source: Any) -> list[Unknown]:
-    found = (source.unknown(k) for k in range(source.unknown_count))
-    return [Unknown(path, ROLES[role], tuple(parameters), *numbers) for path, role, parameters, *numbers in found]
+    rows = (source.unknown(k) for k in range(source.unknown_count))
+    return [Unknown(path, ROLES[role], tuple(parameters), *numbers) for path, role, parameters, *numbers in rows]
 
 
 class Estimator:
@@ -181,8 +181,8 @@ class Estimator:
         # z: [u]; returns [N, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m), [N, n, u] their derivatives by the
         # unknowns
         with _refusals():
-            found = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
-        torque, jump, by_torque, by_jump = (np.asarray(array) for array in found)
+            arrays = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
+        torque, jump, by_torque, by_jump = (np.asarray(array) for array in arrays)
         return torque, jump, by_torque, by_jump
 
     def innovations(self, recording: int, z: Array) -> tuple[Numbers, Numbers, Numbers]:
@@ -190,8 +190,8 @@ class Estimator:
         # z: [u]; returns [N, n] (N·m), [N] their variance ((N·m)²); NaN also at samples that are not used, [N, n] bias
         # after the update (N·m)
         with _refusals():
-            found = self._estimator.innovations(recording, _matrix(z))
-        innovation, variance, bias = (np.asarray(array) for array in found)
+            arrays = self._estimator.innovations(recording, _matrix(z))
+        innovation, variance, bias = (np.asarray(array) for array in arrays)
         return innovation, variance, bias
 
     def fit(
@@ -210,8 +210,8 @@ class Estimator:
         begun = perf_counter()
         first = self.start if start is None else start
         with _refusals():
-            found = self._estimator.fit(_matrix(first), prior_std, tolerance, max_passes, stride, threads, progress)
-        return BatchResult(**found, seconds=perf_counter() - begun)
+            result = self._estimator.fit(_matrix(first), prior_std, tolerance, max_passes, stride, threads, progress)
+        return BatchResult(**result, seconds=perf_counter() - begun)
 
 
 class Learner:

@@ -70,17 +70,17 @@ class Unknown:
 
 def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
     """List the numbers that a fit estimates, without the biases, which are tracked."""
-    found = [number for effect in effects(data) for number in _numbers_of(effect)]
+    numbers = [number for effect in effects(data) for number in _numbers_of(effect)]
     for j, joint in enumerate(data["joints"], start=1):
         stiffness = (joint.get("cover") or {}).get("stiffness")
         if stiffness:
-            found.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
-    found += [
+            numbers.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
+    numbers += [
         Unknown(each.path, each.value, extension=each.effect, size=each.magnitude)
         for each in extension_numbers(data)
         if not each.left_out
     ]
-    return found
+    return numbers
 
 
 def _numbers_of(effect: Effect) -> Iterator[Unknown]:
@@ -166,12 +166,12 @@ class _Run:
     def advance(self, finger: native.Instance, part: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
         """Return [N, n] T of eq. (10) and the bias increments Δb over the part (N·m)."""
         finger.restore_state(self._state)
-        found = finger.run(part)
+        outputs = finger.run(part)
         self._state = finger.save_state()
-        bias = found["bias_torque"]
+        bias = outputs["bias_torque"]
         jump = np.diff(bias, axis=0, prepend=self._bias)
         self._bias = bias[-1:]
-        return found["friction_torque"] - bias, jump
+        return outputs["friction_torque"] - bias, jump
 
 
 def sensitivities(
@@ -194,8 +194,8 @@ def sensitivities(
         plain = base.advance(finger, part)
         changes = np.zeros((len(part["time"]), joints, len(numbers)))
         for done, (bundle, run) in enumerate(zip(bundles, runs, strict=True), start=1):
-            found = run.advance(finger, part)
-            _share_out(bundle, found, plain, part["joint_position"], changes, held)
+            moved = run.advance(finger, part)
+            _share_out(bundle, moved, plain, part["joint_position"], changes, held)
             if progress is not None:
                 progress(number * len(bundles) + done, len(starts) * len(bundles))
         yield changes
@@ -203,14 +203,14 @@ def sensitivities(
 
 def _share_out(
     bundle: _Bundle,
-    found: tuple[Numbers, Numbers],
+    moved: tuple[Numbers, Numbers],
     plain: tuple[Numbers, Numbers],
     joint_position: Numbers,
     changes: Numbers,
     held: Numbers,
 ) -> None:
     """Write the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
-    torque, jump = ((new - old) / STEP for new, old in zip(found, plain, strict=True))
+    torque, jump = ((new - old) / STEP for new, old in zip(moved, plain, strict=True))
     for column, number, joint, active in bundle.shares(joint_position):
         sign = _sign(number)
         bias = held[joint, column] + sign * np.cumsum((active * jump)[:, joint], axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -173,9 +174,9 @@ def explain(
 
 
 def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple[str, str]:
-    found = unvisited(number, cover) if cover is not None else None
-    if found is not None:
-        return found
+    reason = unvisited(number, cover) if cover is not None else None
+    if reason is not None:
+        return reason
     if alone > LIMIT:
         size = f"± {alone:.0%}" if alone < PRIOR / 2 else "nothing is known"
         return "noise", f"{CAUSES['noise']}: {size}"
@@ -245,8 +246,7 @@ def counts_by_kind(verdicts: Sequence[Verdict]) -> dict[tuple[str, str], tuple[i
 
 def causes(verdicts: Sequence[Verdict]) -> dict[str, int]:
     """Count the verdicts by cause, the most frequent first."""
-    found = [verdict.cause for verdict in verdicts if verdict.cause]
-    return dict(sorted(((cause, found.count(cause)) for cause in set(found)), key=lambda item: -item[1]))
+    return dict(Counter(verdict.cause for verdict in verdicts if verdict.cause).most_common())
 
 
 def as_json(judgement: Judgement) -> dict[str, Any]:

@@ -164,8 +164,8 @@ def _measured_weights(
     most = 1.0 if settings.previous is None else settings.previous.share
     for number, (place, part) in enumerate(added):
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
-        found = sample_weights(innovation / np.sqrt(variance)[:, None])
-        weights[place][part] = np.minimum(found, most)
+        measured = sample_weights(innovation / np.sqrt(variance)[:, None])
+        weights[place][part] = np.minimum(measured, most)
     return weights
 
 
@@ -185,28 +185,28 @@ def learn_batch(
     if settings.previous is not None:
         estimator.set_known(_known_information(estimator, settings))
         prior = np.inf  # the known information contains the prior
-    found = _fitted(estimator, begin, prior, settings, watch, "")
-    steps, passes = found.steps, found.passes
+    result = _fitted(estimator, begin, prior, settings, watch, "")
+    steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
     if settings.effective:
-        weights = _measured_weights(estimator, found.z, recordings, added, settings)
+        weights = _measured_weights(estimator, result.z, recordings, added, settings)
     if any((each < 1).any() for each in weights):
         for number, (place, part) in enumerate(added):
             estimator.set_weights(number, weights[place][part.start])
-        found = _fitted(estimator, found.z, prior, settings, watch, ", with effective samples")
-        steps, passes = steps + found.steps, passes + found.passes
+        result = _fitted(estimator, result.z, prior, settings, watch, ", with effective samples")
+        steps, passes = steps + result.steps, passes + result.passes
     return Learned(
         estimator=estimator,
-        z=found.z,
-        covariance=found.covariance,
-        information=found.information,
-        cost=found.cost,
+        z=result.z,
+        covariance=result.covariance,
+        information=result.information,
+        cost=result.cost,
         iterations=steps,
         passes=passes,
-        converged=found.converged,
+        converged=result.converged,
         weights=weights,
         innovations=[],
-        warnings=[] if found.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
+        warnings=[] if result.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
     )
 
 
@@ -248,7 +248,7 @@ def _fitted(
         return watch(FitProgress(f"{phase}{what}", number, done, total, cost))
 
     try:
-        found = estimator.fit(
+        result = estimator.fit(
             begin,
             prior_std=prior,
             max_passes=settings.passes,
@@ -258,9 +258,9 @@ def _fitted(
         )
     except KeyboardInterrupt:
         raise Interrupted(estimator, best, best_cost, by_user=True) from None
-    if watch.stopped or found.stopped:
-        raise Interrupted(estimator, found.z, found.cost, watch.by_user)
-    return found
+    if watch.stopped or result.stopped:
+        raise Interrupted(estimator, result.z, result.cost, watch.by_user)
+    return result
 
 
 def _slack(samples: int) -> str:
@@ -317,9 +317,9 @@ def _common_weight(
     estimator: Estimator, z: Numbers, recordings: Sequence[FitRecording], settings: Settings
 ) -> list[Numbers]:
     """Return by recording [N, n] one weight for all samples: the share of all samples trained on together."""
-    found = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
-    trained = np.concatenate([each[recording.train] for each, recording in zip(found, recordings, strict=True)])
-    return [np.full_like(each, trained.mean()) for each in found]
+    weights = _measured_weights(estimator, z, recordings, _add_recordings(estimator, recordings), settings)
+    trained = np.concatenate([each[recording.train] for each, recording in zip(weights, recordings, strict=True)])
+    return [np.full_like(each, trained.mean()) for each in weights]
 
 
 def _within(estimator: Estimator, z: Numbers) -> Numbers:
@@ -338,7 +338,7 @@ def _filter_once(
 
     innovations = []
     for recording in recordings:
-        found = np.full(recording.target.shape, np.nan)
+        standardised = np.full(recording.target.shape, np.nan)
         for part in recording.parts:
             try:
                 outputs = learner.run(**_rows(recording, part), progress=show)
@@ -348,9 +348,9 @@ def _filter_once(
                 raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
             if watch.stopped:
                 raise Interrupted(estimator, learner.z, float("nan"), watch.by_user)
-            found[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
+            standardised[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
             before += part.stop - part.start
-        innovations.append(np.where(recording.train[:, None], found, np.nan))
+        innovations.append(np.where(recording.train[:, None], standardised, np.nan))
     return innovations
 
 

@@ -94,8 +94,8 @@ def side_of(law: Law, sign: int) -> Law:
     """Return the side of a law for a direction of sliding, +1 or −1."""
     if law.get("positive") is None:
         return law
-    found: Law = law["positive" if sign > 0 else "negative"]
-    return found
+    side: Law = law["positive" if sign > 0 else "negative"]
+    return side
 
 
 def side_path(path: str, law: Law, sign: int) -> str:

@@ -180,14 +180,14 @@ def matcher(pattern: str) -> re.Pattern[str]:
 
 def _select(numbers: Sequence[Unknown], patterns: Iterable[str], option: str) -> set[str]:
     """Return the paths of the numbers that match any pattern. Raises InputError if a pattern matches none."""
-    found: set[str] = set()
+    selected: set[str] = set()
     for pattern in patterns:
         match = matcher(pattern).fullmatch
         hits = {n.path for n in numbers if match(n.path) or (n.with_path is not None and match(n.with_path))}
         if not hits:
             raise InputError(_no_match(option, pattern, numbers))
-        found |= hits
-    return found
+        selected |= hits
+    return selected
 
 
 def _no_match(option: str, pattern: str, numbers: Sequence[Unknown]) -> str:
@@ -251,8 +251,8 @@ def _shared_keys(
             keys = [_place(number, "joint", "pulley_friction") for number in numbers]
         else:
             match = matcher(asked).fullmatch
-            found = [match(number.path) for number in numbers]
-            keys = [None if hit is None else _rest(n, hit[2]) for n, hit in zip(numbers, found, strict=True)]
+            matches = [match(number.path) for number in numbers]
+            keys = [None if hit is None else _rest(n, hit[2]) for n, hit in zip(numbers, matches, strict=True)]
         if not any(keys):
             raise InputError(_no_match("--share", asked, numbers))
         yield keys

@@ -167,9 +167,9 @@ class Motion:
         total = sum(map(len, chosen))
         seen = Seen(np.empty((joints, total, tendons + 3)), np.empty((joints, total, unknowns)))
         at = 0
-        for found, each in zip(recordings, chosen, strict=True):
+        for evaluation, each in zip(recordings, chosen, strict=True):
             for chunk in np.array_split(each, len(each) * joints * unknowns // _CHUNK + 1):
-                arrays = sampled(found, chunk, _STEP * np.arange(len(chunk), dtype=np.float64))
+                arrays = sampled(evaluation, chunk, _STEP * np.arange(len(chunk), dtype=np.float64))
                 arrays["tendon_force"] *= load
                 taken = slice(at, at + len(chunk))
                 seen.parts[:, taken] = friction_parts(self.data, arrays).transpose(1, 0, 2)
