@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.estimate.fit_report import report_text
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.files import report_text
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings.converters import convert_file

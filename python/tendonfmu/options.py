@@ -319,21 +319,14 @@ class FitOptions(Options):
         (), _TEXTS, "laws that share one set of values; may be repeated", metavar="tendons|pulleys|PATTERN"
     )
     asymmetric: bool | None = option(
-        None,
-        _YES_OR_NONE,
-        "fit the two sides of a law apart, or as one",
-        names=("--asymmetric/--symmetric",),
+        None, _YES_OR_NONE, "fit the two sides of a law apart, or as one", names=("--asymmetric/--symmetric",)
     )
     prior: float = option(1.0, Number(1e-6, 1e6), "prior: standard deviation / expected magnitude", metavar="RATIO")
     scale: Sequence[str] = option(
         (), _TEXTS, "expected magnitude, instead of the description's", metavar="PATTERN=VALUE"
     )
     previous: File | None = option(
-        None,
-        _PATH,
-        "report or description of an earlier fit, as the prior",
-        metavar="PREVIOUS.json",
-        names=("--from",),
+        None, _PATH, "report or description of an earlier fit, as the prior", metavar="PREVIOUS.json", names=("--from",)
     )
     # docs/evidence/recalibration.md shows the effect of larger and smaller values
     change: float = option(
@@ -343,18 +336,12 @@ class FitOptions(Options):
         None, _YES_OR_NONE, "count correlated residuals as fewer samples [default: with --from]"
     )
     passes: int | None = option(
-        None,
-        Number(1, whole=True, optional=True),
-        "most passes over the data [default: 60; ekf: 2]",
-        metavar="N",
+        None, Number(1, whole=True, optional=True), "most passes over the data [default: 60; ekf: 2]", metavar="N"
     )
     tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
     drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
     uncertainty: bool = option(
-        True,
-        _YES,
-        "write the uncertainty of the friction, for detection",
-        names=("--uncertainty/--no-uncertainty",),
+        True, _YES, "write the uncertainty of the friction, for detection", names=("--uncertainty/--no-uncertainty",)
     )
     resume: File | None = option(None, _PATH, "continue an interrupted fit", metavar="FITTED.unfinished.json")
 
@@ -402,10 +389,7 @@ class TuneOptions(Options):
         metavar="innovation|cusum|threshold",
     )
     bias_time: float | None = option(
-        None,
-        Number(1e-3, 1e4, optional=True),
-        "time constant of the bias [default: unchanged]",
-        metavar="SECONDS",
+        None, Number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
     )
     release_time: float = option(
         2.0, Number(0.0), "time in contact until the bias is tracked again; inf: never", metavar="SECONDS"

@@ -185,11 +185,7 @@ def test_what_is_unchanged_is_not_done_again(
     assert answer.status == 0 and answer.err == ""
     assert json.loads(answer.out) == json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     other = calibrate(
-        folder / FINGER,
-        [folder / FREE],
-        out,
-        tests=[folder / UNSEEN],
-        options=Options(false_alarms_per_hour=360.0),
+        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], options=Options(false_alarms_per_hour=360.0)
     )
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
     with pytest.raises(AssertionError, match="done again"):
@@ -233,8 +229,7 @@ def test_touched_motion_is_no_free_motion(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("free", "tests", "words"),
-    [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")],
+    ("free", "tests", "words"), [([], [], "no recording"), ([FREE], [FREE], "a test"), ([FREE, FREE], [], "twice")]
 )
 def test_recordings_that_cannot_be_are_refused(
     free: list[str], tests: list[str], words: str, folder: Path, tmp_path: Path

@@ -145,13 +145,7 @@ def test_completion_has_a_script_for_each_shell(shell: str) -> None:
     # by default the shell is that of the caller
     environment = {**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
     command = [sys.executable, "-m", "tendonfmu.cli", "--show-completion", shell]
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        check=True,
-        env=environment,
-    )
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     assert "_TENDONFMU_COMPLETE" in done.stdout and f"complete_{shell}" in done.stdout
     assert "tendonfmu" in done.stdout and done.stderr == ""
 

@@ -24,24 +24,8 @@ from scipy.special import chdtri, pdtr
 from command import Call
 from repository_paths import ROOT
 from tendonfmu.cli import main
-from tendonfmu.detect.alarm_level import (
-    allowed_alarms,
-    cells_of,
-    count_alarms,
-    least_hours,
-    level_for,
-    rate_limit,
-)
-from tendonfmu.detect.bounds import (
-    SHARES,
-    Bound,
-    Line,
-    evidence_line,
-    given_line,
-    level_of,
-    search_for,
-    searched_line,
-)
+from tendonfmu.detect.alarm_level import allowed_alarms, cells_of, count_alarms, least_hours, level_for, rate_limit
+from tendonfmu.detect.bounds import SHARES, Bound, Line, evidence_line, given_line, level_of, search_for, searched_line
 from tendonfmu.detect.free_motion import FreePart, FreeRun
 from tendonfmu.detect.noise import bias_noise, deviation, drift_variance, time_constant
 from tendonfmu.detect.tuning import RELEASE, ContactTuning, TuneWarning

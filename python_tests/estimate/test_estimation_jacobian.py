@@ -13,15 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import oracle_fit
-from fit_cases import (
-    groups,
-    image_of,
-    off_start,
-    random_fit_case,
-    shared_key,
-    small_finger,
-    twin_of,
-)
+from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
 from fit_data import make_recording, wavy_forces, wavy_motion
 from oracle_trace import Trace, run_recorder, with_values
 from repetitions import repeated

@@ -218,10 +218,7 @@ def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str)
 
 @pytest.mark.parametrize(
     ("group", "scale"),
-    [
-        (np.full(len(PATHS) - 1, -1, dtype=np.int32), None),
-        (groups(SMALL), np.full(len(PATHS) + 1, np.nan)),
-    ],
+    [(np.full(len(PATHS) - 1, -1, dtype=np.int32), None), (groups(SMALL), np.full(len(PATHS) + 1, np.nan))],
     ids=["group too short", "scale too long"],
 )
 def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:

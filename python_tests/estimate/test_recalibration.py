@@ -18,8 +18,8 @@ from fit_finger import made_recording, moved_start
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import read_previous_fit
-from tendonfmu.estimate.fit_report import report_text
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.files import report_text
 from tendonfmu.recordings.recording import Recording
 
 pytest.importorskip("tendonfmu._estimation", reason="SKIPPED: built without Eigen, nothing can be estimated")

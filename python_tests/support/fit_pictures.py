@@ -199,10 +199,7 @@ def made_up_report(
             if each.role == "training"
         ],
         "parameters": parameters,
-        "correlation": {
-            "paths": [one.path for one in found],
-            "matrix": (covariance / size / size[:, None]).tolist(),
-        },
+        "correlation": {"paths": [one.path for one in found], "matrix": (covariance / size / size[:, None]).tolist()},
         "identified": {"count": known, "of": len(parameters)},
         "residual": {
             "train": _residual(free, free.used),

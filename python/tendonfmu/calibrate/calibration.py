@@ -335,12 +335,7 @@ class _Run:
             threads=options.jobs,
         )
         before, after = case.errors(case.finger.data), case.errors(fitted.data)
-        error = {
-            "held_out": not case.tests,
-            "bias_only": case.errors(None),
-            "previous": before,
-            "calibrated": after,
-        }
+        error = {"held_out": not case.tests, "bias_only": case.errors(None), "previous": before, "calibrated": after}
         if sum(value**2 for value in after) <= sum(value**2 for value in before):
             return {"finger": fitted.data, "error": error, "warnings": list(fitted.warnings)}
         kept = (

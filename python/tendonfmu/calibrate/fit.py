@@ -102,13 +102,7 @@ def earlier_finger(given: Finger, previous: Path) -> Finger:
 
 
 def fit_again(
-    finger: Finger,
-    previous: Path,
-    recordings: Sequence[FitRecording],
-    *,
-    share: float,
-    kinematics: int,
-    threads: int,
+    finger: Finger, previous: Path, recordings: Sequence[FitRecording], *, share: float, kinematics: int, threads: int
 ) -> CalibratedFit:
     """Fit an earlier calibration to new motion; its values and their uncertainty are the prior. Raises InputError."""
     fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)

@@ -20,8 +20,7 @@ def calibrate(
     test: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FREE",
-            help="free motion to measure the errors on; may be repeated [default: parts of FREE]",
+            metavar="FREE", help="free motion to measure the errors on; may be repeated [default: parts of FREE]"
         ),
     ] = None,
     pushes: Annotated[

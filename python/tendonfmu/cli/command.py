@@ -46,8 +46,7 @@ _BEGINNINGS = {
 
 FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description; its structure is kept")]
 ExtendedFinger = Annotated[
-    Path,
-    typer.Argument(metavar="FINGER.json", help="finger description; it is kept, and extended by the causes found"),
+    Path, typer.Argument(metavar="FINGER.json", help="finger description; it is kept, and extended by the causes found")
 ]
 Model = Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="finger description, or its FMU")]
 FreeRecordings = Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")]
@@ -115,7 +114,6 @@ def _parameters(
     """Return the parameters that typer reads, in the order of the help."""
     hints = get_type_hints(function, include_extras=True)
     parameters: dict[str, inspect.Parameter] = {}
-    moved = {name: [other for other, before in after.items() if before == name] for name in after.values()}
     given = {
         name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=parameter.default, annotation=hints[name])
         for name, parameter in inspect.signature(function).parameters.items()
@@ -124,7 +122,7 @@ def _parameters(
         if name == "options" and options is not None:
             for field, option in options.each().items():
                 parameters[field] = _option(field, option, options.defaults()[field])
-                parameters |= {other: given[other] for other in moved.get(field, ())}
+                parameters |= {other: given[other] for other, before in after.items() if before == field}
         elif name not in after:
             parameters[name] = parameter
     for name, annotation in _OF_ALL.items():

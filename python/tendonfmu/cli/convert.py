@@ -75,12 +75,10 @@ def convert(
         int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed [default: 10]")
     ] = None,
     map_: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="MAP.json", help="table: name, unit and sign of each column"),
+        Path | None, typer.Option("--map", metavar="MAP.json", help="table: name, unit and sign of each column")
     ] = None,
     finger: Annotated[
-        Path | None,
-        typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write"),
+        Path | None, typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write")
     ] = None,
 ) -> None:
     """Convert a third-party recording or any log into a recording of tendonfmu.
@@ -224,8 +222,7 @@ def describe(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.json", help="description to write")],
     name: Annotated[str, typer.Option(help="name of the machine and of its joint")],
     recording: Annotated[
-        Path | None,
-        typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet"),
+        Path | None, typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet")
     ] = None,
     torque: Annotated[
         float | None, typer.Option(min=1e-9, max=LARGEST, help="N.m; largest torque of the drive [default: 1]")

@@ -14,11 +14,7 @@ from tendonfmu.files import counted
 from tendonfmu.options import ScoreOptions, TuneOptions
 
 
-@command(
-    TuneOptions,
-    reads=("finger", "recordings"),
-    after={"report": "release_time", "figures": "release_time"},
-)
+@command(TuneOptions, reads=("finger", "recordings"), after={"report": "release_time", "figures": "release_time"})
 def tune(
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="fitted finger description")],
     recordings: FreeAtPretensions,
@@ -37,9 +33,9 @@ def tune(
     motion suffices for, and reports that rate and how much more motion is
     needed. With --strict it exits with 1 and writes no file.
     """
-    from tendonfmu.detect import NotEnough, TuneWarning, tune_report
+    from tendonfmu.detect import NotEnough, TuneWarning
     from tendonfmu.estimate import check_outputs
-    from tendonfmu.files import write_text
+    from tendonfmu.files import report_text, write_text
     from tendonfmu.interface import tune as tune_finger
     from tendonfmu.report import tune_files, tune_text
 
@@ -55,7 +51,7 @@ def tune(
     for sentence in result.warnings:
         warn(sentence)
     result.write(output)
-    text = tune_report.report_text(result.report)
+    text = report_text(result.report)
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)
@@ -81,8 +77,8 @@ def score(
     An alarm that begins neither in an event nor in the 100 ms after one is
     false. Every figure has its 95 % interval. Several recordings are pooled.
     """
-    from tendonfmu.detect import score_report
     from tendonfmu.estimate import check_outputs
+    from tendonfmu.files import report_text
     from tendonfmu.interface import ScoreWarning
     from tendonfmu.interface import score as score_finger
     from tendonfmu.report import score_files, score_text
@@ -94,7 +90,7 @@ def score(
     for sentence in result.warnings:
         warn(sentence)
     result.write(output)
-    text = score_report.report_text(result.report)
+    text = report_text(result.report)
     print_json(lambda: text)
     print_tables(score_text.tables(result.scored), score_text.lines(result.scored), left="")
     say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")

@@ -41,8 +41,7 @@ def diagnose(
         ),
     ] = False,
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="dask cluster for --history [default: --jobs processes]"),
+        str | None, typer.Option(metavar="ADDRESS", help="dask cluster for --history [default: --jobs processes]")
     ] = None,
     *,
     options: DiagnoseOptions,

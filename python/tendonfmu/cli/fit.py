@@ -41,8 +41,8 @@ def fit(
     tendons[*].edge_friction[2]*.viscous; * stands for anything. Ctrl-C saves
     the best estimate so far in FITTED.unfinished.json.
     """
-    from tendonfmu.estimate import FitWarning, check_outputs, fit_report, write_unfinished
-    from tendonfmu.files import write_text
+    from tendonfmu.estimate import FitWarning, check_outputs, write_unfinished
+    from tendonfmu.files import report_text, write_text
     from tendonfmu.fmu import check_parameter_set_path
     from tendonfmu.interface import FitInterrupted
     from tendonfmu.interface import fit as fit_finger
@@ -65,7 +65,7 @@ def fit(
     for sentence in result.warnings:
         warn(sentence)
     result.write(output)
-    text = fit_report.report_text(result.report)
+    text = report_text(result.report)
     if report is not None:
         write_text(report, text)
     if ssv is not None:

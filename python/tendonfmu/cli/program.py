@@ -23,19 +23,7 @@ from typing import Annotated, Any, NoReturn, TextIO
 import typer
 from typer.main import get_command
 
-from tendonfmu.cli import (
-    calibrate,
-    campaign,
-    check,
-    convert,
-    demo,
-    detect,
-    diagnose,
-    excite,
-    fit,
-    import_mjcf,
-    run,
-)
+from tendonfmu.cli import calibrate, campaign, check, convert, demo, detect, diagnose, excite, fit, import_mjcf, run
 from tendonfmu.cli.command import SeveralValues
 from tendonfmu.cli.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
 from tendonfmu.errors import InputError, InputWarning, line_of

@@ -8,15 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import Model, Progress, Subject, command
-from tendonfmu.cli.console import (
-    check_second_file,
-    check_table,
-    name_of,
-    print_json,
-    progress_bar,
-    say,
-    write_table,
-)
+from tendonfmu.cli.console import check_second_file, check_table, name_of, print_json, progress_bar, say, write_table
 from tendonfmu.errors import InputError
 from tendonfmu.options import BuildOptions, RunOptions
 
@@ -26,8 +18,7 @@ def build(
     file: Subject,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
     reference: Annotated[
-        Path | None,
-        typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks"),
+        Path | None, typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks")
     ] = None,
     *,
     options: BuildOptions,

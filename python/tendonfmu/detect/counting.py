@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,25 +175,22 @@ def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Num
     first, last = int(span[0]), int(span[1])
     before = int(np.searchsorted(time, time[first] - SILENT - _EQUAL))
     grace = int(np.searchsorted(time, time[last] + GRACE + _EQUAL))
-    own = alarms[(alarms[:, 0] >= first) & (alarms[:, 0] < grace)]
+    begun = alarms[(alarms[:, 0] >= first) & (alarms[:, 0] < grace)]
     event = Event(
         onset=float(time[first]),
         end=float(time[last]),
         silent=not alarm[before:first].any(),
-        overhang=float(sum(hanging[end + 1] - hanging[begin] for begin, end in own)),
+        overhang=float(sum(hanging[end + 1] - hanging[begin] for begin, end in begun)),
     )
-    inside = own[own[:, 0] <= last]
+    inside = begun[begun[:, 0] <= last]
     if not len(inside):
         return event
     begin, end = int(inside[0, 0]), int(inside[0, 1])
-    return Event(
-        event.onset,
-        event.end,
-        event.silent,
+    return replace(
+        event,
         alarm=float(time[begin]),
         held=bool(time[last] - time[end] < MERGED - _EQUAL),
         held_share=float(alarm[begin : last + 1].mean()),
-        overhang=event.overhang,
         compensated=None if given.compensated is None else given.compensated[begin],
         external=None if given.external is None else given.external[begin],
         force=math.nan if given.force is None else float(given.force[begin]),

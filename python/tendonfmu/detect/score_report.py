@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,38 +48,6 @@ def build_report(scored: Scored) -> dict[str, Any]:
         "recordings": [_recording(*each) for each in zip(scored.tracks, scored.scores, scored.summaries, strict=True)],
     }
     return {key: finite(value) for key, value in report.items()}
-
-
-def report_text(report: Mapping[str, Any]) -> str:
-    """Return the report as JSON with one line per event, point of the ROC, and other key of a recording."""
-    parts = []
-    for key, value in report.items():
-        text = _flat(value)
-        if key == "recordings":
-            text = "[\n  " + ",\n  ".join(_recording_text(each) for each in value) + "]"
-        elif key == "roc" and value["points"] is not None:
-            text = f'{{"points": {_rows(value["points"], "   ")}, "absent": null}}'
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _recording_text(entry: Mapping[str, Any]) -> str:
-    listed = ("event_list", "false_alarm_list")
-    return (
-        "{"
-        + ",\n   ".join(
-            f'"{key}": {_rows(each, "    ") if key in listed else _flat(each)}' for key, each in entry.items()
-        )
-        + "}"
-    )
-
-
-def _rows(values: Sequence[Any], indent: str) -> str:
-    return "[" + "".join(f"\n{indent}{_flat(each)}," for each in values).rstrip(",") + "]"
-
-
-def _flat(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -56,22 +54,6 @@ def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
     """Return the mean tendon forces (N) that the thresholds were chosen on, and the number of pretensions."""
     low, high = tuning.forces_
     return {"lowest_force": low, "highest_force": high, "pretensions": len(tuning.pretensions_)}
-
-
-def report_text(report: Mapping[str, Any]) -> str:
-    """Return the report as JSON with one line per entry of a list."""
-    parts = []
-    for key, value in report.items():
-        if isinstance(value, list) and value and isinstance(value[0], dict):
-            text = "[" + ",".join(f"\n  {_flat(each)}" for each in value) + "]"
-        else:
-            text = _flat(value)
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _flat(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:

@@ -77,17 +77,17 @@ class BatchResult:
     seconds: float  # time of the computation (s)
 
 
+def _whole(values: Array | None, kind: Any) -> NDArray[Any] | None:
+    return None if values is None else np.ascontiguousarray(values, dtype=kind)
+
+
 def _matrix(values: Array | None) -> Numbers | None:
-    return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
+    return _whole(values, np.float64)
 
 
 def _samples(arrays: Mapping[str, Array]) -> dict[str, Numbers | None]:
     names = ("time", "tendon_force", "tendon_position", "joint_position", "joint_velocity")
     return {name: _matrix(arrays.get(name)) for name in names}
-
-
-def _flags(use: Array | None) -> NDArray[np.uint8] | None:
-    return None if use is None else np.ascontiguousarray(use, dtype=np.uint8)
 
 
 def _unknowns(source: Any) -> list[Unknown]:
@@ -101,20 +101,14 @@ class Estimator:
     def __init__(self, image: bytes, group: Array | None = None, scale: Array | None = None) -> None:
         if not HAS_ESTIMATION:
             raise InputError(ESTIMATION_MISSING)
-        groups = None if group is None else np.ascontiguousarray(group, dtype=np.int32)
         with _refusals():
-            self._estimator = _estimation.Estimator(image, groups, _matrix(scale))
+            self._estimator = _estimation.Estimator(image, _whole(group, np.int32), _matrix(scale))
         self.unknowns = _unknowns(self._estimator)
 
     @property
     def joints(self) -> int:
         """Number of joints n."""
         return int(self._estimator.joints)
-
-    @property
-    def tendons(self) -> int:
-        """Number of tendons m."""
-        return int(self._estimator.tendons)
 
     @property
     def start(self) -> Numbers:
@@ -153,7 +147,7 @@ class Estimator:
                     **_samples(arrays),
                     kinematics_source=kinematics_source,
                     external_torque=_matrix(external_torque),
-                    use=_flags(use),
+                    use=_whole(use, np.uint8),
                 )
             )
 
@@ -229,9 +223,10 @@ class Learner:
     ) -> None:
         if not HAS_ESTIMATION:
             raise InputError(ESTIMATION_MISSING)
-        groups = None if group is None else np.ascontiguousarray(group, dtype=np.int32)
         with _refusals():
-            self._learner = _estimation.Learner(image, groups, _matrix(scale), prior_std, block, parameter_drift)
+            self._learner = _estimation.Learner(
+                image, _whole(group, np.int32), _matrix(scale), prior_std, block, parameter_drift
+            )
         self.unknowns = _unknowns(self._learner)
 
     @property
@@ -283,7 +278,7 @@ class Learner:
                 **_samples(arrays),
                 kinematics_source=kinematics_source,
                 external_torque=_matrix(external_torque),
-                use=_flags(use),
+                use=_whole(use, np.uint8),
                 watch=progress,
             )
         return {"innovation": np.asarray(innovation), "innovation_variance": np.asarray(variance)}

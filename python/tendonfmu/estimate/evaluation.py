@@ -17,16 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.recordings import (
-    BiasSettings,
-    FitRecording,
-    Model,
-    Residuals,
-    bias_settings,
-    model_alone,
-    rms,
-    track,
-)
+from tendonfmu.recordings import BiasSettings, FitRecording, Model, Residuals, bias_settings, model_alone, rms, track
 
 BLOCKS = 80  # approximate number: few enough to be long, many enough for a sum of squares
 SHORTEST = 2.0  # s; several times the memory of the bias filter
@@ -102,11 +93,7 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
 
 
 def block_scores(
-    estimator: Estimator,
-    z: Numbers,
-    data: Data,
-    training: Sequence[Evaluation],
-    weights: Sequence[Numbers],
+    estimator: Estimator, z: Numbers, data: Data, training: Sequence[Evaluation], weights: Sequence[Numbers]
 ) -> tuple[Numbers, float]:
     """Compute the scores [blocks, u] at the estimate z [u], over the samples trained on, and the length of a block."""
     seconds = sum(evaluation.recording.duration for evaluation in training)

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.errors import InputError, InternalError
+from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate.structure import Structure, described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
-from tendonfmu.model import Finger, description_text, native, read_finger
+from tendonfmu.model import Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording
 
 FIT_REPORT = "tendonfmu-fit-1"
@@ -93,19 +93,15 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
                 set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
     if structure.sensor_fault is not None:
         data["sensor_fault"] = dict(structure.sensor_fault)
-    text = description_text(data).encode()
-    try:
-        return Finger(structure.start.path, text, data, native.image_from_json(text))
-    except native.NativeError as refused:  # not the user's fault: a fit keeps within every bound
-        raise InternalError(f"{structure.start.path}: the fitted description is refused: {refused}") from refused
+    with own_fault("the fitted description"):  # a fit keeps within every bound
+        return finger_from_data(data, structure.start.path)
 
 
 def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
     """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given."""
     contact = {**finger.data["contact"], "uncertainty": directions}
-    data = {**finger.data, "contact": contact if level is None else {**contact, "uncertainty_level": level}}
-    text = description_text(data).encode()
-    return Finger(finger.path, text, data, native.image_from_json(text))
+    contact |= {} if level is None else {"uncertainty_level": level}
+    return finger_from_data({**finger.data, "contact": contact}, finger.path)
 
 
 # --- an interrupted fit -----------------------------------------------------------------------------------------------

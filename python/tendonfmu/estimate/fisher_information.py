@@ -175,10 +175,7 @@ class _Run:
 
 
 def sensitivities(
-    data: Mapping[str, Any],
-    numbers: Sequence[Unknown],
-    motion: Mapping[str, Numbers],
-    progress: Progress | None = None,
+    data: Mapping[str, Any], numbers: Sequence[Unknown], motion: Mapping[str, Numbers], progress: Progress | None = None
 ) -> Iterator[Numbers]:
     """Compute the change of T_eff per relative change of each number; only fig. 5 moves the bias."""
     # motion: [N] (s); returns [S, n, p] of successive parts of the motion (N·m)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -63,25 +62,6 @@ def build_report(
         "uncertainty": uncertainty,
     }
     return {key: finite(value) for key, value in report.items()}
-
-
-def report_text(report: Mapping[str, Any]) -> str:
-    """Return the report as JSON with one line per parameter and per row of the correlation."""
-    parts = []
-    for key, value in report.items():
-        if key == "parameters":
-            text = _lines(value)
-        elif key == "correlation":
-            keys = ("paths", "standard_errors", "matrix")
-            text = "{" + ",\n  ".join(f"{json.dumps(part)}: {_lines(value[part])}" for part in keys) + "}"
-        else:
-            text = json.dumps(value, ensure_ascii=False, allow_nan=False)
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _lines(values: Sequence[Any]) -> str:
-    return "[\n  " + ",\n  ".join(json.dumps(each, ensure_ascii=False, allow_nan=False) for each in values) + "]"
 
 
 def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:

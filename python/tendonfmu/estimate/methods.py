@@ -170,11 +170,7 @@ def _measured_weights(
 
 
 def learn_batch(
-    structure: Structure,
-    recordings: Sequence[FitRecording],
-    watch: Watch,
-    settings: Settings,
-    start: Start | None,
+    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by maximum likelihood."""
     # start: [u]
@@ -268,11 +264,7 @@ def _slack(samples: int) -> str:
 
 
 def learn_ekf(
-    structure: Structure,
-    recordings: Sequence[FitRecording],
-    watch: Watch,
-    settings: Settings,
-    start: Start | None,
+    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
     estimator = _estimator(structure)

@@ -17,11 +17,7 @@ from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
 
-CAUSES = {
-    **CAUSES_OF_A_MOTION,
-    "never_moves": "never slides at all",
-    "side": "never slides to that side",
-}
+CAUSES = {**CAUSES_OF_A_MOTION, "never_moves": "never slides at all", "side": "never slides to that side"}
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
 

@@ -227,11 +227,7 @@ class _JointBlock:
 
 
 def _sample(
-    data: Data,
-    plan: Plan,
-    knots: list[Numbers],
-    strokes: list[list[Stroke]],
-    blocks: list[tuple[int, int, float]],
+    data: Data, plan: Plan, knots: list[Numbers], strokes: list[list[Stroke]], blocks: list[tuple[int, int, float]]
 ) -> Excitation:
     time = np.arange(blocks[-1][1] + 1) / plan.rate
     curves = [quintic.evaluate(path, time) for path in knots]

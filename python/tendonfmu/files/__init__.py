@@ -13,7 +13,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .counting import are, counted
     from .extras import require_extra
-    from .finite_numbers import finite
+    from .finite_numbers import finite, report_text
     from .frames import frame_of, is_frame, table_of_frame
     from .json_node import Node, Refusal, read_json
     from .tables import (

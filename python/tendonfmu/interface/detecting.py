@@ -13,7 +13,7 @@ import numpy as np
 
 from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
 from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
-from tendonfmu.files import counted, write_text
+from tendonfmu.files import counted, report_text, write_text
 from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.options import ScoreOptions, TuneOptions
@@ -188,7 +188,7 @@ class ScoreResult:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the report, as `tendonfmu score -o`. Raises InputError if it cannot be written."""
-        write_text(Path(path), score_report.report_text(self.report))
+        write_text(Path(path), report_text(self.report))
 
     def plot(self, recording: int = 0) -> Any:
         """Draw the compensated torque over time, with the labels and the alarms.
