@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import oracle
 import oracle_fit
 from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
-from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_data import recorded
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
 from repetitions import repeated
@@ -103,15 +103,8 @@ def test_cost_gradient_and_information_are_those_of_the_dense_twin(seed: int) ->
         assert_equal_evaluation(estimator, likelihoods, z)
 
 
-def made(description: Description, seed: int, duration: float, rate: float = 20.0, **how: Any) -> Recording:
-    joints = len(description["joints"])
-    motion = wavy_motion(seed, duration, rate, joints)
-    forces = wavy_forces(seed, motion["time"], len(description["tendons"]), mean=30.0)
-    return make_recording(description, motion, forces, seed, 0.02, **how).recording
-
-
 def made_part(description: Description, seed: int, duration: float, rate: float = 20.0, **how: Any) -> Part:
-    recording = made(description, seed, duration, rate, **how)
+    recording = recorded(description, seed, duration, rate, **how)
     return Part(recording, 3, recording.get("external_torque"))
 
 
@@ -173,7 +166,7 @@ LENGTHS = (2, 3, 4, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 25
 @pytest.mark.parametrize("samples", repeated(LENGTHS, 0, 1, 3, 4, 5, 9, 10, 11))
 def test_any_length(samples: int) -> None:
     description = small_finger()
-    whole = made(description, 7, 20.0)
+    whole = recorded(description, 7, 20.0)
     recording = {name: series[:samples] for name, series in whole.items()}
     part = Part(recording, 3, recording["external_torque"])
     estimator, likelihoods = both(description, groups(description), [part])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import oracle_fit
 from fit_cases import few_unknowns, groups, image_of, lasting_finger, random_fit_case, twin_of
-from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_data import recorded
 from oracle_ekf import JosephFilter
 from random_fingers import Description, Recording
 from repetitions import repeated
@@ -23,13 +23,6 @@ if not estimation.HAS_ESTIMATION:
 Array = NDArray[Any]
 
 CLOSE = 1e-8  # of a prior's standard deviation, or of the largest innovation: rounding through a few hundred updates
-
-
-def recorded(description: Description, seed: int, duration: float, rate: float, **how: Any) -> Recording:
-    motion = wavy_motion(seed, duration, rate, 2)
-    return make_recording(
-        description, motion, wavy_forces(seed, motion["time"], 4, mean=30.0), seed, 0.02, **how
-    ).recording
 
 
 class Pair:

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 import oracle_fit
 from fit_cases import few_unknowns, groups, image_of, lasting_finger, small_finger, twin_of
-from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_data import make_recording, recorded, wavy_forces, wavy_motion
 from oracle_trace import with_values
 from random_fingers import Description, Recording
 from tendonfmu.estimate import estimation
@@ -22,13 +22,6 @@ if not estimation.HAS_ESTIMATION:
     pytest.skip(f"SKIPPED: {estimation.ESTIMATION_MISSING}", allow_module_level=True)
 
 Array = NDArray[Any]
-
-
-def recorded(description: Description, seed: int, duration: float, rate: float, **how: Any) -> Recording:
-    motion = wavy_motion(seed, duration, rate, 2)
-    return make_recording(
-        description, motion, wavy_forces(seed, motion["time"], 4, mean=30.0), seed, 0.02, **how
-    ).recording
 
 
 def estimator_with(description: Description, *recordings: Recording, key: Any = few_unknowns) -> Any:

@@ -150,3 +150,12 @@ def wavy_forces(seed: int, time: Array, tendons: int, mean: float = 12.0) -> Arr
     rng = np.random.default_rng([seed, 8])
     wave = np.sin(2.0 * np.pi * rng.uniform(0.03, 0.3, tendons) * time[:, None] + rng.uniform(0.0, 6.0, tendons))
     return np.asarray(mean * (1.0 + 0.4 * wave))
+
+
+def recorded(
+    description: Mapping[str, Any], seed: int, duration: float, rate: float = 20.0, **how: Any
+) -> dict[str, Array]:
+    """A recording of a wavy motion of the whole finger, its tendons tight; how: options of `make_recording`."""
+    motion = wavy_motion(seed, duration, rate, len(description["joints"]))
+    forces = wavy_forces(seed, motion["time"], len(description["tendons"]), mean=30.0)
+    return make_recording(description, motion, forces, seed, 0.02, **how).recording
