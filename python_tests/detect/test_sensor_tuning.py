@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.detect.sensor_faults import AMPLE, HOLD_SAMPLES, finds_a_fault, learn_sensors
-from tendonfmu.estimate.files import with_values
-from tendonfmu.estimate.structure import Choice, build_structure
+from tendonfmu.estimate.structure import Choice, build_structure, with_values
 from tendonfmu.model import native
 from tendonfmu.model.description import Finger
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
         check_unseen,
         read_previous_fit,
         with_previous_values,
-        with_uncertainty,
-        with_values,
         write_unfinished,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
@@ -37,7 +35,18 @@ if TYPE_CHECKING:
         unknown_names,
     )
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
-    from .structure import MAGNITUDES, Choice, Structure, build_structure, described, get_number, own_copy, set_number
+    from .structure import (
+        MAGNITUDES,
+        Choice,
+        Structure,
+        build_structure,
+        described,
+        get_number,
+        own_copy,
+        set_number,
+        with_uncertainty,
+        with_values,
+    )
     from .uncertainty import parameter_uncertainty
     from .verdicts import Fitted
 

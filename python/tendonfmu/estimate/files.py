@@ -1,4 +1,4 @@
-"""The files of a fit: the fitted description, the state of an interrupted fit, and an earlier fit as the prior."""
+"""The files of a fit: what may be read and written, the state of an interrupted fit, and an earlier fit as prior."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate.structure import Structure, described, estimable_numbers, own_copy, set_number
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
-from tendonfmu.model import Finger, finger_from_data, read_finger
+from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import Recording
 
 FIT_REPORT = "tendonfmu-fit-1"
 UNFINISHED = "tendonfmu-fit-unfinished-1"
-DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
@@ -78,30 +77,6 @@ def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role
 def _measured(recording: Recording) -> Numbers:
     """Return [N, 2m] tendon forces and positions."""
     return np.hstack([recording.groups["tendon_force"], recording.groups["tendon_position"]])
-
-
-# --- descriptions -----------------------------------------------------------------------------------------------------
-
-
-def with_values(structure: Structure, values: Numbers) -> Finger:
-    """Replace the estimated numbers in the description of the start."""
-    # values: [p]
-    data = own_copy(structure.start.data)
-    for number in structure.numbers:
-        for path in (number.path, number.with_path):
-            if path is not None:
-                set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
-    if structure.sensor_fault is not None:
-        data["sensor_fault"] = dict(structure.sensor_fault)
-    with own_fault("the fitted description"):  # a fit keeps within every bound
-        return finger_from_data(data, structure.start.path)
-
-
-def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
-    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given."""
-    contact = {**finger.data["contact"], "uncertainty": directions}
-    contact |= {} if level is None else {"uncertainty_level": level}
-    return finger_from_data({**finger.data, "contact": contact}, finger.path)
 
 
 # --- an interrupted fit -----------------------------------------------------------------------------------------------

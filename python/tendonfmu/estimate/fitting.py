@@ -23,8 +23,6 @@ from tendonfmu.estimate.files import (
     read_previous_fit,
     resumed_start,
     with_previous_values,
-    with_uncertainty,
-    with_values,
 )
 from tendonfmu.estimate.fit_report import build_report
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
@@ -39,7 +37,7 @@ from tendonfmu.estimate.methods import (
     unknown_names,
 )
 from tendonfmu.estimate.picture import FitPicture, FitSeries
-from tendonfmu.estimate.structure import Choice, build_structure
+from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers
 from tendonfmu.files import counted

@@ -19,8 +19,8 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
-from tendonfmu.estimate.files import PreviousFit, with_values
-from tendonfmu.estimate.structure import Structure
+from tendonfmu.estimate.files import PreviousFit
+from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.files import counted
 from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording

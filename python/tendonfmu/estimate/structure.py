@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.errors import InputError
+from tendonfmu.arrays import Numbers
+from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
-from tendonfmu.model import LEFT_OUT, Finger, effects, law_path, native, sides, steps_of
+from tendonfmu.model import LEFT_OUT, Finger, effects, finger_from_data, law_path, native, sides, steps_of
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 FIXED = -1
+DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
 
 @dataclass(frozen=True)
@@ -117,16 +119,36 @@ def described(finger: Finger, data: Mapping[str, Any]) -> Finger:
     """Return the finger with another description, checked by the core."""
     if data is finger.data or data == finger.data:
         return finger
-    text = json.dumps(data).encode()
-    try:
-        return Finger(finger.path, text, data, native.image_from_json(text))
-    except native.NativeError as refused:
-        raise InputError(f"{finger.path}: {refused}") from None
+    return finger_from_data(data, finger.path)
 
 
 def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
     given = (data.get("bias") or {}).get("initial_torque") or []
     return [Unknown(f"bias.initial_torque[{j}]", float(value)) for j, value in enumerate(given, start=1)]
+
+
+# --- the fitted description -------------------------------------------------------------------------------------------
+
+
+def with_values(structure: Structure, values: Numbers) -> Finger:
+    """Replace the estimated numbers in the description of the start."""
+    # values: [p]
+    data = own_copy(structure.start.data)
+    for number in structure.numbers:
+        for path in (number.path, number.with_path):
+            if path is not None:
+                set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    if structure.sensor_fault is not None:
+        data["sensor_fault"] = dict(structure.sensor_fault)
+    with own_fault("the fitted description"):  # a fit keeps within every bound
+        return finger_from_data(data, structure.start.path)
+
+
+def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
+    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given."""
+    contact = {**finger.data["contact"], "uncertainty": directions}
+    contact |= {} if level is None else {"uncertainty_level": level}
+    return finger_from_data({**finger.data, "contact": contact}, finger.path)
 
 
 # --- sides of laws ----------------------------------------------------------------------------------------------------
