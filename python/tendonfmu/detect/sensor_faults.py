@@ -108,19 +108,13 @@ def _gaps(data: Data, part: FreePart) -> Iterator[Gap]:
     loops = np.array([bool(tendon.get("bidirectional")) for tendon in data["tendons"]])
     force, position = part.arrays["tendon_force"], part.arrays["tendon_position"]
     taut = (force > TAUT) | loops
-    w, is_known = _joint_side(
-        R,
-        position - force / k,
-        None if part.kinematics == KinematicsSource.TENDON_POSITIONS else part.arrays.get("joint_position"),
-    )
+    is_measured = part.kinematics != KinematicsSource.TENDON_POSITIONS
+    angle = part.arrays.get("joint_position") if is_measured else None
+    w, is_known = _joint_side(R, position - force / k, angle)
     window = max(1, min(len(force), int(np.searchsorted(part.time, part.time[0] + WINDOW))))
     for i in np.flatnonzero(is_known):
         others = np.arange(len(k)) != i
-        known = (
-            taut[:, others].all(axis=1)
-            if part.kinematics == KinematicsSource.TENDON_POSITIONS
-            else np.ones(len(force), dtype=bool)
-        )
+        known = np.ones(len(force), dtype=bool) if is_measured else taut[:, others].all(axis=1)
         stretched = k[i] * (np.abs(np.diff(position[:, i])) + np.abs(np.diff(w[:, i])))
         gap = k[i] * (position[:, i] - w[:, i]) - force[:, i]
         yield Gap(force[:, i], gap, stretched, known & taut[:, i] & part.counted, window)

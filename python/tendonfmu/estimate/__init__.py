@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from . import fit_report, identifiability, verdicts
+    from . import identifiability, verdicts
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate, residuals
     from .files import (
