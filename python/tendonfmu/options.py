@@ -39,7 +39,7 @@ class KinematicsSource(IntEnum):
 # --- which values an option takes -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Number:
     """A number from `least` to `most`; both are allowed."""
 
@@ -71,7 +71,7 @@ class Number:
         return number
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Choice:
     """One of several texts."""
 
@@ -88,7 +88,7 @@ class Choice:
         return value
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Kind:
     """A value of one of `types`; the first is the type on the command line."""
 
@@ -113,7 +113,7 @@ class Kind:
         return value
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Several:
     """One value or several; on the command line an option that may be repeated."""
 
@@ -145,7 +145,7 @@ _YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,)
 # --- an option, and the options of a command --------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Option:
     """What an option takes, and how the command line shows it."""
 

@@ -10,7 +10,6 @@ import inspect
 import math
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -199,6 +198,8 @@ def _standard_input(arguments: Mapping[str, Any], reads: Sequence[str]) -> Itera
     if len(uses) > 1:
         where = " and ".join(dict.fromkeys(uses))
         raise InputError(f"-: given {len(uses)} times, for {where}; standard input can be read once")
+    import tempfile
+
     (name,) = uses
     with tempfile.TemporaryDirectory(prefix="tendonfmu-") as folder:
         kept = _kept(sys.stdin.buffer.read(), Path(folder))

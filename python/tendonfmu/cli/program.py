@@ -9,14 +9,9 @@ from __future__ import annotations
 
 import functools
 import itertools
-import platform
-import shlex
 import sys
-import tempfile
-import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TextIO
 
@@ -27,7 +22,6 @@ from tendonfmu.cli import calibrate, campaign, check, convert, demo, detect, dia
 from tendonfmu.cli.command import SeveralValues
 from tendonfmu.cli.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
 from tendonfmu.errors import InputError, InputWarning, line_of
-from tendonfmu.files import whole_file
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning
@@ -163,12 +157,14 @@ def options(
     """Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor."""
 
 
-# --- what a user sends after an internal fault ------------------------------------------------------------------------
+# --- what a user sends after an internal fault (its imports would take time of every command) ------------------------
 
 
 def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path | None:
     """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable."""
     # It is written whole or not at all, and never replaces another file.
+    import tempfile
+
     text = _report(error, arguments)
     for folder in (".", None):
         try:
@@ -193,6 +189,10 @@ def is_without_memory(error: BaseException) -> bool:
 
 def _written(folder: Path, text: str) -> Path:
     """Write the text under the first free name of this second. Raises OSError or InputError."""
+    from datetime import datetime
+
+    from tendonfmu.files import whole_file
+
     stem = datetime.now().strftime("tendonfmu-error-%Y%m%d-%H%M%S")
     for number in itertools.count(1):
         file = folder / (f"{stem}.txt" if number == 1 else f"{stem}-{number}.txt")
@@ -211,6 +211,11 @@ def _written(folder: Path, text: str) -> Path:
 
 
 def _report(error: BaseException, arguments: Sequence[str]) -> str:
+    import platform
+    import shlex
+    import traceback
+    from datetime import datetime
+
     lines = [
         "An internal error of tendonfmu. Please send this file to its developers; it holds no measured data.",
         "",
