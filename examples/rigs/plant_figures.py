@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from tendonfmu.arrays import Array
 from tendonfmu.model import Instance
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.simulate import Plant, Rig, simulate
+from tendonfmu.simulate.plant import Plant
+from tendonfmu.simulate.rig import Rig
+from tendonfmu.simulate.simulation import simulate
 
 Signals = Mapping[str, Array]
 Interval = tuple[float, float]

@@ -100,7 +100,7 @@ def test_values_have_units_and_names() -> None:
     assert curve.hovertemplate == "%{y:.4~g} mN·m the model<extra></extra>"
     assert figure_of(PANEL, NAMES).layout.xaxis.unifiedhovertitle.text == "%{x:.5~g} s"
     *_, limits = traces(replace(PANEL, bars=(Bars("after", X, X - 1, X + 1),)))
-    assert limits.customdata.tolist() == (X - 1).tolist() and limits.y.tolist() == (X + 1).tolist()
+    assert limits.customdata[:, 0].tolist() == (X - 1).tolist() and limits.y.tolist() == (X + 1).tolist()
 
 
 def test_a_band_goes_round_each_of_its_stretches() -> None:
@@ -109,7 +109,7 @@ def test_a_band_goes_round_each_of_its_stretches() -> None:
     assert area.fill == "toself"
     np.testing.assert_array_equal(area.y, [0, 1, 2, 1, np.nan, 3, 4, 5, 4])
     np.testing.assert_array_equal(area.x, [0, 2.5, 2.5, 0, np.nan, 7.5, 10, 10, 7.5])
-    np.testing.assert_array_equal(limits.customdata, low)
+    np.testing.assert_array_equal(limits.customdata[:, 0], low)
 
 
 def test_bars_lie_where_they_should() -> None:

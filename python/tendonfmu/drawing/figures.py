@@ -44,17 +44,18 @@ _AXIS = {
     "minor": {"ticks": "", "showgrid": False},
 }
 TEMPLATE = go.layout.Template(  # what all figures share
-    layout=go.Layout(
-        font={"family": _FONT, "size": 11, "color": "#5b6570"},
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        margin={"l": 58, "r": 12, "t": 6, "b": 42},
-        showlegend=False,
-        hovermode="x unified",
-        hoverlabel={"bgcolor": "#fff", "font": {"family": _FONT, "size": 12}},
-        xaxis={**_AXIS, "showgrid": False, "ticklabelposition": "outside"},
-        yaxis={**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6"},
-    )
+    layout={
+        "font": {"family": _FONT, "size": 11, "color": "#5b6570"},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "margin": {"l": 58, "r": 12, "t": 6, "b": 42},
+        "showlegend": False,
+        "hovermode": "x unified",
+        "hoverlabel": {"bgcolor": "#fff", "font": {"family": _FONT, "size": 12}},
+        "xaxis": {**_AXIS, "showgrid": False, "ticklabelposition": "outside"},
+        "yaxis": {**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6"},
+    },
+    _validate=False,
 )
 
 
@@ -76,7 +77,7 @@ def figures_json(figures: Iterable[tuple[Panel, go.Figure]]) -> Markup:
 @cache
 def packed_plotly() -> Markup:
     """Return plotly.js, compressed with gzip and encoded in base64: two fifths of its size."""
-    return Markup(base64.b64encode(gzip.compress(get_plotlyjs().encode(), 5, mtime=0)).decode("ascii"))
+    return Markup(base64.b64encode(gzip.compress(get_plotlyjs().encode(), 4, mtime=0)).decode("ascii"))
 
 
 def dark_colours() -> Markup:
@@ -189,16 +190,19 @@ class _Traces:
 
     def _limits(self, name: str, x: Numbers, low: Numbers, high: Numbers) -> go.Scatter:
         """Show both ends under the pointer, without a line of their own."""
-        hover = self._hover(name, x, "%{customdata:.4~g} to %{y:.4~g}")
         line = {"width": 0, "color": STYLES[name].colour}
-        return self._lines(x, high, line=line, customdata=np.asarray(low, dtype=np.float32), **hover)
+        return self._lines(x, high, line=line, **self._hover(name, x, "%{y:.4~g}", low))
 
-    def _hover(self, style: str, x: Numbers, value: str) -> dict[str, Any]:
-        """Show value, unit and name; on a stretched axis also x as a plain number."""
-        text = f"{value} {self._unit} {self._names.get(style, '')}".replace("  ", " ").rstrip()
+    def _hover(self, style: str, x: Numbers, value: str, low: Numbers | None = None) -> dict[str, Any]:
+        """Show value, unit and name, after the lower end if there is one; on a stretched axis also x as it is."""
+        data = [] if low is None else [low]
+        text = value if low is None else f"%{{customdata[0]:.4~g}} to {value}"
+        text = f"{text} {self._unit} {self._names.get(style, '')}".replace("  ", " ").rstrip()
         if self._panel.near_x > 0:
-            return {"text": [f"{number:.4g}" for number in x], "hovertemplate": f"%{{text}}: {text}<extra></extra>"}
-        return {"hovertemplate": f"{text}<extra></extra>"}
+            text = f"%{{customdata[{len(data)}]:.4~g}}: {text}"
+            data.append(x)
+        hover: dict[str, Any] = {"hovertemplate": f"{text}<extra></extra>"}
+        return hover | {"customdata": np.column_stack(data).astype(np.float32)} if data else hover
 
 
 def thinned(curves: Sequence[Curve]) -> Iterator[Curve]:

@@ -83,8 +83,10 @@ def series_figure(
 def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
     """Draw the panels of sheets, two in a row."""
     panels = [(sheet, panel) for sheet in sheets for panel in sheet.panels if not panel.borders]
-    columns = max(1, min(_COLUMNS, len(panels)))
-    rows = max(1, math.ceil(len(panels) / columns))
+    if not panels:
+        return _with_look(go.Figure(layout_title_text=html.escape(title)), {"t": 50, "b": 40})
+    columns = min(_COLUMNS, len(panels))
+    rows = math.ceil(len(panels) / columns)
     keys = _keys(sheets)
     top = 75.0 + _LINE * len(keys)
     inside = (_ROW + _GAP[1]) * rows - _GAP[1]

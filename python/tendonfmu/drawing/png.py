@@ -19,6 +19,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
@@ -210,11 +211,14 @@ def _draw_shape(axes: Axes, shape: Any) -> None:
 def _draw_scatter(axes: Axes, trace: Any) -> None:
     x, y = np.asarray(trace.x, dtype=float), np.asarray(trace.y, dtype=float)
     if trace.fill:
-        below: dict[str, Any] = {} if trace.yaxis is None else {"transform": axes.get_xaxis_transform(), "zorder": 0.5}
-        height = 1.0 if trace.yaxis is None else HISTOGRAM
-        for part in np.split(np.arange(len(x)), np.flatnonzero(np.isnan(x))):
-            known = part[np.isfinite(x[part])]
-            axes.fill(x[known], height * y[known], color=_colour(trace.fillcolor), linewidth=0, **below)
+        counts = trace.yaxis is not None
+        height = HISTOGRAM if counts else 1.0
+        below: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "zorder": 0.5} if counts else {}
+        corners = np.column_stack([x, height * y])
+        parts = [part[np.isfinite(part[:, 0])] for part in np.split(corners, np.flatnonzero(np.isnan(x)))]
+        areas = PolyCollection(parts, facecolors=_colour(trace.fillcolor), linewidths=0, **below)
+        axes.add_collection(areas, autolim=not counts)
+        axes.autoscale_view()
         return
     if "lines" in trace.mode and trace.line.width:
         line = {"color": trace.line.color, "linewidth": trace.line.width, "alpha": trace.opacity}

@@ -10,8 +10,8 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .fmu_packaging import build_plant_fmu
-    from .plant import INTEGRATORS, Plant, require_plant
-    from .rig import Rig, description_files, is_rig, read_rig
+    from .plant import INTEGRATORS, require_plant
+    from .rig import description_files, is_rig, read_rig
     from .rig_summary import describe_rig
     from .simulation import simulate
 
