@@ -54,10 +54,7 @@ struct Effect {
       : type(effect_by_name(name)),
         place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE},
         numbers(std::move(values)) {
-    memory.resize(type->memory_count, 0.0);
-    if (type->state_count) {
-      memory.resize(type->state_count(joints, tendons, place), 0.0);
-    }
+    memory.resize(type->state_count ? type->state_count(joints, tendons, place) : type->memory_count, 0.0);
   }
 
   // calls with the sample as an effect sees it
