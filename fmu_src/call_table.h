@@ -1,7 +1,6 @@
 /* Which function may be called when, and what it and its arguments are called: one table for each version of FMI
  * (fmi2_call_table.c, fmi3_call_table.c). A library has one of them; all else in it is the same. */
-#ifndef TENDONFMU_CALL_TABLE_H
-#define TENDONFMU_CALL_TABLE_H
+#pragma once
 
 /* States of an instance. Steps are carried out at once, so stepInProgress, stepFailed and stepCanceled never occur.
  * There are no events and no structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either.
@@ -14,6 +13,17 @@ typedef enum fmu_phase {
   PHASE_COUNT,
   PHASE_ERROR = PHASE_COUNT /* on top of one of the others */
 } fmu_phase;
+
+/* Types of FMI 3.0 that no variable has, but for those whose calls take other arguments: Binary and Clock. */
+#define OTHER_TYPES(ENTRY) \
+  ENTRY(FLOAT32, Float32)  \
+  ENTRY(INT8, Int8)        \
+  ENTRY(UINT8, UInt8)      \
+  ENTRY(INT16, Int16)      \
+  ENTRY(UINT16, UInt16)    \
+  ENTRY(UINT32, UInt32)    \
+  ENTRY(INT64, Int64)      \
+  ENTRY(UINT64, UInt64)
 
 /* Functions of both versions under the name that they have in FMI 2.0: fmi3SetFloat64 is CALL_SET_REAL. */
 typedef enum fmu_function {
@@ -49,26 +59,13 @@ typedef enum fmu_function {
   CALL_GET_INTEGER_STATUS,
   CALL_GET_BOOLEAN_STATUS,
   CALL_GET_STRING_STATUS,
-  /* of FMI 3.0 only, for types that no variable has */
-  CALL_GET_FLOAT32,
-  CALL_GET_INT8,
-  CALL_GET_UINT8,
-  CALL_GET_INT16,
-  CALL_GET_UINT16,
-  CALL_GET_UINT32,
-  CALL_GET_INT64,
-  CALL_GET_UINT64,
-  CALL_GET_BINARY,
-  CALL_GET_CLOCK,
-  CALL_SET_FLOAT32,
-  CALL_SET_INT8,
-  CALL_SET_UINT8,
-  CALL_SET_INT16,
-  CALL_SET_UINT16,
-  CALL_SET_UINT32,
-  CALL_SET_INT64,
-  CALL_SET_UINT64,
+/* of FMI 3.0 only, for types that no variable has */
+#define CALLS_OF_TYPE(CODE, type) CALL_GET_##CODE, CALL_SET_##CODE,
+  OTHER_TYPES(CALLS_OF_TYPE)
+#undef CALLS_OF_TYPE
+      CALL_GET_BINARY,
   CALL_SET_BINARY,
+  CALL_GET_CLOCK,
   CALL_SET_CLOCK,
   CALL_COUNT
 } fmu_function;
@@ -100,5 +97,3 @@ static inline int call_is_allowed(fmu_function function, fmu_phase phase) {
   return (this_fmi.calls[function].allowed >> phase) & 1;
 }
 const char* phase_name(fmu_phase phase);
-
-#endif

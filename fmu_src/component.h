@@ -1,6 +1,5 @@
 /* One instance of the FMU: a model, its variables, and where it stands in the life that FMI prescribes. */
-#ifndef TENDONFMU_COMPONENT_H
-#define TENDONFMU_COMPONENT_H
+#pragma once
 
 #include <stdint.h>
 
@@ -47,5 +46,3 @@ fmu_status component_fail_because(component* c, const char* function, const char
 /* In initialisation mode: brings the outputs up to the present inputs. 0, or -1 with everything as it was and the
  * reason in model_last_error(). */
 int component_update_outputs(component* c);
-
-#endif

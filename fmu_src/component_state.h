@@ -1,7 +1,6 @@
 /* The whole state of an instance as bytes: life cycle, inputs, parameters, and the model's own saved state.
  * Little-endian, checksummed, without pointers: the same bytes serve in the process and outside. */
-#ifndef TENDONFMU_COMPONENT_STATE_H
-#define TENDONFMU_COMPONENT_STATE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -26,5 +25,3 @@ const char* component_check_state(component* c, const void* bytes, size_t size);
 
 /* Takes over a state; an instance in the state "error" leaves it. Returns NULL, or with nothing changed the reason. */
 const char* component_restore(component* c, const void* bytes);
-
-#endif

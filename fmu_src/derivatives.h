@@ -1,6 +1,5 @@
 /* Partial derivatives of a finger's outputs by its inputs, of the sample last taken. */
-#ifndef TENDONFMU_DERIVATIVES_H
-#define TENDONFMU_DERIVATIVES_H
+#pragma once
 
 #include "component.h"
 
@@ -22,5 +21,3 @@ fmu_status derivatives_directional(component* c, const partials* p);
 
 /* sensitivity of the knowns = transposed J times the seed of the unknowns. */
 fmu_status derivatives_adjoint(component* c, const partials* p);
-
-#endif

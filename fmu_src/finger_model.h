@@ -1,6 +1,5 @@
 /* The model of the friction FMU: a finger of tendonfmu.h. */
-#ifndef TENDONFMU_FINGER_MODEL_H
-#define TENDONFMU_FINGER_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "tendonfmu.h"
@@ -8,5 +7,3 @@
 /* For what is not the same in every FMU: derivatives. */
 tendonfmu_finger* model_finger(const model* m);
 double* model_derivatives(const model* m); /* room for one number of each Real input and output */
-
-#endif

@@ -1,6 +1,5 @@
 /* Inputs and outputs of a finger (tendonfmu.h) as they lie in the block of variables. */
-#ifndef TENDONFMU_FINGER_SIGNALS_H
-#define TENDONFMU_FINGER_SIGNALS_H
+#pragma once
 
 #include "tendonfmu.h"
 #include "variables.h"
@@ -11,5 +10,3 @@ tendonfmu_outputs variables_outputs(const variables* v);
 
 /* Copies the outputs of the last sample into the block. */
 void variables_fetch_outputs(variables* v, const tendonfmu_finger* finger);
-
-#endif

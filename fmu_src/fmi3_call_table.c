@@ -12,6 +12,9 @@ enum {
   WRITING = INSTANTIATED | INITIALISATION | STEP_MODE
 };
 
+#define CALLS_OF_TYPE(CODE, type) \
+  [CALL_GET_##CODE] = {"fmi3Get" #type, ALWAYS}, [CALL_SET_##CODE] = {"fmi3Set" #type, WRITING},
+
 /* FMI 3.0, sections 2.3 and 4.2. Without Event Mode, Step Mode takes tunable parameters. */
 const fmi_version this_fmi = {
     .calls =
@@ -38,26 +41,13 @@ const fmi_version this_fmi = {
             [CALL_GET_DIRECTIONAL_DERIVATIVE] = {"fmi3GetDirectionalDerivative", DERIVING},
             [CALL_GET_ADJOINT_DERIVATIVE] = {"fmi3GetAdjointDerivative", DERIVING},
             [CALL_DO_STEP] = {"fmi3DoStep", STEP_MODE},
-            [CALL_GET_FLOAT32] = {"fmi3GetFloat32", ALWAYS},
-            [CALL_GET_INT8] = {"fmi3GetInt8", ALWAYS},
-            [CALL_GET_UINT8] = {"fmi3GetUInt8", ALWAYS},
-            [CALL_GET_INT16] = {"fmi3GetInt16", ALWAYS},
-            [CALL_GET_UINT16] = {"fmi3GetUInt16", ALWAYS},
-            [CALL_GET_UINT32] = {"fmi3GetUInt32", ALWAYS},
-            [CALL_GET_INT64] = {"fmi3GetInt64", ALWAYS},
-            [CALL_GET_UINT64] = {"fmi3GetUInt64", ALWAYS},
             [CALL_GET_BINARY] = {"fmi3GetBinary", ALWAYS},
-            [CALL_GET_CLOCK] = {"fmi3GetClock", ALWAYS},
-            [CALL_SET_FLOAT32] = {"fmi3SetFloat32", WRITING},
-            [CALL_SET_INT8] = {"fmi3SetInt8", WRITING},
-            [CALL_SET_UINT8] = {"fmi3SetUInt8", WRITING},
-            [CALL_SET_INT16] = {"fmi3SetInt16", WRITING},
-            [CALL_SET_UINT16] = {"fmi3SetUInt16", WRITING},
-            [CALL_SET_UINT32] = {"fmi3SetUInt32", WRITING},
-            [CALL_SET_INT64] = {"fmi3SetInt64", WRITING},
-            [CALL_SET_UINT64] = {"fmi3SetUInt64", WRITING},
             [CALL_SET_BINARY] = {"fmi3SetBinary", WRITING},
+            [CALL_GET_CLOCK] = {"fmi3GetClock", ALWAYS},
             [CALL_SET_CLOCK] = {"fmi3SetClock", WRITING},
+            /* clang-format off */
+            OTHER_TYPES(CALLS_OF_TYPE)
+            /* clang-format on */
         },
     .phases = {"Instantiated", "Initialization Mode", "Step Mode", "Terminated", "Terminated after an error"},
     .types = {"Float64", "Int32", "Boolean", "String"},

@@ -1,7 +1,6 @@
 /* The life of an instance: creation, logging, experiment, initialisation, steps, end. What the functions of both
  * versions of FMI do; the caller adds types and arguments of its own version. */
-#ifndef TENDONFMU_LIFE_CYCLE_H
-#define TENDONFMU_LIFE_CYCLE_H
+#pragma once
 
 #include "component.h"
 
@@ -24,5 +23,3 @@ fmu_status life_exit_initialisation(component* c);
 fmu_status life_terminate(component* c);
 fmu_status life_reset(component* c);
 fmu_status life_step(component* c, double time, double step);
-
-#endif

@@ -1,6 +1,5 @@
 /* Messages of the FMU: one line of text put together without the heap, and the importer's logger. */
-#ifndef TENDONFMU_LOG_H
-#define TENDONFMU_LOG_H
+#pragma once
 
 #include <stddef.h>
 
@@ -37,5 +36,3 @@ void log_send(const log_target* target, fmu_status status, log_category category
 
 /* Category of a declared name; LOG_CATEGORY_COUNT when there is none. */
 log_category log_find_category(const char* name);
-
-#endif

@@ -1,7 +1,6 @@
 /* What an FMU simulates, as the rest of fmu_src sees it: the friction of a finger (finger_model.c), or the simulated
  * finger (plant_fmu/plant_model.c). Each library has one of them and one table of variables; all else is the same. */
-#ifndef TENDONFMU_MODEL_H
-#define TENDONFMU_MODEL_H
+#pragma once
 
 #include <stddef.h>
 
@@ -97,5 +96,3 @@ void model_save(const model* m, void* bytes);
 /* Why these bytes cannot be a state with (initialised 1) or without a sample; NULL when they can. Changes nothing. */
 const char* model_check_state(model* m, const void* bytes, int initialised);
 int model_restore(model* m, const void* bytes);
-
-#endif

@@ -1,6 +1,5 @@
 /* Files of the FMU's resources folder, which importers hand over as a URI (FMI 2.0) or as a path (FMI 3.0). */
-#ifndef TENDONFMU_RESOURCE_H
-#define TENDONFMU_RESOURCE_H
+#pragma once
 
 #include <stddef.h>
 
@@ -14,5 +13,3 @@
  *   reason        receives the text on failure
  * Returns a block for free(), or NULL. No handle stays open. */
 void* resource_read(const char* location, const char* name, size_t* size, const char* argument, log_text* reason);
-
-#endif

@@ -1,7 +1,6 @@
 /* Saved states of an instance: get, set, free, and as bytes. A state that the importer holds is a block of
  * component_save(), the same in both versions of FMI. */
-#ifndef TENDONFMU_STATES_H
-#define TENDONFMU_STATES_H
+#pragma once
 
 #include "component.h"
 
@@ -12,5 +11,3 @@ fmu_status states_free(component* c, void** state);
 fmu_status states_serialized_size(component* c, const void* state, size_t* size);
 fmu_status states_serialize(component* c, const void* state, void* bytes, size_t size);
 fmu_status states_deserialize(component* c, const void* bytes, size_t size, void** state);
-
-#endif

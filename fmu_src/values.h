@@ -2,8 +2,7 @@
  *
  * The values of all variables stand one after another in `values` [value_count], the elements of an array in the order
  * of their index. A call that fails has written nothing; what it has read so far may stand in `values`. */
-#ifndef TENDONFMU_VALUES_H
-#define TENDONFMU_VALUES_H
+#pragma once
 
 #include "component.h"
 
@@ -18,5 +17,3 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
 /* The same for a type that no variable has: says what the first one is. */
 fmu_status values_refuse(component* c, fmu_function function, const char* type, const unsigned references[],
                          size_t count, const void* values);
-
-#endif

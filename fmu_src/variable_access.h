@@ -1,7 +1,6 @@
 /* What all calls that read, write or derive variables have in common: finding them, and saying what is wrong with one.
  */
-#ifndef TENDONFMU_VARIABLE_ACCESS_H
-#define TENDONFMU_VARIABLE_ACCESS_H
+#pragma once
 
 #include "component.h"
 
@@ -33,5 +32,3 @@ int check_value_count(component* c, fmu_function function, variable_type type, c
 
 /* Fails with "<function>: <variable>: <reason>". */
 fmu_status fail_at(component* c, fmu_function function, const variable* found, const char* reason);
-
-#endif

@@ -1,6 +1,5 @@
 /* The variables of one FMU by value reference: where their numbers live and what they are called. */
-#ifndef TENDONFMU_VARIABLES_H
-#define TENDONFMU_VARIABLES_H
+#pragma once
 
 #include <stddef.h>
 
@@ -108,5 +107,3 @@ void variables_append_refusal(log_text* text, const model* m, const variable* fo
 
 /* Name as in the XML, such as "tendon_force[2]" or "contact"; of a whole group "tendon_force". */
 void variables_append_name(log_text* text, const model* m, const variable* found);
-
-#endif

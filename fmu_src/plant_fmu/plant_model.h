@@ -1,6 +1,5 @@
 /* The model of the simulated finger: a plant of tendonfmu_plant.h. The plant's time is 0 at the FMU's start time. */
-#ifndef TENDONFMU_PLANT_MODEL_H
-#define TENDONFMU_PLANT_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "plant_settings.h"
@@ -33,5 +32,3 @@ int plant_start_over(model* m, const double* settings);
 
 /* Hands over inputs [input_count]. 0 or -1. */
 int plant_take_inputs(model* m, const double* inputs);
-
-#endif

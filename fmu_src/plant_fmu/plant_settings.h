@@ -1,6 +1,5 @@
 /* The settings of a plant as numbers, one for each parameter of the variable table. */
-#ifndef TENDONFMU_PLANT_SETTINGS_H
-#define TENDONFMU_PLANT_SETTINGS_H
+#pragma once
 
 #include <stddef.h>
 
@@ -31,5 +30,3 @@ model_range setting_range(variable_group_id group, size_t joints);
 
 /* 1 when all are in their ranges, and whole where they are counts or flags. */
 int settings_are_sound(const double numbers[SETTING_COUNT], size_t joints);
-
-#endif

@@ -96,7 +96,8 @@ def external_names(text: str) -> set[str]:
     Parameters
     ----------
     text
-        A source or header of this project: no macro makes a function, and each statement declares one name.
+        A source or header of this project: each statement declares one name, and macros, whose names are in upper
+        case, make no functions but static ones and those of FMI.
 
     Returns
     -------
@@ -110,7 +111,7 @@ def external_names(text: str) -> set[str]:
         if not declared or _OWN.match(declared):
             continue
         found = re.search(r"(\w+)\s*\(", declared) or re.search(r"\w\W+(\w+)\s*(?:\[[^\]]*\]\s*)*$", declared)
-        if found:
+        if found and not found[1].isupper():
             names.add(found[1])
     return names
 
