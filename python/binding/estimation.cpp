@@ -1,15 +1,18 @@
 // The C interface of the estimation as the Python module _estimation: numpy arrays in and out.
+#include <algorithm>
+
 #include "estimation_arrays.h"
 
 namespace {
 
-class bound_estimator {
+class bound_estimator : bound_handle<tendonfmu_estimator, tendonfmu_estimator_destroy, tendonfmu_estimator_last_error> {
  public:
-  bound_estimator(const nb::bytes& image, const std::optional<group_row>& group,
-                  const std::optional<number_row>& scale) {
-    expect_all_numbers(image, group, scale);
-    create(image, group ? group->data() : nullptr, scale ? scale->data() : nullptr);
-  }
+  bound_estimator(const nb::bytes& image, const std::optional<group_row>& group, const std::optional<number_row>& scale)
+      : bound_handle([&](char* message, std::size_t size) {
+          expect_all_numbers(image, group, scale);
+          return tendonfmu_estimator_create(image.data(), image.size(), group ? group->data() : nullptr,
+                                            scale ? scale->data() : nullptr, message, size);
+        }) {}
 
   std::size_t joints() const { return tendonfmu_estimator_joint_count(get()); }
   std::size_t tendons() const { return tendonfmu_estimator_tendon_count(get()); }
@@ -24,16 +27,16 @@ class bound_estimator {
 
   nb::object values(const number_row& z) const {
     expect_unknowns(z);
-    std::vector<double> values(parameters());
-    expect(tendonfmu_estimator_get_values(get(), z.data(), values.data()));
-    return as_array(std::move(values), {parameters()});
+    auto [array, values] = new_array<double>({parameters()});
+    expect(tendonfmu_estimator_get_values(get(), z.data(), values));
+    return array;
   }
 
   nb::object unknown_values(const number_row& values) const {
     check_length(values.shape(0), "values");
-    std::vector<double> z(unknowns());
-    expect(tendonfmu_estimator_get_unknowns(get(), values.data(), z.data()));
-    return as_array(std::move(z), {unknowns()});
+    auto [array, z] = new_array<double>({unknowns()});
+    expect(tendonfmu_estimator_get_unknowns(get(), values.data(), z));
+    return array;
   }
 
   std::size_t add_recording(const number_row& time, const number_rows& force,
@@ -68,35 +71,37 @@ class bound_estimator {
     expect_unknowns(z);
     const std::size_t u = unknowns();
     double cost = 0.0;
-    std::vector<double> gradient(u), information(u * u);
+    auto [gradient, slopes] = new_array<double>({u});
+    auto [information, rows] = new_array<double>({u, u});
     tendonfmu_status status;
     {
       const nb::gil_scoped_release without_gil;
-      status =
-          tendonfmu_estimator_evaluate(get(), z.data(), stride, threads, &cost, gradient.data(), information.data());
+      status = tendonfmu_estimator_evaluate(get(), z.data(), stride, threads, &cost, slopes, rows);
     }
     expect(status);
-    return nb::make_tuple(cost, as_array(std::move(gradient), {u}), as_array(std::move(information), {u, u}));
+    return nb::make_tuple(cost, gradient, information);
   }
 
   nb::tuple jacobian(std::size_t recording, const number_row& z, std::size_t first, std::size_t count) const {
     expect_unknowns(z);
     const std::size_t u = unknowns(), n = joints();
-    std::vector<double> torque(count * n), jump(count * n), by_torque(count * n * u), by_jump(count * n * u);
-    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, torque.data(), jump.data(),
-                                        by_torque.data(), by_jump.data()));
-    return nb::make_tuple(as_array(std::move(torque), {count, n}), as_array(std::move(jump), {count, n}),
-                          as_array(std::move(by_torque), {count, n, u}), as_array(std::move(by_jump), {count, n, u}));
+    auto [torque, torques] = new_array<double>({count, n});
+    auto [jump, jumps] = new_array<double>({count, n});
+    auto [torque_derivative, torque_slopes] = new_array<double>({count, n, u});
+    auto [jump_derivative, jump_slopes] = new_array<double>({count, n, u});
+    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, torques, jumps, torque_slopes,
+                                        jump_slopes));
+    return nb::make_tuple(torque, jump, torque_derivative, jump_derivative);
   }
 
   nb::tuple innovations(std::size_t recording, const number_row& z) const {
     expect_unknowns(z);
     const std::size_t samples = recording < lengths_.size() ? lengths_[recording] : 0, n = joints();
-    std::vector<double> innovation(samples * n), variance(samples), bias(samples * n);
-    expect(
-        tendonfmu_estimator_innovations(get(), recording, z.data(), innovation.data(), variance.data(), bias.data()));
-    return nb::make_tuple(as_array(std::move(innovation), {samples, n}), as_array(std::move(variance), {samples}),
-                          as_array(std::move(bias), {samples, n}));
+    auto [innovation, innovations] = new_array<double>({samples, n});
+    auto [variance, variances] = new_array<double>({samples});
+    auto [bias, biases] = new_array<double>({samples, n});
+    expect(tendonfmu_estimator_innovations(get(), recording, z.data(), innovations, variances, biases));
+    return nb::make_tuple(innovation, variance, bias);
   }
 
   // watch(pass, stride, samples_done, samples, cost, best) -> bool
@@ -104,8 +109,11 @@ class bound_estimator {
                unsigned threads, const nb::object& watch) const {
     expect_unknowns(start);
     const std::size_t u = unknowns();
-    std::vector<double> z(u), gradient(u), information(u * u), covariance(u * u);
-    tendonfmu_fit_result result{z.data(), gradient.data(), information.data(), covariance.data(), 0, 0, 0, 0, 0, 0};
+    auto [z, best] = new_array<double>({u});
+    auto [gradient, slopes] = new_array<double>({u});
+    auto [information, rows] = new_array<double>({u, u});
+    auto [covariance, covariances] = new_array<double>({u, u});
+    tendonfmu_fit_result result{best, slopes, rows, covariances, 0, 0, 0, 0, 0, 0};
     const tendonfmu_fit_options options{prior_std, tolerance, passes, stride, threads};
     fit_watch watching{python_watch(watch), u};
     tendonfmu_status status;
@@ -115,18 +123,18 @@ class bound_estimator {
     }
     watching.watch.rethrow();
     expect(status);
-    nb::dict found;
-    found["z"] = as_array(std::move(z), {u});
-    found["gradient"] = as_array(std::move(gradient), {u});
-    found["information"] = as_array(std::move(information), {u, u});
-    found["covariance"] = as_array(std::move(covariance), {u, u});
-    found["cost"] = result.cost;
-    found["prior_cost"] = result.prior_cost;
-    found["passes"] = result.passes;
-    found["steps"] = result.steps;
-    found["converged"] = result.converged != 0;
-    found["stopped"] = result.stopped != 0;
-    return found;
+    nb::dict fitted;
+    fitted["z"] = z;
+    fitted["gradient"] = gradient;
+    fitted["information"] = information;
+    fitted["covariance"] = covariance;
+    fitted["cost"] = result.cost;
+    fitted["prior_cost"] = result.prior_cost;
+    fitted["passes"] = result.passes;
+    fitted["steps"] = result.steps;
+    fitted["converged"] = result.converged != 0;
+    fitted["stopped"] = result.stopped != 0;
+    return fitted;
   }
 
  private:
@@ -137,29 +145,13 @@ class bound_estimator {
     static int call(void* context, const tendonfmu_fit_progress* p) {
       auto* self = static_cast<fit_watch*>(context);
       return self->watch.ask([&] {
-        const nb::object best = as_array(std::vector<double>(p->best, p->best + self->unknowns), {self->unknowns});
+        auto [best, values] = new_array<double>({self->unknowns});
+        std::copy_n(p->best, self->unknowns, values);
         return nb::make_tuple(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
       });
     }
   };
 
-  struct estimator_deleter {
-    void operator()(tendonfmu_estimator* e) const { tendonfmu_estimator_destroy(e); }
-  };
-
-  void create(const nb::bytes& image, const std::int32_t* group, const double* scale) {
-    char message[600] = "";
-    estimator_.reset(tendonfmu_estimator_create(image.data(), image.size(), group, scale, message, sizeof message));
-    if (!estimator_) {
-      throw nb::value_error(message);
-    }
-  }
-  tendonfmu_estimator* get() const { return estimator_.get(); }
-  void expect(tendonfmu_status status) const {
-    if (status != TENDONFMU_OK) {
-      throw nb::value_error(tendonfmu_estimator_last_error(get()));
-    }
-  }
   void expect_unknowns(const number_row& z) const {
     if (z.shape(0) != unknowns()) {
       throw nb::value_error(("z: expected " + std::to_string(unknowns()) + " unknowns").c_str());
@@ -171,7 +163,6 @@ class bound_estimator {
     }
   }
 
-  std::unique_ptr<tendonfmu_estimator, estimator_deleter> estimator_;
   std::vector<std::size_t> lengths_;
 };
 

@@ -1,33 +1,11 @@
 // What the parts of the module _estimation share: numpy arrays in and out, and a watch in Python.
 #pragma once
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
-#include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
+#include "arrays.h"
 #include "tendonfmu_estimation.h"
 
-namespace nb = nanobind;
-
-using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using group_row = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-// A numpy array that owns `values`.
-inline nb::object as_array(std::vector<double> values, std::vector<std::size_t> shape) {
-  auto* kept = new std::vector<double>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
-}
 
 // group and scale have a number for each of the description. It is counted by the finger alone: an estimator without
 // them may refuse what they allow, such as a law of 0 whose scale is given.
@@ -36,12 +14,8 @@ inline void expect_all_numbers(const nb::bytes& image, const std::optional<group
   if (!group && !scale) {
     return;
   }
-  char message[600] = "";
-  const std::unique_ptr<tendonfmu_finger, decltype(&tendonfmu_destroy)> finger(
-      tendonfmu_create(image.data(), image.size(), message, sizeof message), &tendonfmu_destroy);
-  if (!finger) {
-    throw nb::value_error(message);
-  }
+  const bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu_last_error> finger(
+      [&](char* message, std::size_t size) { return tendonfmu_create(image.data(), image.size(), message, size); });
   const std::size_t count = tendonfmu_parameter_count(finger.get());
   const auto expect = [count](std::size_t length, const char* name) {
     if (length != count) {

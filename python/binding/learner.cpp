@@ -3,14 +3,16 @@
 
 namespace {
 
-class bound_learner {
+class bound_learner : bound_handle<tendonfmu_learner, tendonfmu_learner_destroy, tendonfmu_learner_last_error> {
  public:
   bound_learner(const nb::bytes& image, const std::optional<group_row>& group, const std::optional<number_row>& scale,
-                double prior_std, std::size_t block, double parameter_drift) {
-    const tendonfmu_learner_options options{prior_std, block, parameter_drift};
-    expect_all_numbers(image, group, scale);
-    create(image, group ? group->data() : nullptr, scale ? scale->data() : nullptr, options);
-  }
+                double prior_std, std::size_t block, double parameter_drift)
+      : bound_handle([&](char* message, std::size_t size) {
+          const tendonfmu_learner_options options{prior_std, block, parameter_drift};
+          expect_all_numbers(image, group, scale);
+          return tendonfmu_learner_create(image.data(), image.size(), group ? group->data() : nullptr,
+                                          scale ? scale->data() : nullptr, &options, message, size);
+        }) {}
 
   std::size_t joints() const { return tendonfmu_learner_joint_count(get()); }
   std::size_t tendons() const { return tendonfmu_learner_tendon_count(get()); }
@@ -33,74 +35,53 @@ class bound_learner {
     rows.check(joints(), tendons());
     const std::size_t samples = time.shape(0), n = joints();
     const tendonfmu_inputs inputs = rows.inputs();
-    std::vector<double> innovation(samples * n), variance(samples * n);
+    auto [innovation, innovations] = new_array<double>({samples, n});
+    auto [variance, variances] = new_array<double>({samples, n});
     std::size_t done = 0;
     python_watch watching(watch);
     tendonfmu_status status;
     {
       const nb::gil_scoped_release without_gil;
       status = tendonfmu_learner_run(get(), samples, time.data(), &inputs, source, data(external),
-                                     use ? use->data() : nullptr, innovation.data(), variance.data(), &look, &watching,
-                                     &done);
+                                     use ? use->data() : nullptr, innovations, variances, &look, &watching, &done);
     }
     watching.rethrow();
     expect(status);
-    return nb::make_tuple(as_array(std::move(innovation), {samples, n}), as_array(std::move(variance), {samples, n}),
-                          done);
+    return nb::make_tuple(innovation, variance, done);
   }
 
   void begin_pass() { expect(tendonfmu_learner_begin_pass(get())); }
 
   nb::tuple values() const {
-    std::vector<double> values(parameters()), errors(parameters());
-    expect(tendonfmu_learner_get_values(get(), values.data(), errors.data()));
-    return nb::make_tuple(as_array(std::move(values), {parameters()}), as_array(std::move(errors), {parameters()}));
+    auto [values, numbers] = new_array<double>({parameters()});
+    auto [errors, standard_errors] = new_array<double>({parameters()});
+    expect(tendonfmu_learner_get_values(get(), numbers, standard_errors));
+    return nb::make_tuple(values, errors);
   }
 
   nb::object z() const {
-    std::vector<double> z(unknowns());
-    expect(tendonfmu_learner_get_unknowns(get(), z.data(), nullptr));
-    return as_array(std::move(z), {unknowns()});
+    auto [z, values] = new_array<double>({unknowns()});
+    expect(tendonfmu_learner_get_unknowns(get(), values, nullptr));
+    return z;
   }
 
   nb::object covariance() const {
-    std::vector<double> covariance(unknowns() * unknowns());
-    expect(tendonfmu_learner_get_unknowns(get(), nullptr, covariance.data()));
-    return as_array(std::move(covariance), {unknowns(), unknowns()});
+    auto [covariance, values] = new_array<double>({unknowns(), unknowns()});
+    expect(tendonfmu_learner_get_unknowns(get(), nullptr, values));
+    return covariance;
   }
 
   nb::tuple bias() const {
-    std::vector<double> bias(joints()), errors(joints());
-    expect(tendonfmu_learner_get_bias(get(), bias.data(), errors.data()));
-    return nb::make_tuple(as_array(std::move(bias), {joints()}), as_array(std::move(errors), {joints()}));
+    auto [bias, values] = new_array<double>({joints()});
+    auto [errors, standard_errors] = new_array<double>({joints()});
+    expect(tendonfmu_learner_get_bias(get(), values, standard_errors));
+    return nb::make_tuple(bias, errors);
   }
 
  private:
-  struct learner_deleter {
-    void operator()(tendonfmu_learner* l) const { tendonfmu_learner_destroy(l); }
-  };
-
   static int look(void* context, std::size_t done, std::size_t samples) {
     return static_cast<python_watch*>(context)->ask([&] { return nb::make_tuple(done, samples); });
   }
-
-  void create(const nb::bytes& image, const std::int32_t* group, const double* scale,
-              const tendonfmu_learner_options& options) {
-    char message[600] = "";
-    learner_.reset(
-        tendonfmu_learner_create(image.data(), image.size(), group, scale, &options, message, sizeof message));
-    if (!learner_) {
-      throw nb::value_error(message);
-    }
-  }
-  tendonfmu_learner* get() const { return learner_.get(); }
-  void expect(tendonfmu_status status) const {
-    if (status != TENDONFMU_OK) {
-      throw nb::value_error(tendonfmu_learner_last_error(get()));
-    }
-  }
-
-  std::unique_ptr<tendonfmu_learner, learner_deleter> learner_;
 };
 
 }  // namespace

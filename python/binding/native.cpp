@@ -1,28 +1,11 @@
 // The C interface as the Python module _native: numpy arrays in and out, one call for a whole recording.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
-#include <algorithm>
 #include <cstring>
-#include <memory>
-#include <optional>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
+#include "arrays.h"
 #include "output_table.h"
 #include "tendonfmu_description.h"
 
-namespace nb = nanobind;
-
 namespace {
-
-using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using time_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 nb::bytes image_from_json(const nb::bytes& json) {
   void* image = nullptr;
@@ -44,24 +27,18 @@ std::string image_guid(const nb::bytes& image, unsigned long long salt) {
   return guid;
 }
 
-// A new numpy array.
-template <typename Number>
-nb::object new_array(const std::vector<std::size_t>& shape, void** data) {
-  std::size_t count = 1;
-  for (const std::size_t length : shape) {
-    count *= length;
-  }
-  auto values = std::make_unique<std::vector<Number>>(count);
-  *data = values->data();
-  nb::capsule owner(values.release(), [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, Number>(*data, shape.size(), shape.data(), owner));
+template <typename Value>
+nb::object new_array_of(const std::vector<std::size_t>& shape, void** data) {
+  auto [array, values] = new_array<Value>(shape);
+  *data = values;
+  return array;
 }
 
-nb::object new_array(output_type type, const std::vector<std::size_t>& shape, void** data) {
+nb::object new_output(output_type type, const std::vector<std::size_t>& shape, void** data) {
   switch (type) {
-    case output_type::number: return new_array<double>(shape, data);
-    case output_type::flag: return new_array<unsigned char>(shape, data);
-    default: return new_array<int>(shape, data);
+    case output_type::number: return new_array_of<double>(shape, data);
+    case output_type::flag: return new_array_of<unsigned char>(shape, data);
+    default: return new_array_of<int>(shape, data);
   }
 }
 
@@ -70,63 +47,57 @@ void set_array(tendonfmu_outputs& outputs, const output_row& row, void* data) {
   std::memcpy(reinterpret_cast<char*>(&outputs) + row.offset, &data, sizeof data);
 }
 
-class bound_finger {
+class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu_last_error> {
  public:
-  explicit bound_finger(const nb::bytes& image) {
-    char message[600] = "";
-    handle_ = tendonfmu_create(image.data(), image.size(), message, sizeof message);
-    if (handle_ == nullptr) {
-      throw nb::value_error(message);
-    }
-  }
-  ~bound_finger() { tendonfmu_destroy(handle_); }
-  bound_finger(const bound_finger&) = delete;
-  bound_finger& operator=(const bound_finger&) = delete;
+  explicit bound_finger(const nb::bytes& image)
+      : bound_handle([&](char* message, std::size_t size) {
+          return tendonfmu_create(image.data(), image.size(), message, size);
+        }) {}
 
-  std::size_t joints() const { return tendonfmu_joint_count(handle_); }
-  std::size_t tendons() const { return tendonfmu_tendon_count(handle_); }
-  bool has_links() const { return tendonfmu_has_links(handle_) != 0; }
-  bool watches_rest() const { return tendonfmu_watches_rest(handle_) != 0; }
-  bool watches_sensors() const { return tendonfmu_watches_sensors(handle_) != 0; }
-  std::size_t parameter_count() const { return tendonfmu_parameter_count(handle_); }
-  std::string kernel() const { return tendonfmu_get_kernel(handle_); }
-  void set_kernel(const std::string& name) { check(tendonfmu_set_kernel(handle_, name.c_str())); }
-  int source() const { return tendonfmu_get_kinematics_source(handle_); }
-  void set_source(int source) { check(tendonfmu_set_kinematics_source(handle_, source)); }
-  void reset() { check(tendonfmu_reset(handle_)); }
+  std::size_t joints() const { return tendonfmu_joint_count(get()); }
+  std::size_t tendons() const { return tendonfmu_tendon_count(get()); }
+  bool has_links() const { return tendonfmu_has_links(get()) != 0; }
+  bool watches_rest() const { return tendonfmu_watches_rest(get()) != 0; }
+  bool watches_sensors() const { return tendonfmu_watches_sensors(get()) != 0; }
+  std::size_t parameter_count() const { return tendonfmu_parameter_count(get()); }
+  std::string kernel() const { return tendonfmu_get_kernel(get()); }
+  void set_kernel(const std::string& name) { expect(tendonfmu_set_kernel(get(), name.c_str())); }
+  int source() const { return tendonfmu_get_kinematics_source(get()); }
+  void set_source(int source) { expect(tendonfmu_set_kinematics_source(get(), source)); }
+  void reset() { expect(tendonfmu_reset(get())); }
 
   std::string parameter_path(std::size_t index) const {
     char path[80];
-    check(tendonfmu_get_parameter_path(handle_, index, path, sizeof path));
+    expect(tendonfmu_get_parameter_path(get(), index, path, sizeof path));
     return path;
   }
   nb::tuple parameter_info(std::size_t index) const {
     tendonfmu_parameter_info i;
-    check(tendonfmu_get_parameter_info(handle_, index, &i));
+    expect(tendonfmu_get_parameter_info(get(), index, &i));
     return nb::make_tuple(i.start, i.minimum, i.maximum, i.above_minimum != 0, i.tunable != 0, i.unit);
   }
-  std::size_t find_parameter(const std::string& path) const { return tendonfmu_find_parameter(handle_, path.c_str()); }
+  std::size_t find_parameter(const std::string& path) const { return tendonfmu_find_parameter(get(), path.c_str()); }
   std::vector<double> get_parameters(const std::vector<std::size_t>& indices) const {
     std::vector<double> values(indices.size());
-    check(tendonfmu_get_parameters(handle_, indices.size(), indices.data(), values.data()));
+    expect(tendonfmu_get_parameters(get(), indices.size(), indices.data(), values.data()));
     return values;
   }
   void set_parameters(const std::vector<std::size_t>& indices, const std::vector<double>& values) {
     if (indices.size() != values.size()) {
       throw nb::value_error("as many values as indices expected");
     }
-    check(tendonfmu_set_parameters(handle_, indices.size(), indices.data(), values.data()));
+    expect(tendonfmu_set_parameters(get(), indices.size(), indices.data(), values.data()));
   }
 
   nb::bytes save_state() const {
-    std::vector<unsigned char> bytes(tendonfmu_state_size(handle_));
-    check(tendonfmu_save_state(handle_, bytes.data(), bytes.size()));
+    std::vector<unsigned char> bytes(tendonfmu_state_size(get()));
+    expect(tendonfmu_save_state(get(), bytes.data(), bytes.size()));
     return nb::bytes(bytes.data(), bytes.size());
   }
-  void restore_state(const nb::bytes& bytes) { check(tendonfmu_restore_state(handle_, bytes.data(), bytes.size())); }
+  void restore_state(const nb::bytes& bytes) { expect(tendonfmu_restore_state(get(), bytes.data(), bytes.size())); }
 
   // Name of each output to its rows.
-  nb::dict run(const time_row& time, const std::optional<number_rows>& force,
+  nb::dict run(const number_row& time, const std::optional<number_rows>& force,
                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
                const std::optional<number_rows>& velocity, bool with_parts) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
@@ -138,7 +109,7 @@ class bound_finger {
     for (const output_row& row : output_table) {
       if (row.need == output_need::parts ? with_parts : has(row.need)) {
         void* data = nullptr;
-        arrays[row.name] = new_array(row.type, shape_of(row.size, samples), &data);
+        arrays[row.name] = new_output(row.type, shape_of(row.size, samples), &data);
         set_array(outputs, row, data);
       }
     }
@@ -146,10 +117,10 @@ class bound_finger {
     tendonfmu_status status;
     {
       nb::gil_scoped_release released;
-      status = tendonfmu_run(handle_, samples, time.data(), &inputs, &outputs, &done);
+      status = tendonfmu_run(get(), samples, time.data(), &inputs, &outputs, &done);
     }
     if (status != TENDONFMU_OK) {
-      throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(handle_)).c_str());
+      throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(get())).c_str());
     }
     return arrays;
   }
@@ -162,7 +133,7 @@ class bound_finger {
         if (row.need != output_need::parts && has(row.need)) {
           void* data = nullptr;
           const std::vector<std::size_t> shape = shape_of(row.size, 1);
-          arrays[row.name] = new_array(row.type, {shape.back()}, &data);
+          arrays[row.name] = new_output(row.type, {shape.back()}, &data);
           set_array(step_pointers_, row, data);
         }
       }
@@ -182,7 +153,7 @@ class bound_finger {
     const std::size_t n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {numbers(force, m, "tendon_force"), numbers(position, m, "tendon_position"),
                                      numbers(angle, n, "joint_position"), numbers(velocity, n, "joint_velocity")};
-    check(tendonfmu_run(handle_, 1, &time, &inputs, &step_pointers_, nullptr));
+    expect(tendonfmu_run(get(), 1, &time, &inputs, &step_pointers_, nullptr));
   }
 
   // Name of each output that has a derivative to its n slopes.
@@ -197,17 +168,16 @@ class bound_finger {
     for (const output_row& row : output_table) {
       if (row.has_derivative) {
         void* data = nullptr;
-        slopes[row.name] = new_array(row.type, {n}, &data);
+        slopes[row.name] = new_output(row.type, {n}, &data);
         set_array(derivative, row, data);
       }
     }
     const tendonfmu_inputs direction = {force.data(), position.data(), angle.data(), velocity.data()};
-    check(tendonfmu_get_directional_derivative(handle_, &direction, &derivative));
+    expect(tendonfmu_get_directional_derivative(get(), &direction, &derivative));
     return slopes;
   }
 
  private:
-  tendonfmu_finger* handle_ = nullptr;
   nb::dict step_arrays_ = nb::steal<nb::dict>(nb::handle());  // made by the first step_outputs()
   tendonfmu_outputs step_pointers_ = {};
 
@@ -227,14 +197,6 @@ class bound_finger {
       case output_size::parts: return {samples, joints(), tendons() + 3};
       default: return {samples};
     }
-  }
-
-  void check(tendonfmu_status status) const {
-    if (status == TENDONFMU_OK) {
-      return;
-    }
-    const std::string reason = tendonfmu_last_error(handle_);
-    throw nb::value_error(reason.empty() ? "bad argument" : reason.c_str());
   }
 
   static const double* rows(const std::optional<number_rows>& array, std::size_t samples, std::size_t columns,

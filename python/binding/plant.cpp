@@ -1,27 +1,14 @@
 // The simulated finger (tendonfmu_plant.h) as the Python module _plant: numpy arrays in and out, many samples in a
 // call.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/array.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "arrays.h"
 #include "tendonfmu_plant.h"
-
-namespace nb = nanobind;
 
 namespace {
 
-using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using plant_signals = tendonfmu_plant_signals;
 
 enum class signal_size { one, three, six, joints, tendons };
@@ -73,37 +60,22 @@ const Entry* find(const Entry (&entries)[count], const std::string& name) {
   return nullptr;
 }
 
-// A numpy array that owns its values, and the values.
-template <typename Value>
-std::pair<nb::object, Value*> new_array(std::size_t rows, std::size_t columns) {
-  auto* kept = new std::vector<Value>(rows * columns);
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
-  const std::size_t shape[] = {rows, columns};
-  return {nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), 2, shape, owner)), kept->data()};
-}
-
-class bound_plant {
+class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendonfmu_plant_last_error> {
  public:
-  explicit bound_plant(const nb::bytes& json) {
-    char message[600] = "";
-    handle_ = tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, sizeof message);
-    if (handle_ == nullptr) {
-      throw nb::value_error(message);
-    }
-  }
-  ~bound_plant() { tendonfmu_plant_destroy(handle_); }
-  bound_plant(const bound_plant&) = delete;
-  bound_plant& operator=(const bound_plant&) = delete;
+  explicit bound_plant(const nb::bytes& json)
+      : bound_handle([&](char* message, std::size_t size) {
+          return tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, size);
+        }) {}
 
-  std::size_t joints() const { return tendonfmu_plant_joint_count(handle_); }
-  std::size_t tendons() const { return tendonfmu_plant_tendon_count(handle_); }
-  std::size_t order() const { return tendonfmu_plant_order(handle_); }
-  double time() const { return tendonfmu_plant_get_time(handle_); }
-  bool initialised() const { return tendonfmu_plant_is_initialised(handle_) != 0; }
+  std::size_t joints() const { return tendonfmu_plant_joint_count(get()); }
+  std::size_t tendons() const { return tendonfmu_plant_tendon_count(get()); }
+  std::size_t order() const { return tendonfmu_plant_order(get()); }
+  double time() const { return tendonfmu_plant_get_time(get()); }
+  bool initialised() const { return tendonfmu_plant_is_initialised(get()) != 0; }
 
   nb::tuple settings() const {
     tendonfmu_plant_settings s;
-    check(tendonfmu_plant_get_settings(handle_, &s));
+    check(tendonfmu_plant_get_settings(get(), &s));
     return nb::make_tuple(s.integrator, s.relative_tolerance, s.step, s.scheduled_motion != 0, s.scheduled_pushes != 0,
                           s.sensors != 0, s.seed,
                           std::array<double, 3>{s.push_point[0], s.push_point[1], s.push_point[2]}, s.push_link);
@@ -112,7 +84,7 @@ class bound_plant {
                     std::uint64_t seed, const std::array<double, 3>& point, int link) {
     const tendonfmu_plant_settings s = {
         integrator, tolerance, step, motion, pushes, sensors, seed, {point[0], point[1], point[2]}, link};
-    check(tendonfmu_plant_set_settings(handle_, &s));
+    check(tendonfmu_plant_set_settings(get(), &s));
   }
   void set_inputs(const std::optional<std::vector<double>>& command, double pretension,
                   const std::array<double, 3>& push) {
@@ -121,19 +93,19 @@ class bound_plant {
     }
     const tendonfmu_plant_inputs inputs = {
         command ? command->data() : nullptr, pretension, {push[0], push[1], push[2]}};
-    check(tendonfmu_plant_set_inputs(handle_, &inputs));
+    check(tendonfmu_plant_set_inputs(get(), &inputs));
   }
 
   void initialise() {
-    check(released([this] { return tendonfmu_plant_initialise(handle_); }));
+    check(released([this] { return tendonfmu_plant_initialise(get()); }));
   }
   void advance(double time) {
-    check(released([this, time] { return tendonfmu_plant_advance(handle_, time); }));
+    check(released([this, time] { return tendonfmu_plant_advance(get(), time); }));
   }
-  void reset() { check(tendonfmu_plant_reset(handle_)); }
+  void reset() { check(tendonfmu_plant_reset(get())); }
   std::vector<double> hold_command() const {
     std::vector<double> command(tendons());
-    check(tendonfmu_plant_hold_command(handle_, command.data()));
+    check(tendonfmu_plant_hold_command(get(), command.data()));
     return command;
   }
 
@@ -141,41 +113,41 @@ class bound_plant {
   nb::dict run(const number_row& time, const std::vector<std::string>& names) {
     const std::size_t samples = time.shape(0);
     plant_signals signals = {};
-    nb::dict found;
+    nb::dict arrays;
     for (const std::string& name : names) {
       if (const number_signal* number = find(numbers, name)) {
-        auto [array, values] = new_array<double>(samples, size_of(number->size));
+        auto [array, values] = new_array<double>({samples, size_of(number->size)});
         signals.*(number->place) = values;
-        found[name.c_str()] = array;
+        arrays[name.c_str()] = array;
       } else if (const flag_signal* flag = find(flags, name)) {
-        auto [array, values] = new_array<unsigned char>(samples, size_of(flag->size));
+        auto [array, values] = new_array<unsigned char>({samples, size_of(flag->size)});
         signals.*(flag->place) = values;
-        found[name.c_str()] = array;
+        arrays[name.c_str()] = array;
       } else {
         throw nb::value_error(("no signal " + name).c_str());
       }
     }
-    check(released([&] { return tendonfmu_plant_run(handle_, samples, time.data(), &signals, nullptr); }));
-    return found;
+    check(released([&] { return tendonfmu_plant_run(get(), samples, time.data(), &signals, nullptr); }));
+    return arrays;
   }
 
   nb::bytes save_state() const {
-    std::vector<unsigned char> bytes(tendonfmu_plant_state_size(handle_));
-    check(tendonfmu_plant_save_state(handle_, bytes.data(), bytes.size()));
+    std::vector<unsigned char> bytes(tendonfmu_plant_state_size(get()));
+    check(tendonfmu_plant_save_state(get(), bytes.data(), bytes.size()));
     return nb::bytes(bytes.data(), bytes.size());
   }
   void restore_state(const nb::bytes& bytes) {
-    check(tendonfmu_plant_restore_state(handle_, bytes.data(), bytes.size()));
+    check(tendonfmu_plant_restore_state(get(), bytes.data(), bytes.size()));
   }
   nb::tuple statistics() const {
     tendonfmu_plant_statistics s;
-    check(tendonfmu_plant_get_statistics(handle_, &s));
+    check(tendonfmu_plant_get_statistics(get(), &s));
     return nb::make_tuple(s.steps, s.right_hand_sides, s.jacobians, s.roots, s.restarts);
   }
 
   nb::object continuous_state() const {
-    auto [array, values] = new_array<double>(1, order());
-    check(tendonfmu_plant_get_continuous_state(handle_, values));
+    auto [array, values] = new_array<double>({1, order()});
+    check(tendonfmu_plant_get_continuous_state(get(), values));
     return array;
   }
   // [1, order] and, when wanted, [order, order]
@@ -184,16 +156,14 @@ class bound_plant {
     if (state.shape(0) != size) {
       throw nb::value_error(("derivative: expected a state of " + std::to_string(size) + " numbers").c_str());
     }
-    auto [slope, slope_values] = new_array<double>(1, size);
-    auto [jacobian, jacobian_values] = new_array<double>(with_jacobian ? size : 0, size);
-    check(tendonfmu_plant_derivative(handle_, time, state.data(), slope_values,
-                                     with_jacobian ? jacobian_values : nullptr));
+    auto [slope, slope_values] = new_array<double>({1, size});
+    auto [jacobian, jacobian_values] = new_array<double>({with_jacobian ? size : 0, size});
+    check(
+        tendonfmu_plant_derivative(get(), time, state.data(), slope_values, with_jacobian ? jacobian_values : nullptr));
     return nb::make_tuple(slope, jacobian);
   }
 
  private:
-  tendonfmu_plant* handle_ = nullptr;
-
   // Other Python threads go on while the plant integrates.
   template <typename Call>
   static tendonfmu_plant_status released(const Call& call) {
@@ -203,17 +173,10 @@ class bound_plant {
 
   // ValueError for what was asked, RuntimeError for what the integrator could not do.
   void check(tendonfmu_plant_status status) const {
-    if (status == TENDONFMU_PLANT_OK) {
-      return;
-    }
-    std::string reason = tendonfmu_plant_last_error(handle_);
-    if (reason.empty()) {
-      reason = "bad argument";
-    }
     if (status == TENDONFMU_PLANT_SOLVER) {
-      throw std::runtime_error(reason);
+      throw std::runtime_error(reason());
     }
-    throw nb::value_error(reason.c_str());
+    expect(status);
   }
 
   std::size_t size_of(signal_size size) const {

@@ -1,0 +1,63 @@
+// What the modules share: numpy arrays in and out, and handles of the C interfaces.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <functional>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace nb = nanobind;
+
+using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// A new numpy array of zeros, and its values.
+template <typename Value>
+std::pair<nb::object, Value*> new_array(const std::vector<std::size_t>& shape) {
+  const std::size_t count = std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+  auto* kept = new std::vector<Value>(count);
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
+  return {nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), shape.size(), shape.data(), owner)), kept->data()};
+}
+
+// What tendonfmu_<thing>_create() gave. create(message, message_size) calls it; its refusal is a ValueError.
+template <typename Handle, void (*destroy)(Handle*), const char* (*last_error)(const Handle*)>
+class bound_handle {
+ public:
+  template <typename Create>
+  explicit bound_handle(const Create& create) {
+    char message[600] = "";
+    handle_.reset(create(message, sizeof message));
+    if (!handle_) {
+      throw nb::value_error(message);
+    }
+  }
+  Handle* get() const { return handle_.get(); }
+  std::string reason() const {
+    const std::string line = last_error(get());
+    return line.empty() ? "bad argument" : line;
+  }
+  // ValueError with the reason, unless the status is OK, which is 0.
+  template <typename Status>
+  void expect(Status status) const {
+    if (status != Status{}) {
+      throw nb::value_error(reason().c_str());
+    }
+  }
+
+ private:
+  struct deleter {
+    void operator()(Handle* handle) const { destroy(handle); }
+  };
+  std::unique_ptr<Handle, deleter> handle_;
+};
