@@ -1,7 +1,6 @@
 /* Generated from the tables in runtime/description by `python tools/tables/generate.py`: do not edit. */
 /* clang-format off */
-#ifndef TENDONFMU_OUTPUT_TABLE_H
-#define TENDONFMU_OUTPUT_TABLE_H
+#pragma once
 
 #include <cstddef>
 
@@ -47,5 +46,3 @@ constexpr output_row output_table[] = {
     {"sensor_fault", offsetof(tendonfmu_outputs, sensor_fault), output_type::flag, output_size::tendons, output_need::sensor_fault, false},
     {"contact_observable", offsetof(tendonfmu_outputs, contact_observable), output_type::flag, output_size::scalar, output_need::sensor_fault, false},
 };
-
-#endif

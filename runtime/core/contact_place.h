@@ -1,13 +1,8 @@
 /* Where a finger is touched, as far as torques tell: the force at the tip and the least link that explains them
  * (docs/reference/semantics.md#link-geometry). */
-#ifndef TENDONFMU_CONTACT_PLACE_H
-#define TENDONFMU_CONTACT_PLACE_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 typedef struct tip_force {
   double force[3];     /* N, base frame; 0 along what the torques do not tell */
@@ -33,9 +28,3 @@ typedef struct contact_place {
 
 /* Of the sample last taken, from its outputs alone; all 0 without links. */
 contact_place find_contact_place(const tendonfmu_finger* finger);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,12 +1,7 @@
 /* Directional derivative of the last sample's outputs by its inputs. */
-#ifndef TENDONFMU_DIRECTIONAL_DERIVATIVE_H
-#define TENDONFMU_DIRECTIONAL_DERIVATIVE_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes. */
 void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
@@ -21,9 +16,3 @@ typedef struct state_direction {
 /* entry [2·n·m + 2·n] ∂(b·what acts) of every place (parameter_derivative.h); NULL: not wanted. */
 void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump,
                   double* entry);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

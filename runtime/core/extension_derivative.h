@@ -1,12 +1,7 @@
 /* The part of the parameters' derivative that the extensions make (parameter_derivative.h). */
-#ifndef TENDONFMU_EXTENSION_DERIVATIVE_H
-#define TENDONFMU_EXTENSION_DERIVATIVE_H
+#pragma once
 
 #include "parameter_derivative.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Appends the slopes by every number of every extension to the plain terms; the places are read already. */
 void extension_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);
@@ -23,9 +18,3 @@ void extension_place_slopes(const tendonfmu_finger* finger, const parameter_deri
 
 /* ∂(b·what acts) of every place [places] by number k of the row_number-th signal row. */
 void extension_entry_slopes(const tendonfmu_finger* finger, size_t row_number, uint32_t k, double* entry);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,13 +1,8 @@
 /* What the effects beyond the paper do to the signals of a sample, and the derivatives of all that follows by their
  * numbers (docs/reference/semantics.md#signals-of-extensions). */
-#ifndef TENDONFMU_EXTENSION_SIGNALS_H
-#define TENDONFMU_EXTENSION_SIGNALS_H
+#pragma once
 
 #include "extensions.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Signals in scratch, before the joint angles are known (late 0) and after (late 1); time of the sample, s. */
 void shape_signals(tendonfmu_finger* finger, double time, int late);
@@ -40,9 +35,3 @@ const double* signal_slopes(const tendonfmu_finger* finger, const extension_row*
 /* Turns a direction of the inputs into that of what the signal rows made of them, at the sample last remembered; before
  * (late 0) and after the joint angles are known. */
 void pass_signals(const tendonfmu_finger* finger, signal_derivative* derivative, int late);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -27,7 +27,7 @@ static void note_row(row_search* search, uint32_t index, uint32_t first_paramete
   const effect_type* effect = effect_by_id(words[0]);
   const effect_place place = model_extension_place(&f->shape, index);
   const size_t all = model_extension_memory(effect, &f->shape, place);
-  const size_t own = effect->state_count ? effect->state_count(f->joints, f->tendons, place) : 0;
+  const size_t own = model_effect_memory(effect, &f->shape, place);
   if (effect->kind == search->kind && effect->order == search->order) {
     double *memory = f->remembered.extension + search->memory, *next = f->scratch.extension + search->memory;
     f->extensions.row[search->found++] = (extension_row){.effect = effect,

@@ -1,13 +1,8 @@
 /* The effects beyond the paper that a finger carries: what they remember, what they do to signals, friction and torques
  * of a sample (docs/reference/semantics.md#extensions). */
-#ifndef TENDONFMU_EXTENSIONS_H
-#define TENDONFMU_EXTENSIONS_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Fills the table of rows and the cosines between the axes; whenever numbers were derived anew. */
 void find_extensions(tendonfmu_finger* finger);
@@ -86,9 +81,3 @@ void remember_extensions(tendonfmu_finger* finger);
 
 /* The sample as torque rows see it. */
 effect_sample remembered_sample(const tendonfmu_finger* finger);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -2,9 +2,11 @@
 
 #include "finger_memory.h"
 
-#include "presliding_step.h"
-
+#include <float.h>
+#include <stddef.h>
 #include <string.h>
+
+#include "presliding_step.h"
 
 /* Every array begins at a multiple of 64 bytes, a cache line. The rows of the state follow each other without gaps,
  * each a multiple of 32 bytes: aligned loads in every kernel. */
@@ -112,58 +114,91 @@ static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   lay_out_layer(&f->extensions.overruled, slots, c);
 }
 
+#define AT(name)     offsetof(finger_state, name)
+#define ANYTHING     -DBL_MAX, DBL_MAX, 0
+#define FLAG         0.0, 1.0, 1
+#define SIGN         -1.0, 1.0, 1
+#define UP_TO(most)  0.0, most, 0
+#define WITHIN(most) -(most), most, 0
+
+const state_row state_rows[] = {
+    {AT(angle), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(speed), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(torque), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(friction), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(compensated), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(bias), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(joint_contact), ROW_OF_JOINTS, 1, 0, FLAG, 0},
+    {AT(variance), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SQUARE), 1},
+    {AT(gain), ROW_OF_JOINTS, 1, 0, UP_TO(1.0), 1},
+    {AT(residual), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(innovation), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(tracked), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
+    {AT(stuck_friction), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
+    {AT(friction_jump), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
+    {AT(evidence), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_TIME), 0},
+    {AT(exceeded_at), ROW_OF_JOINTS, 1, 0, WITHIN(LARGEST_TIME), 0},
+    {AT(total_variance), ROW_OF_JOINTS, 1, 0, UP_TO(DBL_MAX), 1},
+    {AT(force), ROW_OF_TENDONS, 1, 0, ANYTHING, 0},
+    {AT(slack), ROW_OF_TENDONS, 1, 0, FLAG, 0},
+    {AT(moving), ROW_OF_SLOTS, 1, 0, FLAG, 0},
+    {AT(side), ROW_OF_SLOTS, 1, 0, SIGN, 0},
+    {AT(side_before), ROW_OF_SLOTS, 1, 0, SIGN, 0},
+    {AT(event), ROW_OF_SLOTS, 1, 0, SIGN, 0},
+    {AT(stuck_since), ROW_OF_SLOTS, 1, 0, -LARGEST_TIME, LARGEST_SQUARE, 0, 1}, /* of time, or of absorption */
+    {AT(last_stuck), ROW_OF_SLOTS, 1, 0, WITHIN(LARGEST_TIME), 1},
+    {AT(entry_edge), ROW_OF_SLOTS, 1, MODEL_REMEMBERS_ENTRY_LOAD, ANYTHING, 1},
+    {AT(entry_pulley), ROW_OF_SLOTS, 1, MODEL_REMEMBERS_ENTRY_LOAD, ANYTHING, 1},
+    {AT(start_left), ROW_OF_SLOTS, 1, MODEL_HAS_START_SHARE, UP_TO(1.0), 0},
+    {AT(unlearned), ROW_OF_JOINTS, 1, MODEL_HAS_START_SHARE, UP_TO(LARGEST_SUM), 0},
+    {AT(part), ROW_OF_PARTS, 1, MODEL_HAS_UNCERTAINTY, ANYTHING, 1},
+    {AT(filter), ROW_OF_JOINTS, FILTER_ROWS, MODEL_HAS_POSITION_FILTER, ANYTHING, 1},
+    {AT(drift_of_late), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
+    {AT(drift_quick), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
+    {AT(drift_slow), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
+    {AT(learned), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
+    {AT(drift), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
+    {AT(contact_change), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(rest_tracked), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(rest_contact), ROW_OF_JOINTS, 1, MODEL_HAS_REST, FLAG, 0},
+    {AT(rest_extreme), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(carried_load), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(smooth_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(mark_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(mark_position), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(recent_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(recent_position), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(sensor), ROW_OF_TENDONS, SENSOR_ROWS, MODEL_HAS_SENSOR_FAULT, ANYTHING, 1},
+    {AT(watch), ROW_OF_JOINTS, 1, MODEL_HAS_SENSOR_FAULT, 0.0, JOINT_BEGINS_ANEW, 1, 0},
+    {AT(extension), ROW_OF_EXTENSIONS, 1, 0, ANYTHING, 1},
+};
+const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
+
+size_t state_row_length(const tendonfmu_finger* finger, const state_row* row) {
+  if ((finger->shape.options & row->option) != row->option) {
+    return 0;
+  }
+  switch (row->lanes) {
+    case ROW_OF_JOINTS: return row->rows * finger->joint_lanes;
+    case ROW_OF_TENDONS: return row->rows * finger->tendon_lanes;
+    case ROW_OF_SLOTS: return row->rows * finger->slots;
+    case ROW_OF_PARTS: return finger->joints * finger->tendon_lanes + 3 * finger->joint_lanes;
+    default: return finger->shape.extension_memory;
+  }
+}
+
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
-  finger_state* s = &f->remembered;
-  const size_t joints = f->joint_lanes, tendons = f->tendon_lanes, slots = f->slots;
-  const size_t entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? slots : 0;
-  const size_t parts = f->shape.options & MODEL_HAS_UNCERTAINTY ? f->joints * tendons + 3 * joints : 0;
-  const size_t filter = f->shape.options & MODEL_HAS_POSITION_FILTER ? FILTER_ROWS * joints : 0;
-  const size_t rests = f->shape.options & MODEL_HAS_REST ? 1 : 0;
-  const size_t starts = f->shape.options & MODEL_HAS_START_SHARE ? 1 : 0;
-  const size_t drifts = f->shape.options & MODEL_HAS_DRIFT ? 1 : 0;
-  const size_t sensors = f->shape.options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
-  f->state_count = STATE_SCALARS + 17 * joints + 2 * tendons + 6 * slots + 2 * entries + parts + filter +
-                   starts * (slots + joints) + drifts * 5 * joints + rests * (5 * joints + 5 * tendons) +
-                   sensors * (SENSOR_ROWS * tendons + joints) + f->shape.extension_memory;
+  f->state_count = STATE_SCALARS;
+  for (size_t k = 0; k < state_row_count; ++k) {
+    f->state_count += state_row_length(f, &state_rows[k]);
+  }
   f->state = take_numbers(c, f->state_count + (f->shape.extension_count ? PRESLIDING_NUMBERS : 0));
   double* run = f->state;
-  s->scalar = part(&run, STATE_SCALARS);
-  double** const joint_rows[] = {
-      &s->angle,          &s->speed,         &s->torque,   &s->friction,    &s->compensated,   &s->bias,
-      &s->joint_contact,  &s->variance,      &s->gain,     &s->residual,    &s->innovation,    &s->tracked,
-      &s->stuck_friction, &s->friction_jump, &s->evidence, &s->exceeded_at, &s->total_variance};
-  for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
-    *joint_rows[i] = part(&run, joints);
+  f->remembered.scalar = part(&run, STATE_SCALARS);
+  for (size_t k = 0; k < state_row_count; ++k) {
+    double** pointer = (double**)(void*)((char*)&f->remembered + state_rows[k].place);
+    *pointer = part(&run, state_row_length(f, &state_rows[k]));
   }
-  s->force = part(&run, tendons);
-  s->slack = part(&run, tendons);
-  double** const slot_rows[] = {&s->moving, &s->side, &s->side_before, &s->event, &s->stuck_since, &s->last_stuck};
-  for (size_t i = 0; i < sizeof slot_rows / sizeof slot_rows[0]; ++i) {
-    *slot_rows[i] = part(&run, slots);
-  }
-  s->entry_edge = part(&run, entries);
-  s->entry_pulley = part(&run, entries);
-  s->start_left = part(&run, starts * slots);
-  s->unlearned = part(&run, starts * joints);
-  s->part = part(&run, parts);
-  s->filter = part(&run, filter);
-  double** const drift_rows[] = {&s->drift_of_late, &s->drift_quick, &s->drift_slow, &s->learned, &s->drift};
-  for (size_t i = 0; i < sizeof drift_rows / sizeof drift_rows[0]; ++i) {
-    *drift_rows[i] = part(&run, drifts * joints);
-  }
-  double** const rest_of_joints[] = {&s->contact_change, &s->rest_tracked, &s->rest_contact, &s->rest_extreme,
-                                     &s->carried_load};
-  for (size_t i = 0; i < sizeof rest_of_joints / sizeof rest_of_joints[0]; ++i) {
-    *rest_of_joints[i] = part(&run, rests * joints);
-  }
-  double** const rest_of_tendons[] = {&s->smooth_force, &s->mark_force, &s->mark_position, &s->recent_force,
-                                      &s->recent_position};
-  for (size_t i = 0; i < sizeof rest_of_tendons / sizeof rest_of_tendons[0]; ++i) {
-    *rest_of_tendons[i] = part(&run, rests * tendons);
-  }
-  s->sensor = part(&run, sensors * SENSOR_ROWS * tendons);
-  s->watch = part(&run, sensors * joints);
-  s->extension = run;
 }
 
 static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {

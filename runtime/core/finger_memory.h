@@ -5,17 +5,12 @@
  * relative velocity has one slot, n rows of tendon lanes (ẋ_ij, eq. 5) and then a row of joint lanes (q̇_j). The
  * friction effects that share a velocity (F_B before joint j and F_A of pulley j−1; T_jv0 and T_jvf) move and stick
  * together, so what fig. 5 remembers of an effect is kept once per slot. */
-#ifndef TENDONFMU_FINGER_MEMORY_H
-#define TENDONFMU_FINGER_MEMORY_H
+#pragma once
 
 #include "friction_law.h"
 #include "link_geometry.h"
 #include "model_image.h"
 #include "tendonfmu.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum { ERROR_BYTES = 400 };
 
@@ -23,6 +18,10 @@ enum { ERROR_BYTES = 400 };
  * and squares. */
 #define LARGEST_SUM    1e150
 #define LARGEST_SQUARE 1e300
+
+/* Beyond this, in magnitude, no input is a measurement; below it no product in a step overflows for sane parameters. */
+#define LARGEST_INPUT 1e12
+#define LARGEST_TIME  1e15 /* s */
 
 /* Numbers of the description that are neither per joint nor per tendon. */
 typedef struct finger_settings {
@@ -229,6 +228,24 @@ typedef struct finger_state {
   double* extension;                                 /* as the extensions ask for */
 } finger_state;
 
+/* Which lanes of a row stand for something; the others hold 0, unless they are tracked along. */
+typedef enum row_lanes { ROW_OF_JOINTS, ROW_OF_TENDONS, ROW_OF_SLOTS, ROW_OF_PARTS, ROW_OF_EXTENSIONS } row_lanes;
+
+/* A row of the state, or some of a kind: where finger_state points to it, and what may stand in a saved one. */
+typedef struct state_row {
+  size_t place; /* offset in finger_state */
+  row_lanes lanes;
+  size_t rows;
+  uint32_t option; /* without which it is empty; 0: always there */
+  double low, high;
+  int whole;       /* whole numbers only */
+  int spare_lanes; /* lanes that stand for nothing are tracked along */
+} state_row;
+
+/* All but the scalars, in the order of the state. */
+extern const state_row state_rows[];
+extern const size_t state_row_count;
+
 /* The laws of four neighbouring slots as they look at present: on the side to which each lane moves, and between the
  * working points among which the joint before stands. A view is valid until a velocity changes sign or the angle leaves
  * [low, high); most samples find it valid. Rows of four lanes; laws by number (LAW_COULOMB, …). */
@@ -341,15 +358,12 @@ static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) 
              : finger->derived.settings.forget_rate * (s->last_stuck[slot] - since);
 }
 
+/* Numbers of a row. */
+size_t state_row_length(const tendonfmu_finger* finger, const state_row* row);
+
 /* Bytes needed for a finger of a checked image header. */
 size_t finger_memory_size(const model_shape* shape);
 
 /* Lays a finger of a checked image header into memory of that size, all zeros; words receives room for the shape words.
  */
 tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,7 +1,6 @@
 /* Included first by every source that computes: no contraction of a*b + c into one rounding, whatever flags an importer
  * compiles with, so that all machines give the same bits. */
-#ifndef TENDONFMU_FLOATING_POINT_H
-#define TENDONFMU_FLOATING_POINT_H
+#pragma once
 
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
@@ -9,6 +8,4 @@
 #pragma GCC optimize("fp-contract=off")
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
-#endif
-
 #endif

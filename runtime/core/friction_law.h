@@ -4,14 +4,9 @@
  *
  * A law has a side for v > 0 and one for v < 0; a symmetric law has two equal ones. A side is kept as four numbers:
  * Fc, Fs − Fc, 1/vs, Fv (paper VII: 1/vs behaves, vs does not). */
-#ifndef TENDONFMU_FRICTION_LAW_H
-#define TENDONFMU_FRICTION_LAW_H
+#pragma once
 
 #include "exponential.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
@@ -42,9 +37,3 @@ HOT_INLINE quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
   const quad stribeck = quad_mul(side[LAW_DROP], exp_of_minus(quad_mul(speed, side[LAW_RATE])));
   return quad_add(quad_add(side[LAW_COULOMB], stribeck), quad_mul(side[LAW_VISCOUS], speed));
 }
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

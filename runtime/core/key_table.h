@@ -1,7 +1,6 @@
 /* Generated from the tables in runtime/description by `python tools/tables/generate.py`: do not edit. */
 /* clang-format off */
-#ifndef TENDONFMU_KEY_TABLE_H
-#define TENDONFMU_KEY_TABLE_H
+#pragma once
 
 #include <stdint.h>
 
@@ -97,5 +96,3 @@ typedef struct key_row {
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */
 const key_row* key_row_of(model_item_kind kind, uint32_t offset);
-
-#endif

@@ -1,13 +1,8 @@
 /* Where the links of a finger are: a chain of joints that turn about axes
  * (docs/reference/semantics.md#link-geometry). */
-#ifndef TENDONFMU_LINK_GEOMETRY_H
-#define TENDONFMU_LINK_GEOMETRY_H
+#pragma once
 
 #include <stddef.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 typedef struct link_geometry {
   double* axis;   /* [n × 3] unit vectors, each in its own link's frame */
@@ -27,9 +22,3 @@ void find_tip_levers(const link_geometry* geometry, size_t joints, const double*
 /* For each joint the least link, from 1, on which a force that turns this joint can be: the first from there on whose
  * end is off its own axis, the last link where none is. least [joints]. */
 void find_least_links(const link_geometry* geometry, size_t joints, int* least);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,12 +1,7 @@
 /* One line of text put together without the heap, with a decimal point in every locale. */
-#ifndef TENDONFMU_MESSAGE_H
-#define TENDONFMU_MESSAGE_H
+#pragma once
 
 #include <stddef.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 typedef struct message_line {
   char* text; /* may be NULL when size is 0 */
@@ -21,9 +16,3 @@ void message_count(message_line line, size_t value);
 
 /* Starts with "<name>[<index>]". */
 void message_element(message_line line, const char* name, size_t index);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

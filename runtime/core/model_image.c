@@ -119,15 +119,15 @@ effect_place model_extension_place(const model_shape* shape, uint32_t index) {
   return place_of(row[1], row[2]);
 }
 
-static size_t own_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : 0;
+size_t model_effect_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
+  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : effect->memory_count;
 }
 
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
   const size_t joint_rows = shape->options & MODEL_HAS_POSITION_FILTER ? 5 : 2;
   const size_t slopes =
       effect->kind == EFFECT_SIGNAL ? joint_rows * shape->joints + shape->tendons + shape->effect_memory : 0;
-  return own_memory(effect, shape, place) + slopes * effect->parameter_count;
+  return model_effect_memory(effect, shape, place) + slopes * effect->parameter_count;
 }
 
 static void walk_extensions(walk* w) {
@@ -361,7 +361,8 @@ static int check_extensions(const unsigned char* image, model_shape* shape, mess
     if (is_everywhere_twice(effect, row, &everywhere)) {
       return refuse(message, "model image with two extensions of one effect everywhere, expected one");
     }
-    shape->effect_memory += effect->kind == EFFECT_SIGNAL ? 0 : own_memory(effect, shape, place_of(joint, tendon));
+    shape->effect_memory +=
+        effect->kind == EFFECT_SIGNAL ? 0 : model_effect_memory(effect, shape, place_of(joint, tendon));
   }
   row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
   for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {

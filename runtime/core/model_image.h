@@ -19,8 +19,7 @@
  * Shape words   a joint    bit 0 cover, bits 1-2 friction (law_kind), bits 3-4 load_friction
  *               a tendon   bit 0 bidirectional; then n words: pulley_friction (the last is LAW_ABSENT);
  *                          then for each of n edges: points K, bit 31 where it has angles; K words law_kind */
-#ifndef TENDONFMU_MODEL_IMAGE_H
-#define TENDONFMU_MODEL_IMAGE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -29,10 +28,6 @@
 #include "key_table.h" /* the kinds of items, and the largest numbers of things */
 #include "message.h"
 #include "model_options.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum {
   MODEL_VERSION = 1,
@@ -75,10 +70,11 @@ typedef struct model_item {
 /* Calls visit for each item in order; stops at the first result other than 0 and returns it. */
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
 
-/* Where row `index` of the extensions acts, and how many numbers it remembers: its own, and, where it changes signals,
- * by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon, the derivative of all effect_memory, and with a
- * position filter that of three rows of joints. */
+/* Where row `index` of the extensions acts, and how many numbers it remembers: those of its effect, and, where it
+ * changes signals, by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon, the derivative of all
+ * effect_memory, and with a position filter that of three rows of joints. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
+size_t model_effect_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 
 /* Directions of uncertainty that every joint has room for; joints with fewer have zeros there. */
@@ -104,9 +100,3 @@ size_t model_image_size(const model_shape* shape);
 
 /* Writes an image [model_image_size] from a shape and its values [parameter_count]. */
 void model_write(const model_shape* shape, const double* values, void* image);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

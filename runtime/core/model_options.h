@@ -1,7 +1,6 @@
 /* The option bits of the model image: which parts of a description are there. The bits of keys stand in
  * description/keys.json by their names. */
-#ifndef TENDONFMU_MODEL_OPTIONS_H
-#define TENDONFMU_MODEL_OPTIONS_H
+#pragma once
 
 enum {
   MODEL_HAS_INITIAL_VARIANCE = 1,
@@ -28,5 +27,3 @@ enum {
   MODEL_HAS_SENSOR_FAULT = 1 << 23,
   MODEL_OPTION_BITS = (1 << 24) - 1
 };
-
-#endif

@@ -9,14 +9,9 @@
  *
  * The factors carry the forces along: friction at one place changes the forces behind it, hence all losses there
  * (differs from sect. V: the paper's regressors freeze f_A and f_B, which leaves out that part). */
-#ifndef TENDONFMU_PARAMETER_DERIVATIVE_H
-#define TENDONFMU_PARAMETER_DERIVATIVE_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum { SIDE_STATIC, SIDE_COULOMB, SIDE_RATE, SIDE_VISCOUS };
 
@@ -70,9 +65,3 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
 /* Fills it, but for the extensions (extension_derivative.h), for the sample that the finger last took, by a step: a
  * restored state has no scratch. */
 void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

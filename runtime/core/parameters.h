@@ -1,6 +1,5 @@
 /* The parameters of a finger: path, unit, allowed range of each, and what they must be together. */
-#ifndef TENDONFMU_PARAMETERS_H
-#define TENDONFMU_PARAMETERS_H
+#pragma once
 
 #include "message.h"
 #include "model_image.h"
@@ -38,5 +37,3 @@ int parameter_check_all(const model_shape* shape, const double* values, message_
 /* Only the relations within laws and grids, or only the rank of the routing. */
 int parameter_check_relations(const model_shape* shape, const double* values, message_line message);
 int parameter_check_routing(const model_shape* shape, const double* values, message_line message);
-
-#endif

@@ -1,13 +1,8 @@
 /* The rows of R whose tendons tell the joint angles: all but those of failing sensors
  * (docs/reference/semantics.md#sensor-faults). */
-#ifndef TENDONFMU_ROWS_IN_USE_H
-#define TENDONFMU_ROWS_IN_USE_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* A row leaves R⁺, or is told by the others, where that makes the variance of the angles at most so many times larger:
  * 1/(1 − h) of its leverage h. */
@@ -28,9 +23,3 @@ void weigh_forces(const tendonfmu_finger* finger, const double* fault, double* w
 
 /* Whether a joint was blind at the last sample; 0 without sensor_fault. */
 int any_joint_is_blind(const tendonfmu_finger* finger);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,13 +1,8 @@
 /* Samples from the caller's arrays into the finger, and outputs back. */
-#ifndef TENDONFMU_SAMPLES_H
-#define TENDONFMU_SAMPLES_H
+#pragma once
 
 #include "finger_memory.h"
 #include "message.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Checks the time and copies the inputs that the kinematics source uses into scratch; their values are left to the
  * kernel. Returns 0, or −1 with one line in message. */
@@ -22,9 +17,3 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
 
 /* Row `row` of many samples. */
 tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

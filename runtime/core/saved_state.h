@@ -8,15 +8,10 @@
  *          32  u64      checksum of the model image it belongs to
  *          40  f64[p]   parameter values
  *              f64[s]   everything remembered (finger_state), outputs included */
-#ifndef TENDONFMU_SAVED_STATE_H
-#define TENDONFMU_SAVED_STATE_H
+#pragma once
 
 #include "finger_memory.h"
 #include "message.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 size_t saved_state_size(const tendonfmu_finger* finger);
 
@@ -25,9 +20,3 @@ void save_state(const tendonfmu_finger* finger, void* bytes);
 
 /* Takes over saved bytes, or refuses them, changes nothing, and returns −1 with one line in message. */
 int restore_state(tendonfmu_finger* finger, const void* bytes, message_line message);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

@@ -1,13 +1,8 @@
 /* Which laws are in force at a slot: the side of each by the sign of its velocity, the working points by the joint
  * angle. */
-#ifndef TENDONFMU_SLOT_VIEW_H
-#define TENDONFMU_SLOT_VIEW_H
+#pragma once
 
 #include "finger_memory.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Fills the view of four slots from `slot` on.
  *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints
@@ -16,9 +11,3 @@ void slot_view_fill(const tendonfmu_finger* finger, size_t slot, double angle, i
 
 /* Segment of a grid in which an angle lies, as the number of working points at or below it. */
 size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

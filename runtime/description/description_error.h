@@ -1,5 +1,4 @@
-#ifndef TENDONFMU_DESCRIPTION_ERROR_H
-#define TENDONFMU_DESCRIPTION_ERROR_H
+#pragma once
 
 #include <cstddef>
 #include <stdexcept>
@@ -21,5 +20,3 @@ std::string printable(const std::string& text, std::size_t limit = 60);
 void copy_line(const char* line, char* text, std::size_t size) noexcept;
 
 }  // namespace tendonfmu
-
-#endif

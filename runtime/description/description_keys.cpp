@@ -43,99 +43,42 @@ const std::vector<std::string>& words_of(const std::string& path) {
   return words.at(path);
 }
 
-const std::vector<number_key>& numbers_of(const std::string& object) {
-  static const std::map<std::string, std::vector<number_key>> numbers = {
-    {"", {
-      {"velocity_filter_cutoff", false, false, "Hz", 0},
-      {"tip", false, false, "m", MODEL_HAS_LINKS},
-    }},
-    {"joints", {
-    }},
-    {"joints.cover", {
-      {"stiffness", false, true, "N.m/rad", 0},
-      {"rest_angle", false, false, "rad", 0},
-    }},
-    {"tendons", {
-      {"stiffness", false, true, "N/m", 0},
-      {"moment_arms", true, true, "m", 0},
-    }},
-    {"tendons.edge_friction", {
-      {"angles", false, true, "rad", 0},
-    }},
-    {"velocity_threshold", {
-      {"tendon", false, false, "m/s", 0},
-      {"joint", false, false, "rad/s", 0},
-      {"hysteresis", false, false, "1", MODEL_HAS_HYSTERESIS},
-    }},
-    {"position_filter", {
-      {"noise", true, true, "rad", 0},
-      {"jerk_density", false, false, "rad2/s5", 0},
-    }},
-    {"bias", {
-      {"drift_variance", false, false, "N2.m2/s", 0},
-      {"noise_std", false, false, "N.m", 0},
-      {"noise_std_per_force", false, false, "N.m per N", 0},
-      {"initial_variance", false, false, "N2.m2", MODEL_HAS_INITIAL_VARIANCE},
-      {"forget_rate", false, false, "1/s", 0},
-      {"initial_torque", true, false, "N.m", MODEL_HAS_INITIAL_TORQUE},
-      {"noise_time", false, false, "s", MODEL_HAS_NOISE_TIME},
-      {"start_share", false, false, "1", MODEL_HAS_START_SHARE},
-    }},
-    {"contact", {
-      {"threshold", true, true, "N.m", 0},
-      {"threshold_per_force", true, false, "N.m per N", 0},
-      {"uncertainty", false, false, "1", MODEL_HAS_UNCERTAINTY},
-      {"uncertainty_level", false, false, "1", MODEL_HAS_UNCERTAINTY},
-      {"deviation", true, false, "N.m", MODEL_HAS_DEVIATION},
-      {"deviation_per_force", true, false, "N.m per N", MODEL_HAS_DEVIATION},
-      {"release_ratio", false, false, "1", MODEL_HAS_RELEASE},
-      {"hold_time", false, false, "s", MODEL_HAS_RELEASE},
-      {"release_time", false, false, "s", MODEL_HAS_RELEASE_TIME},
-    }},
-    {"contact.innovation", {
-      {"time", false, true, "s", 0},
-      {"threshold", true, true, "N.m", 0},
-      {"threshold_per_force", true, false, "N.m per N", 0},
-      {"evidence_time", false, false, "s", MODEL_DETECTS_BY_CUSUM},
-    }},
-    {"contact.friction_bound", {
-      {"stuck_share", false, false, "1", 0},
-      {"stuck_time", false, false, "s", 0},
-      {"jump_share", false, false, "1", 0},
-      {"jump_time", false, false, "s", 0},
-    }},
-    {"contact.drift", {
-      {"quick_time", false, false, "s", 0},
-      {"slow_time", false, false, "s", 0},
-      {"threshold", true, true, "N.m", 0},
-      {"threshold_per_force", true, false, "N.m per N", 0},
-    }},
-    {"contact.rest", {
-      {"travel", false, true, "m", 0},
-      {"settle_time", false, false, "s", 0},
-      {"averaging_time", false, false, "s", 0},
-      {"threshold", true, true, "N.m", 0},
-      {"threshold_per_force", true, false, "N.m per N", 0},
-      {"creep", true, false, "N.m", 0},
-      {"fall_share", false, false, "1", 0},
-    }},
-    {"contact.rest.innovation", {
-      {"time", false, true, "s", 0},
-      {"threshold", true, true, "N.m", 0},
-    }},
-    {"links", {
-      {"axis", false, true, "1", MODEL_HAS_LINKS},
-      {"offset", false, false, "m", MODEL_HAS_LINKS},
-    }},
-    {"sensor_fault", {
-      {"hold_time", false, false, "s", 0},
-      {"force_resolution", false, false, "N", 0},
-      {"position_resolution", false, false, "m", 0},
-      {"jump_margin", false, false, "N", 0},
-      {"recovery_time", false, false, "s", 0},
-    }},
+std::vector<number_key> numbers_of(const std::string& object) {
+  static const std::multimap<std::string, number_key> numbers = {
+    {"", {"tip", false, false, "m", MODEL_HAS_LINKS}},
+    {"tendons", {"moment_arms", true, true, "m", 0}},
+    {"velocity_threshold", {"hysteresis", false, false, "1", MODEL_HAS_HYSTERESIS}},
+    {"position_filter", {"noise", true, true, "rad", 0}},
+    {"bias", {"initial_variance", false, false, "N2.m2", MODEL_HAS_INITIAL_VARIANCE}},
+    {"bias", {"initial_torque", true, false, "N.m", MODEL_HAS_INITIAL_TORQUE}},
+    {"bias", {"noise_time", false, false, "s", MODEL_HAS_NOISE_TIME}},
+    {"bias", {"start_share", false, false, "1", MODEL_HAS_START_SHARE}},
+    {"contact", {"threshold", true, true, "N.m", 0}},
+    {"contact", {"threshold_per_force", true, false, "N.m per N", 0}},
+    {"contact", {"uncertainty", false, false, "1", MODEL_HAS_UNCERTAINTY}},
+    {"contact", {"uncertainty_level", false, false, "1", MODEL_HAS_UNCERTAINTY}},
+    {"contact", {"deviation", true, false, "N.m", MODEL_HAS_DEVIATION}},
+    {"contact", {"deviation_per_force", true, false, "N.m per N", MODEL_HAS_DEVIATION}},
+    {"contact", {"release_ratio", false, false, "1", MODEL_HAS_RELEASE}},
+    {"contact", {"hold_time", false, false, "s", MODEL_HAS_RELEASE}},
+    {"contact", {"release_time", false, false, "s", MODEL_HAS_RELEASE_TIME}},
+    {"contact.innovation", {"threshold", true, true, "N.m", 0}},
+    {"contact.innovation", {"threshold_per_force", true, false, "N.m per N", 0}},
+    {"contact.innovation", {"evidence_time", false, false, "s", MODEL_DETECTS_BY_CUSUM}},
+    {"contact.drift", {"threshold", true, true, "N.m", 0}},
+    {"contact.drift", {"threshold_per_force", true, false, "N.m per N", 0}},
+    {"contact.rest", {"threshold", true, true, "N.m", 0}},
+    {"contact.rest", {"threshold_per_force", true, false, "N.m per N", 0}},
+    {"contact.rest", {"creep", true, false, "N.m", 0}},
+    {"contact.rest.innovation", {"threshold", true, true, "N.m", 0}},
+    {"links", {"axis", false, true, "1", MODEL_HAS_LINKS}},
+    {"links", {"offset", false, false, "m", MODEL_HAS_LINKS}},
   };
-  return numbers.at(object);
+  std::vector<number_key> keys;
+  for (auto [row, end] = numbers.equal_range(object); row != end; ++row) {
+    keys.push_back(row->second);
+  }
+  return keys;
 }
 
 }  // namespace tendonfmu

@@ -1,6 +1,5 @@
 /* The list `extensions` of a description: which effects, and where. */
-#ifndef TENDONFMU_EXTENSION_READER_H
-#define TENDONFMU_EXTENSION_READER_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -15,5 +14,3 @@ void read_extensions(const json_node& list, std::uint32_t joints, std::uint32_t 
                      std::vector<std::uint32_t>& table);
 
 }  // namespace tendonfmu
-
-#endif

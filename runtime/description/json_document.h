@@ -1,5 +1,4 @@
-#ifndef TENDONFMU_JSON_DOCUMENT_H
-#define TENDONFMU_JSON_DOCUMENT_H
+#pragma once
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -19,5 +18,3 @@ constexpr std::size_t max_document_depth = 32;
 json parse_document(const char* text, std::size_t size);
 
 }  // namespace tendonfmu
-
-#endif

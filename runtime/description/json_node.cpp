@@ -109,4 +109,8 @@ const json_node& json_node::expect_keys(const std::vector<std::string>& known) c
   return *this;
 }
 
+const json_node& json_node::expect_keys_if_present(const std::vector<std::string>& known) const {
+  return absent() ? *this : expect_keys(known);
+}
+
 }  // namespace tendonfmu

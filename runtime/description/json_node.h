@@ -1,7 +1,6 @@
 /* A value of the description together with its path, so that whoever finds fault can say where. A node may be absent:
  * a key left out, null, or anything within either. */
-#ifndef TENDONFMU_JSON_NODE_H
-#define TENDONFMU_JSON_NODE_H
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -35,6 +34,7 @@ class json_node {
 
   /* Throws for the first key that is not among `known`. */
   const json_node& expect_keys(const std::vector<std::string>& known) const;
+  const json_node& expect_keys_if_present(const std::vector<std::string>& known) const;
 
   /* Number of elements of a list. */
   std::size_t size() const { return value_->size(); }
@@ -52,5 +52,3 @@ class json_node {
 };
 
 }  // namespace tendonfmu
-
-#endif

@@ -127,9 +127,7 @@ std::uint32_t read_joint(const json_node& joint) {
   joint.expect_keys(keys_of("joints"));
   check_optional_name(joint);
   const json_node cover = joint.member("cover");
-  if (!cover.absent()) {
-    cover.expect_keys(keys_of("joints.cover"));
-  }
+  cover.expect_keys_if_present(keys_of("joints.cover"));
   return (cover.absent() ? 0u : 1u) | static_cast<std::uint32_t>(read_law(joint.member("friction"))) << 1 |
          static_cast<std::uint32_t>(read_law(joint.member("load_friction"))) << 3;
 }
@@ -164,12 +162,15 @@ void read_tendon(const json_node& tendon, std::uint32_t joints, std::vector<std:
 
 /* --- the finger as a whole ---------------------------------------------------------------------------------------- */
 
-/* an object that may be left out */
-void check_settings(const json_node& document, const std::string& name) {
-  const json_node settings = document.member(name);
-  if (!settings.absent()) {
-    settings.expect_keys(keys_of(name));
+/* an object that may be left out: the option bit that says it is there, or 0 */
+std::uint32_t read_object(const json_node& object, const std::string& name, std::uint32_t joints,
+                          std::uint32_t option) {
+  if (object.absent()) {
+    return 0u;
   }
+  object.expect_keys(keys_of(name));
+  check_lists(object, name, joints);
+  return option;
 }
 
 /* position of a word among those allowed; the first one where it is left out */
@@ -246,57 +247,24 @@ std::uint32_t read_uncertainty(const json_node& contact, std::uint32_t joints, s
   return unsigned{MODEL_HAS_UNCERTAINTY} | most << 10;
 }
 
-std::uint32_t read_rest(const json_node& contact, std::uint32_t joints) {
-  const json_node rest = contact.member("rest");
-  if (rest.absent()) {
-    return 0u;
-  }
-  rest.expect_keys(keys_of("contact.rest"));
-  check_lists(rest, "contact.rest", joints);
-  const json_node innovation = rest.member("innovation");
-  if (innovation.absent()) {
-    return MODEL_HAS_REST;
-  }
-  innovation.expect_keys(keys_of("contact.rest.innovation"));
-  check_lists(innovation, "contact.rest.innovation", joints);
-  return unsigned{MODEL_HAS_REST} | unsigned{MODEL_HAS_REST_INNOVATION};
+std::uint32_t read_rest(const json_node& rest, std::uint32_t joints) {
+  return read_object(rest, "contact.rest", joints, MODEL_HAS_REST) |
+         read_object(rest.member("innovation"), "contact.rest.innovation", joints, MODEL_HAS_REST_INNOVATION);
 }
 
-std::uint32_t read_drift(const json_node& contact, std::uint32_t joints) {
-  const json_node drift = contact.member("drift");
-  if (drift.absent()) {
-    return 0u;
-  }
-  drift.expect_keys(keys_of("contact.drift"));
-  check_lists(drift, "contact.drift", joints);
-  return MODEL_HAS_DRIFT;
-}
-
-std::uint32_t read_friction_bound(const json_node& contact) {
-  const json_node bound = contact.member("friction_bound");
-  if (bound.absent()) {
-    return 0u;
-  }
-  bound.expect_keys(keys_of("contact.friction_bound"));
+std::uint32_t read_friction_bound(const json_node& bound, std::uint32_t joints) {
+  const std::uint32_t options = read_object(bound, "contact.friction_bound", joints, MODEL_HAS_FRICTION_BOUND);
   const json_node presliding = bound.member("stuck_presliding");
-  const bool counts = !presliding.absent() && presliding.boolean();
-  return unsigned{MODEL_HAS_FRICTION_BOUND} | (counts ? unsigned{MODEL_BOUNDS_PRESLIDING} : 0u);
+  return options | (!presliding.absent() && presliding.boolean() ? unsigned{MODEL_BOUNDS_PRESLIDING} : 0u);
 }
 
 std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
   contact.expect_keys(keys_of("contact"));
   check_lists(contact, "contact", joints);
-  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) | read_friction_bound(contact) |
-         given_options(contact, "contact") | read_drift(contact, joints) | read_rest(contact, joints);
-}
-
-std::uint32_t read_position_filter(const json_node& filter, std::uint32_t joints) {
-  if (filter.absent()) {
-    return 0u;
-  }
-  filter.expect_keys(keys_of("position_filter"));
-  check_lists(filter, "position_filter", joints);
-  return MODEL_HAS_POSITION_FILTER;
+  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) |
+         read_friction_bound(contact.member("friction_bound"), joints) | given_options(contact, "contact") |
+         read_object(contact.member("drift"), "contact.drift", joints, MODEL_HAS_DRIFT) |
+         read_rest(contact.member("rest"), joints);
 }
 
 std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
@@ -319,14 +287,6 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   return MODEL_HAS_LINKS;
 }
 
-std::uint32_t read_sensor_fault(const json_node& fault) {
-  if (fault.absent()) {
-    return 0u;
-  }
-  fault.expect_keys(keys_of("sensor_fault"));
-  return MODEL_HAS_SENSOR_FAULT;
-}
-
 void check_top(const json_node& document) {
   document.expect_keys(keys_of(""));
   const json_node format = document.member("format");
@@ -334,8 +294,9 @@ void check_top(const json_node& document) {
     format.refuse("\"" + std::string(format_name) + "\"");
   }
   check_name(document.member("name"));
-  check_settings(document, "velocity_threshold");
-  check_settings(document, "bias");
+  for (const std::string name : {"velocity_threshold", "bias"}) {
+    document.member(name).expect_keys_if_present(keys_of(name));
+  }
 }
 
 }  // namespace
@@ -354,11 +315,14 @@ finger_shape read_shape(const json_node& document) {
   for (std::size_t i = 0; i < tendons.size(); ++i) {
     read_tendon(tendons.element(i), finger.shape.joints, finger.words);
   }
-  finger.shape.options = read_bias_options(document.member("bias"), finger.shape.joints) |
-                         read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
-                         given_options(document.member("velocity_threshold"), "velocity_threshold") |
-                         read_position_filter(document.member("position_filter"), finger.shape.joints) |
-                         read_links(document, finger.shape.joints) | read_sensor_fault(document.member("sensor_fault"));
+  finger.shape.options =
+      read_bias_options(document.member("bias"), finger.shape.joints) |
+      read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
+      given_options(document.member("velocity_threshold"), "velocity_threshold") |
+      read_object(document.member("position_filter"), "position_filter", finger.shape.joints,
+                  MODEL_HAS_POSITION_FILTER) |
+      read_links(document, finger.shape.joints) |
+      read_object(document.member("sensor_fault"), "sensor_fault", finger.shape.joints, MODEL_HAS_SENSOR_FAULT);
   read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);
   finger.shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);
   finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());

@@ -1,5 +1,4 @@
-#ifndef TENDONFMU_SHAPE_READER_H
-#define TENDONFMU_SHAPE_READER_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -25,5 +24,3 @@ struct finger_shape {
 finger_shape read_shape(const json_node& document);
 
 }  // namespace tendonfmu
-
-#endif

@@ -1,5 +1,4 @@
-#ifndef TENDONFMU_VALUE_READER_H
-#define TENDONFMU_VALUE_READER_H
+#pragma once
 
 #include <vector>
 
@@ -13,5 +12,3 @@ namespace tendonfmu {
 std::vector<double> read_values(const json_node& document, const model_shape& shape);
 
 }  // namespace tendonfmu
-
-#endif

@@ -1,7 +1,6 @@
 /* All recordings at once: maximum likelihood of the model under a weak Gaussian prior, within the unknowns' boxes. Each
  * pass over the data gives a local model of the cost, whose best step leads to the next. */
-#ifndef TENDONFMU_ESTIMATION_BATCH_H
-#define TENDONFMU_ESTIMATION_BATCH_H
+#pragma once
 
 #include "information.h"
 
@@ -41,5 +40,3 @@ batch_result fit_batch(const fit_problem& problem, const std::vector<double>& st
 Eigen::MatrixXd posterior_covariance(const fit_problem& problem, const Eigen::MatrixXd& information, double prior_std);
 
 }  // namespace tendonfmu::estimation
-
-#endif

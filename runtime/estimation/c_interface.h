@@ -1,7 +1,6 @@
 /* What the two C interfaces of the estimation share: no exception passes them, and a refusal's line stays with the
  * handle. A handle is a struct with `mutable std::string error`. */
-#ifndef TENDONFMU_ESTIMATION_C_INTERFACE_H
-#define TENDONFMU_ESTIMATION_C_INTERFACE_H
+#pragma once
 
 #include <cstdio>
 #include <new>
@@ -90,5 +89,3 @@ tendonfmu_status describe_unknown(const Handle* handle, const unknown_list& all,
 }
 
 }  // namespace tendonfmu::estimation
-
-#endif

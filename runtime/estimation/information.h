@@ -9,8 +9,7 @@
  *   Σ ν_i ν_iᵀ = Σ ν'_i ν'_iᵀ + z zᵀ,   u = Σ c_i ν⁰_i, C = Σ c_i², ν'_i = ν⁰_i − c_i·u/C, z = √C·s − u/√C,
  *
  * which is exact, a sum of squares, and leaves the many rows ν' sparse and one dense row z a block. */
-#ifndef TENDONFMU_ESTIMATION_INFORMATION_H
-#define TENDONFMU_ESTIMATION_INFORMATION_H
+#pragma once
 
 #include <Eigen/Core>
 #include <atomic>
@@ -71,5 +70,3 @@ cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& 
                          const pass_watch& watch);
 
 }  // namespace tendonfmu::estimation
-
-#endif

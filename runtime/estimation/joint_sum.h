@@ -1,6 +1,5 @@
 /* One joint's sums over samples: Σ ν νᵀ of filtered rows with the bias eliminated, see information.h. */
-#ifndef TENDONFMU_ESTIMATION_JOINT_SUM_H
-#define TENDONFMU_ESTIMATION_JOINT_SUM_H
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -114,5 +113,3 @@ class joint_sum {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

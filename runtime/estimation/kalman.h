@@ -8,8 +8,7 @@
  *
  * Of the covariance there is only the lower triangle, so it cannot become unsymmetric, and it changes by −W Wᵀ with W
  * from the Cholesky factor of the innovations' covariance: P − K H P loses nine digits in twenty samples here. */
-#ifndef TENDONFMU_ESTIMATION_KALMAN_H
-#define TENDONFMU_ESTIMATION_KALMAN_H
+#pragma once
 
 #include <cstddef>
 #include <vector>
@@ -119,5 +118,3 @@ class kalman_filter {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

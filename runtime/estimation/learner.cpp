@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "derived_numbers.h"
 #include "refusal.h"
 
 namespace tendonfmu::estimation {

@@ -1,6 +1,5 @@
 /* The extended Kalman filter on a finger: samples in, the description's numbers with their errors out. */
-#ifndef TENDONFMU_ESTIMATION_LEARNER_H
-#define TENDONFMU_ESTIMATION_LEARNER_H
+#pragma once
 
 #include <functional>
 
@@ -77,5 +76,3 @@ class finger_learner {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

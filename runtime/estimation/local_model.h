@@ -1,7 +1,6 @@
 /* The cost around a point, from one pass over the data: exact in the unknowns that enter linearly, to third order in
  * the rates of the laws. */
-#ifndef TENDONFMU_ESTIMATION_LOCAL_MODEL_H
-#define TENDONFMU_ESTIMATION_LOCAL_MODEL_H
+#pragma once
 
 #include "information.h"
 #include "prior.h"
@@ -51,5 +50,3 @@ class local_model {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

@@ -1,6 +1,5 @@
 /* Two numbers at once, for the products of symmetric_update_kernel.h on any processor. */
-#ifndef TENDONFMU_ESTIMATION_PORTABLE_LANES_H
-#define TENDONFMU_ESTIMATION_PORTABLE_LANES_H
+#pragma once
 
 #include <cstddef>
 #include <cstring>
@@ -49,5 +48,3 @@ lane_vector multiply_add(lane_vector a, lane_vector b, lane_vector c) {
 
 }  // namespace
 }  // namespace tendonfmu::estimation
-
-#endif

@@ -1,6 +1,5 @@
 /* What is known of the unknowns before the data: a Gaussian about the start of the description. */
-#ifndef TENDONFMU_ESTIMATION_PRIOR_H
-#define TENDONFMU_ESTIMATION_PRIOR_H
+#pragma once
 
 #include <Eigen/Core>
 #include <utility>
@@ -35,5 +34,3 @@ struct gaussian_prior {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

@@ -1,7 +1,6 @@
 /* The finger and the recordings that it is fitted to. What does not depend on the friction (velocities, what moves and
  * what sticks since when) is found once, and remembered where a recording is cut into segments. */
-#ifndef TENDONFMU_ESTIMATION_RECORDING_TRACK_H
-#define TENDONFMU_ESTIMATION_RECORDING_TRACK_H
+#pragma once
 
 #include <memory>
 
@@ -108,5 +107,3 @@ struct bias_gains {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

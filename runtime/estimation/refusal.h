@@ -1,6 +1,5 @@
 /* What the estimation refuses: one line, as everywhere. */
-#ifndef TENDONFMU_ESTIMATION_REFUSAL_H
-#define TENDONFMU_ESTIMATION_REFUSAL_H
+#pragma once
 
 #include <stdexcept>
 
@@ -11,5 +10,3 @@ struct refused : std::runtime_error {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

@@ -1,12 +1,9 @@
 /* The sensitivities of one sample: ∂T_j and ∂Δb_j by every unknown, as the core gives them. */
-#ifndef TENDONFMU_ESTIMATION_SAMPLE_ROWS_H
-#define TENDONFMU_ESTIMATION_SAMPLE_ROWS_H
+#pragma once
 
 #include <algorithm>
 #include <vector>
 
-#include "extension_derivative.h"
-#include "extensions.h"
 #include "recording_track.h"
 #include "unknowns.h"
 
@@ -88,5 +85,3 @@ segment_states states_with(const recording_track& recording, free_finger* finger
                            const std::vector<double>& numbers);
 
 }  // namespace tendonfmu::estimation
-
-#endif

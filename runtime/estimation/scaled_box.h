@@ -1,6 +1,5 @@
 /* Unknowns divided by their scales, with the box they stay in, and a Newton step within a box. */
-#ifndef TENDONFMU_ESTIMATION_SCALED_BOX_H
-#define TENDONFMU_ESTIMATION_SCALED_BOX_H
+#pragma once
 
 #include <Eigen/Core>
 
@@ -26,5 +25,3 @@ Eigen::VectorXd boxed_step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, c
                            const scaled_box& box);
 
 }  // namespace tendonfmu::estimation
-
-#endif

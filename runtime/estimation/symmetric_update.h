@@ -12,8 +12,7 @@
  * skip no column of zeros. Measured by bench/bench_symmetric_update.cpp on one core with AVX2, p = 476, k = 128, in
  * GFLOP/s: add_outer_products() 34 (avx2), 13 (portable), Eigen 13; multiply_symmetric() with 2 of 5 columns not zero
  * 31, 8, Eigen 5. With k = 4, a sample of an index finger: 13, 8, Eigen 7 and 13, 5, Eigen 3. */
-#ifndef TENDONFMU_SYMMETRIC_UPDATE_H
-#define TENDONFMU_SYMMETRIC_UPDATE_H
+#pragma once
 
 #include <cstddef>
 
@@ -61,5 +60,3 @@ extern const symmetric_update avx512_symmetric_update;
 #endif
 
 }  // namespace tendonfmu::estimation
-
-#endif

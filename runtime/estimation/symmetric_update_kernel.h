@@ -5,8 +5,7 @@
  *
  * Everything here is in the unnamed namespace and uses no inline function of another header: compiled for different
  * processors, no two copies of it may be taken for the same function. */
-#ifndef TENDONFMU_SYMMETRIC_UPDATE_KERNEL_H
-#define TENDONFMU_SYMMETRIC_UPDATE_KERNEL_H
+#pragma once
 
 #include "symmetric_update.h"
 
@@ -319,5 +318,3 @@ void multiply_by_rows(double* product, std::size_t product_stride, const double*
 }  // namespace tendonfmu::estimation
 
 #undef ALWAYS_INLINE
-
-#endif

@@ -3,8 +3,7 @@
  * A side of a law becomes coulomb Fc, drop Fs − Fc, rate 1/vs and viscous Fv: every bound is then a box (Fs >= Fc >= 0,
  * vs > vs_min), and 1/vs has no singularity (paper VII). Covers, extensions and the initial bias are taken as they are.
  */
-#ifndef TENDONFMU_ESTIMATION_UNKNOWNS_H
-#define TENDONFMU_ESTIMATION_UNKNOWNS_H
+#pragma once
 
 #include <array>
 #include <cstdint>
@@ -12,7 +11,6 @@
 #include <vector>
 
 #include "core_inside.h"
-#include "finger_memory.h"
 
 namespace tendonfmu::estimation {
 
@@ -80,5 +78,3 @@ class unknown_list {
 };
 
 }  // namespace tendonfmu::estimation
-
-#endif

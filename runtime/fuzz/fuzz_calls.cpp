@@ -6,8 +6,11 @@
 #include <string>
 
 #include "../tests/test_finger.h"
-#include "bytes.h"
 #include "promises.h"
+
+extern "C" {
+#include "bytes.h"
+}
 
 namespace {
 

@@ -7,8 +7,7 @@
  * that fades with the velocity, so that the contact stays passive (H. Olsson, thesis, Lund 1996, section 3.6).
  *
  * All contacts of a finger at once, in columns, two rows at a time: most time of a simulation is spent here. */
-#ifndef TENDONFMU_PLANT_BRISTLE_H
-#define TENDONFMU_PLANT_BRISTLE_H
+#pragma once
 
 #include <cstddef>
 #include <vector>
@@ -65,5 +64,3 @@ void respond(const law_columns& laws, const response_settings& settings, const d
 void set_law(const law& one, double v, int stribeck_exponent, std::size_t k, law_columns* laws);
 
 }  // namespace tendonfmu::plant
-
-#endif

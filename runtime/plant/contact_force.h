@@ -1,7 +1,6 @@
 /* Forces on the finger from outside: scheduled pushes, the push of the inputs, and a compliant obstacle. Over numbers
  * or duals, since they depend on the posture. */
-#ifndef TENDONFMU_PLANT_CONTACT_FORCE_H
-#define TENDONFMU_PLANT_CONTACT_FORCE_H
+#pragma once
 
 #include "rigid_body.h"
 
@@ -101,5 +100,3 @@ contact_torque<T> contact_torques(const rig& rig, const chain_motion<T>& motion,
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,7 +1,6 @@
 /* CVODE (A. C. Hindmarsh et al., "SUNDIALS: Suite of nonlinear and differential/algebraic equation solvers", ACM TOMS
  * 31(3), 2005): backward differentiation formulas of order 1 to 5 with the analytic Jacobian, kinks found as roots. */
-#ifndef TENDONFMU_PLANT_CVODE_INTEGRATOR_H
-#define TENDONFMU_PLANT_CVODE_INTEGRATOR_H
+#pragma once
 
 #include <memory>
 
@@ -13,5 +12,3 @@ namespace tendonfmu::plant {
 std::unique_ptr<integrator> make_cvode_integrator(dynamics* equations, double relative_tolerance);
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,7 +1,6 @@
 /* Forward derivatives: a number with its derivatives along N directions. Used where a formula is long and rarely
  * differentiated, the rigid bodies; everything else is differentiated by hand. */
-#ifndef TENDONFMU_PLANT_DUAL_H
-#define TENDONFMU_PLANT_DUAL_H
+#pragma once
 
 #include <array>
 #include <cmath>
@@ -96,5 +95,3 @@ dual_sine_and_cosine<N> sine_cosine(const dual<N>& x) {
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* The finger's differential equations and their Jacobian. */
-#ifndef TENDONFMU_PLANT_DYNAMICS_H
-#define TENDONFMU_PLANT_DYNAMICS_H
+#pragma once
 
 #include <vector>
 
@@ -123,5 +122,3 @@ class dynamics {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,7 +1,6 @@
 /* Exponential, logarithm, sine and cosine with the same bits on every machine of one architecture: those of the C
  * library depend on what the processor offers (fused multiply-add). Accurate to about one unit in the last place. */
-#ifndef TENDONFMU_PLANT_ELEMENTARY_H
-#define TENDONFMU_PLANT_ELEMENTARY_H
+#pragma once
 
 #include <cmath>
 #include <cstddef>
@@ -116,5 +115,3 @@ inline double cosine(double x) {
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,7 +1,6 @@
 /* Steps of one size, implicit: for long series, and for clients that change the inputs at every step, which makes
  * CVODE begin anew each time. */
-#ifndef TENDONFMU_PLANT_FIXED_STEP_INTEGRATOR_H
-#define TENDONFMU_PLANT_FIXED_STEP_INTEGRATOR_H
+#pragma once
 
 #include "integrator.h"
 #include "linearisation.h"
@@ -36,5 +35,3 @@ class fixed_step_integrator : public integrator {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

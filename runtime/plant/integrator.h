@@ -1,6 +1,5 @@
 /* What both integrators promise. */
-#ifndef TENDONFMU_PLANT_INTEGRATOR_H
-#define TENDONFMU_PLANT_INTEGRATOR_H
+#pragma once
 
 #include <cmath>
 #include <limits>
@@ -59,5 +58,3 @@ class integrator {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

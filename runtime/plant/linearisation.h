@@ -1,8 +1,7 @@
 /* The Jacobian of the differential equations in blocks, and the solution of (I − γ J) x = b by eliminating all that is
  * simple: motors (two by two), bristles (one by one: their block is diagonal, so this is a Schur complement), angles.
  * What is left is one dense system of n speeds and the heat. */
-#ifndef TENDONFMU_PLANT_LINEARISATION_H
-#define TENDONFMU_PLANT_LINEARISATION_H
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -78,5 +77,3 @@ class linearisation {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* What the motors are told: desired joint angles and pretension over time. */
-#ifndef TENDONFMU_PLANT_MOTION_H
-#define TENDONFMU_PLANT_MOTION_H
+#pragma once
 
 #include "elementary.h"
 #include "rig.h"
@@ -48,5 +47,3 @@ void scheduled_command(const rig& rig, double time, double extra, double* comman
 void hold_command(const rig& rig, double* command);
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* `linearisation` as a SUNDIALS matrix and linear solver. */
-#ifndef TENDONFMU_PLANT_NEWTON_SOLVER_H
-#define TENDONFMU_PLANT_NEWTON_SOLVER_H
+#pragma once
 
 #include <sundials/sundials_linearsolver.h>
 #include <sundials/sundials_matrix.h>
@@ -16,5 +15,3 @@ SUNMatrix newton_matrix(linearisation* blocks, SUNContext context);
 SUNLinearSolver newton_solver(linearisation* blocks, SUNContext context);
 
 }  // namespace tendonfmu::plant
-
-#endif

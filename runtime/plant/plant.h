@@ -1,6 +1,5 @@
 /* The simulated finger as a whole: equations, integrator, sensors, and what remembers them. */
-#ifndef TENDONFMU_PLANT_PLANT_H
-#define TENDONFMU_PLANT_PLANT_H
+#pragma once
 
 #include <memory>
 #include <string>
@@ -70,5 +69,3 @@ class plant {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* Random numbers without a state: a number is a function of seed, channel and sample. */
-#ifndef TENDONFMU_PLANT_RANDOM_NUMBERS_H
-#define TENDONFMU_PLANT_RANDOM_NUMBERS_H
+#pragma once
 
 #include <cmath>
 #include <cstdint>
@@ -40,5 +39,3 @@ inline double normal_number(std::uint64_t seed, std::uint32_t channel, std::uint
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* The numbers of a simulated finger, as read and checked: plain data in SI units, joints and tendons counted from 0. */
-#ifndef TENDONFMU_PLANT_RIG_H
-#define TENDONFMU_PLANT_RIG_H
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -177,5 +176,3 @@ struct rig {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

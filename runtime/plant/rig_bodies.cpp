@@ -63,9 +63,7 @@ void read_links(const json_node& finger, const json_node& physics, rig* rig) {
   rig->tip = three_in(physics, "tip", any_length, three{});
   rig->coupling = numbers_in(physics, "joint_coupling", n - 1, {0.0, 1e6, "N·m/rad"});
   const json_node servo = physics.member("servo");
-  if (!servo.absent()) {
-    servo.expect_keys({"frequency", "damping_ratio"});
-  }
+  servo.expect_keys_if_present({"frequency", "damping_ratio"});
   rig->servo_frequency = number_in(servo, "frequency", {0.01, 1e4, "Hz"}, 15.0);
   rig->servo_damping = number_in(servo, "damping_ratio", {0.01, 100.0, ""}, 1.0);
 }
@@ -79,9 +77,8 @@ void read_tendons(const json_node& finger, const json_node& physics, rig* rig) {
   rig->tendons.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
     const json_node node = list.element(i);
-    if (!node.absent()) {
-      node.expect_keys({"hardening", "damping", "moment_arm_scale", "moment_arm_slope", "eccentricity", "phase"});
-    }
+    node.expect_keys_if_present(
+        {"hardening", "damping", "moment_arm_scale", "moment_arm_slope", "eccentricity", "phase"});
     tendon& tendon = rig->tendons[i];
     tendon.stiffness = number_in(described.element(i), "stiffness", {0.0, 1e9, "N/m", true});
     tendon.hardening = number_in(node, "hardening", {0.0, 1e12, "N/m2"}, 0.0);

@@ -63,9 +63,7 @@ struct presliding {
 
 presliding read_presliding(const json_node& friction) {
   const json_node node = friction.member("presliding");
-  if (!node.absent()) {
-    node.expect_keys({"pulley", "edge", "joint"});
-  }
+  node.expect_keys_if_present({"pulley", "edge", "joint"});
   return {number_in(node, "pulley", {0.0, 1.0, "m", true}, 25e-6),
           number_in(node, "edge", {0.0, 1.0, "m", true}, 40e-6),
           number_in(node, "joint", {0.0, 10.0, "rad", true}, 0.004)};
@@ -198,10 +196,8 @@ void read_joint_sites(const json_node& joints, double distance, double asymmetry
 
 void read_friction(const json_node& finger, const json_node& physics, rig* rig) {
   const json_node node = physics.member("friction");
-  if (!node.absent()) {
-    node.expect_keys({"presliding", "bristle_damping", "stribeck_exponent", "tension_loss", "pulley_torque",
-                      "joint_load", "preload", "asymmetry", "edges", "drift", "heat"});
-  }
+  node.expect_keys_if_present({"presliding", "bristle_damping", "stribeck_exponent", "tension_loss", "pulley_torque",
+                               "joint_load", "preload", "asymmetry", "edges", "drift", "heat"});
   friction_settings& settings = rig->friction;
   const presliding distance = read_presliding(node);
   settings.bristle_damping = number_in(node, "bristle_damping", {0.0, 10.0, "s"}, 0.0);
@@ -214,12 +210,8 @@ void read_friction(const json_node& finger, const json_node& physics, rig* rig) 
   const double asymmetry = number_in(node, "asymmetry", {-0.9, 0.9, ""}, 0.0);
 
   const json_node drift = node.member("drift"), heat = node.member("heat");
-  if (!drift.absent()) {
-    drift.expect_keys({"amplitude", "time_constant"});
-  }
-  if (!heat.absent()) {
-    heat.expect_keys({"coefficient", "time_constant"});
-  }
+  drift.expect_keys_if_present({"amplitude", "time_constant"});
+  heat.expect_keys_if_present({"coefficient", "time_constant"});
   settings.drift_amplitude = number_in(drift, "amplitude", {-0.9, 10.0, ""}, 0.0);
   settings.drift_time = number_in(drift, "time_constant", {0.0, 1e9, "s", true}, 300.0);
   settings.heat_coefficient = number_in(heat, "coefficient", {-10.0, 10.0, "1/J"}, 0.0);

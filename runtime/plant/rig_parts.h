@@ -1,6 +1,5 @@
 /* The parts of a rig file, in the order in which they are read: later ones need the earlier ones' counts. */
-#ifndef TENDONFMU_PLANT_RIG_PARTS_H
-#define TENDONFMU_PLANT_RIG_PARTS_H
+#pragma once
 
 #include "json_node.h"
 #include "rig.h"
@@ -20,5 +19,3 @@ void read_sensors(const json_node& sensors, rig* rig);
 void check_rig(const json_node& document, rig* rig);
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -49,9 +49,7 @@ json_node physics_of(const json_node& document) {
 }
 
 void read_integration(const json_node& node, rig* rig) {
-  if (!node.absent()) {
-    node.expect_keys({"method", "relative_tolerance", "step"});
-  }
+  node.expect_keys_if_present({"method", "relative_tolerance", "step"});
   rig->integration.method = static_cast<int>(choice_in(node, "method", {"cvode", "fixed_step"})) + 1;
   rig->integration.relative_tolerance = number_in(node, "relative_tolerance", {1e-10, 1e-2, ""}, 1e-6);
   rig->integration.step = number_in(node, "step", {1e-6, 1e-2, "s"}, 1e-3);

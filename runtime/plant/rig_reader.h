@@ -1,6 +1,5 @@
 /* From the text of an expanded rig (docs/reference/rig.md) to its numbers. */
-#ifndef TENDONFMU_PLANT_RIG_READER_H
-#define TENDONFMU_PLANT_RIG_READER_H
+#pragma once
 
 #include <cstddef>
 
@@ -12,5 +11,3 @@ namespace tendonfmu::plant {
 rig read_rig(const char* text, std::size_t size);
 
 }  // namespace tendonfmu::plant
-
-#endif

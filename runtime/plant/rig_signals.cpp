@@ -81,10 +81,8 @@ void read_motion(const json_node& motion, rig* rig) {
 }
 
 void read_sensors(const json_node& node, rig* rig) {
-  if (!node.absent()) {
-    node.expect_keys(
-        {"rate", "tendon_force", "tendon_position", "joint_position", "joint_velocity", "external_torque"});
-  }
+  node.expect_keys_if_present(
+      {"rate", "tendon_force", "tendon_position", "joint_position", "joint_velocity", "external_torque"});
   const std::size_t n = rig->joint_count(), m = rig->tendon_count();
   sensors& sensors = rig->sensors;
   sensors.rate = number_in(node, "rate", {1.0, 1e5, "Hz"}, 1000.0);

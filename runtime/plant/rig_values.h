@@ -1,6 +1,5 @@
 /* Numbers of a rig file with their ranges: read, or refused with key path, value, range and unit. */
-#ifndef TENDONFMU_PLANT_RIG_VALUES_H
-#define TENDONFMU_PLANT_RIG_VALUES_H
+#pragma once
 
 #include <optional>
 #include <string>
@@ -41,5 +40,3 @@ std::size_t index_in(const json_node& parent, const char* key, std::size_t low, 
 std::size_t choice_in(const json_node& parent, const char* key, const std::vector<std::string>& choices);
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,7 +1,6 @@
 /* The links as a serial chain of rigid bodies, in the base frame: R. Featherstone, "Rigid Body Dynamics Algorithms",
  * 2008, chapters 5 (recursive Newton-Euler) and 6 (composite bodies). Over numbers or duals. */
-#ifndef TENDONFMU_PLANT_RIGID_BODY_H
-#define TENDONFMU_PLANT_RIGID_BODY_H
+#pragma once
 
 #include <cstddef>
 
@@ -107,5 +106,3 @@ double kinetic_energy(const rig& rig, const chain_motion<double>& motion);
 double gravity_energy(const rig& rig, const chain_motion<double>& motion);
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* What the sensors make of the true signals: play, delay, gain and offset, noise, resolution, in this order. */
-#ifndef TENDONFMU_PLANT_SENSOR_BANK_H
-#define TENDONFMU_PLANT_SENSOR_BANK_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -55,5 +54,3 @@ class sensor_bank {
 };
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* A line of a message, put together with numbers that no locale changes. */
-#ifndef TENDONFMU_PLANT_SENTENCE_H
-#define TENDONFMU_PLANT_SENTENCE_H
+#pragma once
 
 #include <locale>
 #include <sstream>
@@ -18,5 +17,3 @@ std::string sentence(const Parts&... parts) {
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

@@ -1,6 +1,5 @@
 /* The law of a tendon's site at the present angle of the joint before it: working points, or the edge's diversion. */
-#ifndef TENDONFMU_PLANT_SITE_LAW_H
-#define TENDONFMU_PLANT_SITE_LAW_H
+#pragma once
 
 #include "bristle.h"
 #include "rig.h"
@@ -12,5 +11,3 @@ void set_site_law(const friction_site& site, double angle, double v, int stribec
                   law_columns* laws);
 
 }  // namespace tendonfmu::plant
-
-#endif

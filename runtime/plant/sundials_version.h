@@ -1,6 +1,5 @@
 /* SUNDIALS 6 and 7 differ in a few names. */
-#ifndef TENDONFMU_PLANT_SUNDIALS_VERSION_H
-#define TENDONFMU_PLANT_SUNDIALS_VERSION_H
+#pragma once
 
 #include <sundials/sundials_config.h>
 #include <sundials/sundials_context.h>
@@ -27,5 +26,3 @@ inline int create_context(SUNContext* context) {
 #endif
 
 }  // namespace tendonfmu::plant
-
-#endif

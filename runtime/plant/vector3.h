@@ -1,6 +1,5 @@
 /* Vectors and matrices of three dimensions over numbers or duals. */
-#ifndef TENDONFMU_PLANT_VECTOR3_H
-#define TENDONFMU_PLANT_VECTOR3_H
+#pragma once
 
 #include <array>
 
@@ -60,5 +59,3 @@ rotation<T> turned(const rotation<T>& frame, const std::array<double, 3>& axis, 
 }
 
 }  // namespace tendonfmu::plant
-
-#endif

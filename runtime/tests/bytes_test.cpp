@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "bytes.h"
+#include "core_inside.h"
 
 namespace {
 

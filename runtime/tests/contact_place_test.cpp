@@ -6,8 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "contact_place.h"
-#include "link_geometry.h"
+#include "core_inside.h"
 
 namespace {
 

@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "bytes.h"
-#include "finger_memory.h"
 #include "model_inside.h"
 
 using test_finger::Finger;

@@ -54,9 +54,7 @@ struct Effect {
       : type(effect_by_name(name)),
         place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE},
         numbers(std::move(values)) {
-    if (type->state_count) {
-      memory.resize(type->state_count(joints, tendons, place), 0.0);
-    }
+    memory.resize(type->state_count ? type->state_count(joints, tendons, place) : type->memory_count, 0.0);
   }
 
   // calls with the sample as an effect sees it
@@ -473,7 +471,8 @@ TEST(Table, HasDifferentNamesAndNumbers) {
     EXPECT_EQ(effect_by_id(effect->id), effect);
     EXPECT_EQ(effect_by_name(effect->name), effect);
     EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
-    EXPECT_EQ(effect->state_count != nullptr, effect->advance || effect->kind == EFFECT_SIGNAL) << effect->name;
+    EXPECT_EQ(effect->state_count || effect->memory_count, effect->advance || effect->kind == EFFECT_SIGNAL)
+        << effect->name;
     for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
       const effect_parameter& number = effect->parameters[p];
       EXPECT_GT(number.scale, 0.0) << effect->name << "." << number.name;

@@ -8,9 +8,12 @@
 #include <random>
 #include <vector>
 
-#include "exponential_kernels.h"
-#include "friction_law.h"
+#include "core_inside.h"
 #include "test_finger.h"
+
+extern "C" {
+#include "exponential_kernels.h"
+}
 
 namespace {
 

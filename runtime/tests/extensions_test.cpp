@@ -10,8 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "bytes.h"
-#include "extension_signals.h"
+#include "core_inside.h"
 #include "test_finger.h"
 
 namespace {

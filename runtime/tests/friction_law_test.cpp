@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "friction_law.h"
+#include "core_inside.h"
 
 namespace {
 

@@ -1,6 +1,5 @@
 // Recordings that the model explains exactly, with a known truth, and fingers that do not know it yet.
-#ifndef TENDONFMU_TESTS_MADE_RECORDING_H
-#define TENDONFMU_TESTS_MADE_RECORDING_H
+#pragma once
 
 #include <gtest/gtest.h>
 
@@ -259,5 +258,3 @@ inline double mean_square(const Learner& learner, std::size_t first) {
 }
 
 }  // namespace made
-
-#endif

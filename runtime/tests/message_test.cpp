@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "message.h"
+#include "core_inside.h"
 
 namespace {
 

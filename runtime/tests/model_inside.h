@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "bytes.h"
 #include "core_inside.h"
 #include "test_finger.h"
 

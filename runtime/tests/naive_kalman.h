@@ -1,7 +1,6 @@
 /* The filter that kalman.h is compared with: one sample at a time, full matrices in long double, Joseph's form. Written
  * for nothing but to be seen to be right. */
-#ifndef TENDONFMU_TESTS_NAIVE_KALMAN_H
-#define TENDONFMU_TESTS_NAIVE_KALMAN_H
+#pragma once
 
 #include <Eigen/Dense>
 
@@ -74,5 +73,3 @@ class Filter {
 };
 
 }  // namespace naive
-
-#endif

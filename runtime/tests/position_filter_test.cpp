@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "finger_memory.h"
+#include "core_inside.h"
 #include "test_finger.h"
 
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "pseudo_inverse.h"
+#include "core_inside.h"
 
 namespace {
 

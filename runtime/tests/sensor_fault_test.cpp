@@ -6,9 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "finger_memory.h"
 #include "model_inside.h"
-#include "rows_in_use.h"
 
 using test_finger::Finger;
 using test_finger::joints;

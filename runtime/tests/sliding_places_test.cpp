@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "finger_memory.h"
 #include "model_inside.h"
 #include "presliding_step.h"
 #include "test_finger.h"

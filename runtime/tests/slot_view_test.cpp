@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "core_inside.h"
-#include "slot_view.h"
 #include "test_finger.h"
 
 namespace {

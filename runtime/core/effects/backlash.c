@@ -6,13 +6,6 @@
 
 enum { BEHIND, BY_WIDTH, FOLLOWS, MEMORY_COUNT };
 
-static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)joints;
-  (void)tendons;
-  (void)place;
-  return MEMORY_COUNT;
-}
-
 /* the position that has the play; NULL: not this time, or the kinematics source does not use it */
 static double* position_of(effect_place place, const effect_signals* signals) {
   if (place.joint != EFFECT_NOWHERE) {
@@ -75,7 +68,7 @@ const effect_type effect_backlash = {
     BACKLASH_FACTS,
     .kind = EFFECT_SIGNAL,
     .order = 1,
-    .state_count = state_count,
+    .memory_count = MEMORY_COUNT,
     .signal = signal,
     .signal_slope = signal_slope,
     .signal_pass = signal_pass,

@@ -7,15 +7,10 @@
  * Order within a sample: advance() computes what the effect will remember, from what the sample before left; then its
  * other calls read that. It becomes the finger's memory only when the sample is accepted, and derivatives asked for
  * afterwards read the same memory: whatever they need of the sample before must be in it. */
-#ifndef TENDONFMU_EFFECT_H
-#define TENDONFMU_EFFECT_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_ALL_JOINTS = 16 };
 
@@ -117,7 +112,9 @@ typedef struct effect_type {
   uint32_t parameter_count;
   const effect_parameter* parameters;
 
-  /* Numbers that it remembers on a finger of n joints and m tendons, part of the finger's state block; NULL: none. */
+  /* Numbers that it remembers, part of the finger's state block: so many, or what state_count() says of a finger of n
+   * joints and m tendons. */
+  size_t memory_count;
   size_t (*state_count)(size_t joints, size_t tendons, effect_place place);
   /* after ← what it remembers once this sample is accepted; NULL with no memory, and of signals. Called when the
    * kinematics are known. */
@@ -163,9 +160,3 @@ const effect_type* effect_by_name(const char* name);
 
 /* Row by position 0.., NULL past the end. */
 const effect_type* effect_at(size_t position);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif

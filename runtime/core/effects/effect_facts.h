@@ -1,7 +1,6 @@
 /* Generated from the tables in runtime/description by `python tools/tables/generate.py`: do not edit. */
 /* clang-format off */
-#ifndef TENDONFMU_EFFECT_FACTS_H
-#define TENDONFMU_EFFECT_FACTS_H
+#pragma once
 
 #include "effect.h"
 
@@ -64,5 +63,3 @@ enum { EFFECT_COUNT = 17 };
 
 /* All effects, in the order of the table. */
 extern const effect_type* const all_effects[EFFECT_COUNT];
-
-#endif

@@ -1,6 +1,5 @@
 /* What several terms have in common. */
-#ifndef TENDONFMU_EFFECT_PARTS_H
-#define TENDONFMU_EFFECT_PARTS_H
+#pragma once
 
 #include "effect.h"
 
@@ -24,5 +23,3 @@ static inline double held_side(const effect_sample* sample, double velocity, dou
   }
   return sample->first ? 0.0 : *before;
 }
-
-#endif

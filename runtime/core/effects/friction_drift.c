@@ -10,13 +10,6 @@ enum { AMPLITUDE, TIME_CONSTANT };
 /* what has come of it, 1 − e^−age, and how fast it comes with age, −age·e^−age, for the time constant it was told */
 enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, BY_AGE, MEMORY_COUNT };
 
-static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)joints;
-  (void)tendons;
-  (void)place;
-  return MEMORY_COUNT;
-}
-
 static void come_so_far(double elapsed, double time_constant, double* come, double* by_age) {
   const double age = elapsed > 0.0 ? elapsed / time_constant : 0.0;
   *come = law_one_minus_exponential(age);
@@ -45,5 +38,5 @@ static effect_grip grip(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_friction_drift = {
-    FRICTION_DRIFT_FACTS, .kind = EFFECT_FRICTION, .state_count = state_count, .advance = advance, .grip = grip,
+    FRICTION_DRIFT_FACTS, .kind = EFFECT_FRICTION, .memory_count = MEMORY_COUNT, .advance = advance, .grip = grip,
 };

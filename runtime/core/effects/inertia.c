@@ -8,13 +8,6 @@
 
 enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
 
-static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)joints;
-  (void)tendons;
-  (void)place;
-  return NUMBERS_REMEMBERED;
-}
-
 static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                     double* after) {
   (void)parameters;
@@ -50,7 +43,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_inertia = {
-    INERTIA_FACTS,      .kind = EFFECT_TORQUE,          .state_count = state_count,
+    INERTIA_FACTS,      .kind = EFFECT_TORQUE,          .memory_count = NUMBERS_REMEMBERED,
     .advance = advance, .advance_slope = advance_slope, .torque = torque,
     .slope = slope,
 };

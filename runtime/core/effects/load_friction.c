@@ -9,13 +9,6 @@
 /* T_j = coulomb·|f0|·s: Coulomb friction in a joint that grows with the force of one tendon, s the sign of the joint's
  * velocity when it last moved. */
 
-static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)joints;
-  (void)tendons;
-  (void)place;
-  return 1;
-}
-
 static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                     double* after) {
   (void)parameters;
@@ -34,6 +27,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_load_friction = {
-    LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
-    .advance = advance,  .torque = torque,      .slope = slope,
+    LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .memory_count = 1, .advance = advance, .torque = torque, .slope = slope,
 };

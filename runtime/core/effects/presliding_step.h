@@ -2,8 +2,7 @@
  *
  * F = ζ·|F(v)|, dζ = (s − ζ)·|dx|/D with s = sgn(dx), integrated exactly over each sample (Dahl 1968 with exponent 1).
  * D is the displacement at a place; of a row without one displacement·v_min, v_min being the effect's threshold. */
-#ifndef TENDONFMU_PRESLIDING_STEP_H
-#define TENDONFMU_PRESLIDING_STEP_H
+#pragma once
 
 #include <float.h>
 
@@ -55,5 +54,3 @@ HOT_INLINE void presliding_step(const presliding_places* p, quad share, quad by_
       quad_keep(quad_both(lasts, p->has_slopes), presliding_bounded(quad_div(motion, p->distance)));
   after[PRESLIDING_KEPT] = quad_select(stands, one, kept);
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Sine and cosine with the same bits everywhere, without the host's libm: within 1 ulp of 1 for the angles of joints.
  * Angles beyond ±1e5 rad count as ±1e5. */
-#ifndef TENDONFMU_SINE_COSINE_H
-#define TENDONFMU_SINE_COSINE_H
+#pragma once
 
 /* include floating_point.h first */
 
@@ -39,5 +38,3 @@ static inline sine_cosine sine_cosine_of(double angle) {
          : quarters == 2 ? (sine_cosine){-s, -c}
                          : (sine_cosine){-c, s};
 }
-
-#endif

@@ -8,13 +8,6 @@
 
 enum { BY_HARDENING, BY_FORCE, MEMORY_COUNT }; /* of the correction: m³/N, m/N */
 
-static size_t state_count(size_t joints, size_t tendons, effect_place place) {
-  (void)joints;
-  (void)tendons;
-  (void)place;
-  return MEMORY_COUNT;
-}
-
 static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
                    double* after) {
   (void)before;
@@ -51,6 +44,7 @@ static void signal_pass(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_tendon_nonlinearity = {
-    TENDON_NONLINEARITY_FACTS,    .kind = EFFECT_SIGNAL,      .order = 2, .state_count = state_count, .signal = signal,
-    .signal_slope = signal_slope, .signal_pass = signal_pass,
+    TENDON_NONLINEARITY_FACTS,    .kind = EFFECT_SIGNAL, .order = 2,
+    .memory_count = MEMORY_COUNT, .signal = signal,      .signal_slope = signal_slope,
+    .signal_pass = signal_pass,
 };

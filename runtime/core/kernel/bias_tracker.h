@@ -1,7 +1,6 @@
 /* The bias procedure of fig. 5: what happens when an effect comes to rest or begins to move, and a Kalman filter per
  * joint that tracks what sticks. */
-#ifndef TENDONFMU_BIAS_TRACKER_H
-#define TENDONFMU_BIAS_TRACKER_H
+#pragma once
 
 #include "extensions.h"
 #include "force_propagation.h"
@@ -294,5 +293,3 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
     count_absorbed(f, 1.0 - own_gain[0]);
   }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Contact while the motors stand: a joint torque that has changed since they came to rest by more than noise and creep
  * make of it (docs/reference/semantics.md#contact-at-rest). */
-#ifndef TENDONFMU_CONTACT_AT_REST_H
-#define TENDONFMU_CONTACT_AT_REST_H
+#pragma once
 
 #include "friction_bound.h"
 #include "kinematics.h"
@@ -222,5 +221,3 @@ HOT_INLINE quad_mask loaded_since_rest(tendonfmu_finger* f, size_t j) {
   quad_store(s->carried_load + j, quad_keep(lasts, carried));
   return quad_either(lasts, quad_greater(quad_load(s->rest_contact + j), quad_set(0.5)));
 }
-
-#endif

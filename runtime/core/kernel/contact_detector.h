@@ -1,7 +1,6 @@
 /* Contact: a joint whose residual exceeds its threshold (paper VI), or whose innovation exceeds what noise and friction
  * can make of it (docs/reference/semantics.md#contact-detector). */
-#ifndef TENDONFMU_CONTACT_DETECTOR_H
-#define TENDONFMU_CONTACT_DETECTOR_H
+#pragma once
 
 #include "contact_at_rest.h"
 #include "contact_drift.h"
@@ -146,5 +145,3 @@ HOT_INLINE void estimate_variance(tendonfmu_finger* f, double mean_force) {
     quad_store(s->total_variance + j, total);
   }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Contact that rises slowly: what the modelled friction leaves drifts away from where it was
  * (docs/reference/semantics.md#contact-detector). */
-#ifndef TENDONFMU_CONTACT_DRIFT_H
-#define TENDONFMU_CONTACT_DRIFT_H
+#pragma once
 
 #include "bias_tracker.h"
 
@@ -82,5 +81,3 @@ HOT_INLINE void follow_drift(tendonfmu_finger* f, int contact, double step, doub
     quad_store(s->learned + j, quad_with_sign(quad_min(quad_abs(sum), quad_set(LARGEST_SUM)), sum));
   }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* exp(−x) for x >= 0, four at a time: the same bits in every kernel, without the host's libm. Within 1.5 ulp
  * (runtime/tests holds it to that). Arguments above 708 count as 708, 3e-308: no result is subnormal. */
-#ifndef TENDONFMU_EXPONENTIAL_H
-#define TENDONFMU_EXPONENTIAL_H
+#pragma once
 
 #include "quad.h"
 
@@ -35,5 +34,3 @@ HOT_INLINE quad exp_of_minus(quad x) {
 HOT_INLINE quad approach_share(quad x) {
   return quad_sub(quad_set(1.0), exp_of_minus(x));
 }
-
-#endif

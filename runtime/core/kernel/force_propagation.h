@@ -1,7 +1,6 @@
 /* Friction values at the present velocities, the tendon forces behind them, and the torques they make: eqs. (6)-(10).
  */
-#ifndef TENDONFMU_FORCE_PROPAGATION_H
-#define TENDONFMU_FORCE_PROPAGATION_H
+#pragma once
 
 #include "sliding_places.h"
 #include "slot_view.h"
@@ -276,5 +275,3 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
     quad_store(s->friction + j, quad_add(quad_add(quad_sums(tendon_friction + j), joint_friction), cover));
   }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* How far the friction may be from what is modelled: what stiction can hold, and what the errors of the parameters make
  * (docs/reference/semantics.md#friction-bounds). */
-#ifndef TENDONFMU_FRICTION_BOUND_H
-#define TENDONFMU_FRICTION_BOUND_H
+#pragma once
 
 #include "force_propagation.h"
 
@@ -111,5 +110,3 @@ HOT_INLINE void remember_jumps(tendonfmu_finger* f, const double* before, double
     quad_store(sum, quad_min(larger, quad_set(LARGEST_SUM))); /* however many jumps pile up */
   }
 }
-
-#endif

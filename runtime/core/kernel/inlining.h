@@ -1,6 +1,5 @@
 /* How the functions of a kernel are declared. */
-#ifndef TENDONFMU_INLINING_H
-#define TENDONFMU_INLINING_H
+#pragma once
 
 /* Four-lane functions must be inlined: a quad passed through memory costs more than most of them do. The transitions of
  * fig. 5 are rare and stay out of the way. */
@@ -13,6 +12,4 @@
 #else
 #define HOT_INLINE  static inline
 #define COLD_STATIC static
-#endif
-
 #endif

@@ -1,6 +1,5 @@
 /* From tendon positions to joint angles and velocities, eqs. (2), (4), (5), and the velocity filter. */
-#ifndef TENDONFMU_KINEMATICS_H
-#define TENDONFMU_KINEMATICS_H
+#pragma once
 
 #include "finger_memory.h"
 
@@ -74,5 +73,3 @@ HOT_INLINE void relative_velocities(const tendonfmu_finger* f, double* velocity)
     }
   }
 }
-
-#endif

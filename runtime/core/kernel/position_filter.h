@@ -1,8 +1,7 @@
 /* Joint angles with known noise: a Kalman filter over angle, velocity and acceleration of each joint, driven by white
  * jerk, and a gate that holds the angle while the velocity is not told from 0
  * (docs/reference/semantics.md#position-filter). */
-#ifndef TENDONFMU_POSITION_FILTER_H
-#define TENDONFMU_POSITION_FILTER_H
+#pragma once
 
 #include "kinematics.h"
 
@@ -130,5 +129,3 @@ HOT_INLINE int filter_is_finite(const tendonfmu_finger* f) {
   }
   return quad_sum(probe) == 0.0;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* What the x86-64 processor and its operating system allow. Own checks: the compilers' __builtin_cpu_supports does not
  * link under zig. */
-#ifndef TENDONFMU_PROCESSOR_H
-#define TENDONFMU_PROCESSOR_H
+#pragma once
 
 #if defined(__x86_64__) || defined(_M_X64)
 
@@ -67,7 +66,5 @@ static inline int has_avx2_and_fma(void) {
 static inline int has_avx512f(void) {
   return processor_has(PROCESSOR_AVX, PROCESSOR_AVX512F, REGISTERS_AVX512);
 }
-
-#endif
 
 #endif

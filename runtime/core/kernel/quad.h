@@ -1,6 +1,5 @@
 /* The quad of this source: plain C, unless the source defines TENDONFMU_QUAD_SSE2 or TENDONFMU_QUAD_AVX2 before. */
-#ifndef TENDONFMU_QUAD_H
-#define TENDONFMU_QUAD_H
+#pragma once
 
 #if defined(TENDONFMU_QUAD_AVX2)
 #include "quad_avx2.h"
@@ -8,6 +7,4 @@
 #include "quad_sse2.h"
 #else
 #include "quad_plain.h"
-#endif
-
 #endif

@@ -1,6 +1,5 @@
 /* Four doubles side by side in one AVX2 register. The meaning of each call is in quad_plain.h. */
-#ifndef TENDONFMU_QUAD_AVX2_H
-#define TENDONFMU_QUAD_AVX2_H
+#pragma once
 
 #include <immintrin.h>
 
@@ -40,28 +39,25 @@ HOT_INLINE quad quad_set(double x) {
   return _mm256_set1_pd(x);
 }
 
-HOT_INLINE quad quad_add(quad a, quad b) {
-  return _mm256_add_pd(a, b);
-}
+#define QUAD_CALL(name, operation)       \
+  HOT_INLINE quad name(quad a, quad b) { \
+    return operation(a, b);              \
+  }
 
-HOT_INLINE quad quad_sub(quad a, quad b) {
-  return _mm256_sub_pd(a, b);
-}
+QUAD_CALL(quad_add, _mm256_add_pd)
+QUAD_CALL(quad_sub, _mm256_sub_pd)
+QUAD_CALL(quad_mul, _mm256_mul_pd)
+QUAD_CALL(quad_div, _mm256_div_pd)
+QUAD_CALL(quad_min, _mm256_min_pd)
+QUAD_CALL(quad_max, _mm256_max_pd)
+QUAD_CALL(quad_both, _mm256_and_pd)
+QUAD_CALL(quad_either, _mm256_or_pd)
+QUAD_CALL(quad_differ, _mm256_xor_pd)
+QUAD_CALL(quad_keep, _mm256_and_pd)
+QUAD_CALL(quad_drop, _mm256_andnot_pd)
 
-HOT_INLINE quad quad_mul(quad a, quad b) {
-  return _mm256_mul_pd(a, b);
-}
-
-HOT_INLINE quad quad_div(quad a, quad b) {
-  return _mm256_div_pd(a, b);
-}
-
-HOT_INLINE quad quad_abs(quad a) {
-  return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
-}
-
-HOT_INLINE quad quad_with_sign(quad a, quad sign) {
-  return _mm256_xor_pd(a, _mm256_and_pd(_mm256_set1_pd(-0.0), sign));
+HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
+  return quad_drop(b, a);
 }
 
 HOT_INLINE quad_mask quad_greater(quad a, quad b) {
@@ -72,44 +68,20 @@ HOT_INLINE quad_mask quad_at_least(quad a, quad b) {
   return _mm256_cmp_pd(a, b, _CMP_GE_OQ);
 }
 
-HOT_INLINE quad_mask quad_both(quad_mask a, quad_mask b) {
-  return _mm256_and_pd(a, b);
+HOT_INLINE quad quad_abs(quad a) {
+  return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
 }
 
-HOT_INLINE quad_mask quad_either(quad_mask a, quad_mask b) {
-  return _mm256_or_pd(a, b);
-}
-
-HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
-  return _mm256_andnot_pd(b, a);
-}
-
-HOT_INLINE quad_mask quad_differ(quad_mask a, quad_mask b) {
-  return _mm256_xor_pd(a, b);
+HOT_INLINE quad quad_with_sign(quad a, quad sign) {
+  return _mm256_xor_pd(a, _mm256_and_pd(_mm256_set1_pd(-0.0), sign));
 }
 
 HOT_INLINE int quad_mask_bits(quad_mask m) {
   return _mm256_movemask_pd(m);
 }
 
-HOT_INLINE quad quad_keep(quad_mask m, quad a) {
-  return _mm256_and_pd(m, a);
-}
-
 HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   return _mm256_blendv_pd(b, a, m);
-}
-
-HOT_INLINE quad quad_drop(quad_mask m, quad a) {
-  return _mm256_andnot_pd(m, a);
-}
-
-HOT_INLINE quad quad_min(quad a, quad b) {
-  return _mm256_min_pd(a, b);
-}
-
-HOT_INLINE quad quad_max(quad a, quad b) {
-  return _mm256_max_pd(a, b);
 }
 
 HOT_INLINE quad quad_sqrt(quad a) {
@@ -135,5 +107,3 @@ HOT_INLINE quad quad_scale(quad a, quad shifted) {
   return _mm256_castsi256_pd(
       _mm256_add_epi64(_mm256_castpd_si256(a), _mm256_slli_epi64(_mm256_castpd_si256(shifted), 52)));
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Four doubles side by side, in plain C: the fallback, and the definition of what the other quads must give bit by bit.
  */
-#ifndef TENDONFMU_QUAD_PLAIN_H
-#define TENDONFMU_QUAD_PLAIN_H
+#pragma once
 
 #include <math.h>
 #include <stdint.h>
@@ -17,25 +16,26 @@ typedef struct quad_mask {
 } quad_mask;
 
 /* the expression for each lane i, written out: compilers leave a loop of four a loop */
+#define QUAD_LANE(number, expression) \
+  {                                   \
+    enum { i = number };              \
+    expression;                       \
+  }
 #define QUAD_EACH(expression) \
   do {                        \
-    {                         \
-      enum { i = 0 };         \
-      expression;             \
-    }                         \
-    {                         \
-      enum { i = 1 };         \
-      expression;             \
-    }                         \
-    {                         \
-      enum { i = 2 };         \
-      expression;             \
-    }                         \
-    {                         \
-      enum { i = 3 };         \
-      expression;             \
-    }                         \
+    QUAD_LANE(0, expression)  \
+    QUAD_LANE(1, expression)  \
+    QUAD_LANE(2, expression)  \
+    QUAD_LANE(3, expression)  \
   } while (0)
+
+/* a call of two quads, or of a mask and a quad, lane by lane */
+#define QUAD_CALL(result, name, first, second, value) \
+  HOT_INLINE result name(first a, second b) {         \
+    result r;                                         \
+    QUAD_EACH(r.lane[i] = (value));                   \
+    return r;                                         \
+  }
 
 HOT_INLINE uint64_t quad_bits(double x) {
   uint64_t bits;
@@ -78,66 +78,28 @@ HOT_INLINE quad quad_set(double x) {
   return r;
 }
 
-HOT_INLINE quad quad_add(quad a, quad b) {
-  QUAD_EACH(a.lane[i] += b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad quad_sub(quad a, quad b) {
-  QUAD_EACH(a.lane[i] -= b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad quad_mul(quad a, quad b) {
-  QUAD_EACH(a.lane[i] *= b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad quad_div(quad a, quad b) {
-  QUAD_EACH(a.lane[i] /= b.lane[i]);
-  return a;
-}
+QUAD_CALL(quad, quad_add, quad, quad, a.lane[i] + b.lane[i])
+QUAD_CALL(quad, quad_sub, quad, quad, a.lane[i] - b.lane[i])
+QUAD_CALL(quad, quad_mul, quad, quad, a.lane[i] * b.lane[i])
+QUAD_CALL(quad, quad_div, quad, quad, a.lane[i] / b.lane[i])
+/* b where one is NaN */
+QUAD_CALL(quad, quad_min, quad, quad, a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i])
+QUAD_CALL(quad, quad_max, quad, quad, a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i])
+QUAD_CALL(quad_mask, quad_greater, quad, quad, a.lane[i] > b.lane[i] ? UINT64_MAX : 0)
+QUAD_CALL(quad_mask, quad_at_least, quad, quad, a.lane[i] >= b.lane[i] ? UINT64_MAX : 0)
+QUAD_CALL(quad_mask, quad_both, quad_mask, quad_mask, a.lane[i] & b.lane[i])
+QUAD_CALL(quad_mask, quad_either, quad_mask, quad_mask, a.lane[i] | b.lane[i])
+QUAD_CALL(quad_mask, quad_only_first, quad_mask, quad_mask, a.lane[i] & ~b.lane[i])
+QUAD_CALL(quad_mask, quad_differ, quad_mask, quad_mask, a.lane[i] ^ b.lane[i])
+/* b where the mask is set, or not set, +0 elsewhere */
+QUAD_CALL(quad, quad_keep, quad_mask, quad, a.lane[i] ? b.lane[i] : 0.0)
+QUAD_CALL(quad, quad_drop, quad_mask, quad, a.lane[i] ? 0.0 : b.lane[i])
+/* a where b >= 0, -a where the sign bit of b is set */
+QUAD_CALL(quad, quad_with_sign, quad, quad,
+          quad_from_bits(quad_bits(a.lane[i]) ^ (quad_bits(b.lane[i]) & 0x8000000000000000u)))
 
 HOT_INLINE quad quad_abs(quad a) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) & 0x7fffffffffffffffu));
-  return a;
-}
-
-/* a where sign >= 0, -a where the sign bit of `sign` is set */
-HOT_INLINE quad quad_with_sign(quad a, quad sign) {
-  QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) ^ (quad_bits(sign.lane[i]) & 0x8000000000000000u)));
-  return a;
-}
-
-HOT_INLINE quad_mask quad_greater(quad a, quad b) {
-  quad_mask m;
-  QUAD_EACH(m.lane[i] = a.lane[i] > b.lane[i] ? UINT64_MAX : 0);
-  return m;
-}
-
-HOT_INLINE quad_mask quad_at_least(quad a, quad b) {
-  quad_mask m;
-  QUAD_EACH(m.lane[i] = a.lane[i] >= b.lane[i] ? UINT64_MAX : 0);
-  return m;
-}
-
-HOT_INLINE quad_mask quad_both(quad_mask a, quad_mask b) {
-  QUAD_EACH(a.lane[i] &= b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad_mask quad_either(quad_mask a, quad_mask b) {
-  QUAD_EACH(a.lane[i] |= b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
-  QUAD_EACH(a.lane[i] &= ~b.lane[i]);
-  return a;
-}
-
-HOT_INLINE quad_mask quad_differ(quad_mask a, quad_mask b) {
-  QUAD_EACH(a.lane[i] ^= b.lane[i]);
   return a;
 }
 
@@ -148,30 +110,6 @@ HOT_INLINE int quad_mask_bits(quad_mask m) {
 
 HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   QUAD_EACH(a.lane[i] = m.lane[i] ? a.lane[i] : b.lane[i]);
-  return a;
-}
-
-/* a where the mask is set, +0 elsewhere */
-HOT_INLINE quad quad_keep(quad_mask m, quad a) {
-  QUAD_EACH(a.lane[i] = m.lane[i] ? a.lane[i] : 0.0);
-  return a;
-}
-
-/* a where the mask is not set, +0 elsewhere */
-HOT_INLINE quad quad_drop(quad_mask m, quad a) {
-  QUAD_EACH(a.lane[i] = m.lane[i] ? 0.0 : a.lane[i]);
-  return a;
-}
-
-/* the smaller one; b where one is NaN */
-HOT_INLINE quad quad_min(quad a, quad b) {
-  QUAD_EACH(a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]);
-  return a;
-}
-
-/* the larger one; b where one is NaN */
-HOT_INLINE quad quad_max(quad a, quad b) {
-  QUAD_EACH(a.lane[i] = a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i]);
   return a;
 }
 
@@ -196,5 +134,3 @@ HOT_INLINE quad quad_scale(quad a, quad shifted) {
   QUAD_EACH(a.lane[i] = quad_from_bits(quad_bits(a.lane[i]) + (quad_bits(shifted.lane[i]) << 52)));
   return a;
 }
-
-#endif

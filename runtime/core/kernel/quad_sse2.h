@@ -1,6 +1,5 @@
 /* Four doubles side by side in two SSE2 registers: baseline x86-64. The meaning of each call is in quad_plain.h. */
-#ifndef TENDONFMU_QUAD_SSE2_H
-#define TENDONFMU_QUAD_SSE2_H
+#pragma once
 
 #include <emmintrin.h>
 
@@ -41,20 +40,27 @@ HOT_INLINE quad quad_set(double x) {
   return (quad){_mm_set1_pd(x), _mm_set1_pd(x)};
 }
 
-HOT_INLINE quad quad_add(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_add_pd, a, b);
-}
+#define QUAD_CALL(name, operation)            \
+  HOT_INLINE quad name(quad a, quad b) {      \
+    return QUAD_BOTH_HALVES(operation, a, b); \
+  }
 
-HOT_INLINE quad quad_sub(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_sub_pd, a, b);
-}
+QUAD_CALL(quad_add, _mm_add_pd)
+QUAD_CALL(quad_sub, _mm_sub_pd)
+QUAD_CALL(quad_mul, _mm_mul_pd)
+QUAD_CALL(quad_div, _mm_div_pd)
+QUAD_CALL(quad_min, _mm_min_pd)
+QUAD_CALL(quad_max, _mm_max_pd)
+QUAD_CALL(quad_both, _mm_and_pd)
+QUAD_CALL(quad_either, _mm_or_pd)
+QUAD_CALL(quad_differ, _mm_xor_pd)
+QUAD_CALL(quad_keep, _mm_and_pd)
+QUAD_CALL(quad_drop, _mm_andnot_pd)
+QUAD_CALL(quad_greater, _mm_cmpgt_pd)
+QUAD_CALL(quad_at_least, _mm_cmpge_pd)
 
-HOT_INLINE quad quad_mul(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_mul_pd, a, b);
-}
-
-HOT_INLINE quad quad_div(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_div_pd, a, b);
+HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
+  return quad_drop(b, a);
 }
 
 HOT_INLINE quad quad_abs(quad a) {
@@ -68,54 +74,14 @@ HOT_INLINE quad quad_with_sign(quad a, quad sign) {
   return QUAD_BOTH_HALVES(_mm_xor_pd, a, flip);
 }
 
-HOT_INLINE quad_mask quad_greater(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_cmpgt_pd, a, b);
-}
-
-HOT_INLINE quad_mask quad_at_least(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_cmpge_pd, a, b);
-}
-
-HOT_INLINE quad_mask quad_both(quad_mask a, quad_mask b) {
-  return QUAD_BOTH_HALVES(_mm_and_pd, a, b);
-}
-
-HOT_INLINE quad_mask quad_either(quad_mask a, quad_mask b) {
-  return QUAD_BOTH_HALVES(_mm_or_pd, a, b);
-}
-
-HOT_INLINE quad_mask quad_only_first(quad_mask a, quad_mask b) {
-  return QUAD_BOTH_HALVES(_mm_andnot_pd, b, a);
-}
-
-HOT_INLINE quad_mask quad_differ(quad_mask a, quad_mask b) {
-  return QUAD_BOTH_HALVES(_mm_xor_pd, a, b);
-}
-
 HOT_INLINE int quad_mask_bits(quad_mask m) {
   return _mm_movemask_pd(m.low) | _mm_movemask_pd(m.high) << 2;
-}
-
-HOT_INLINE quad quad_keep(quad_mask m, quad a) {
-  return QUAD_BOTH_HALVES(_mm_and_pd, m, a);
 }
 
 HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   const quad first = quad_keep(m, a);
   const quad second = QUAD_BOTH_HALVES(_mm_andnot_pd, m, b);
   return QUAD_BOTH_HALVES(_mm_or_pd, first, second);
-}
-
-HOT_INLINE quad quad_drop(quad_mask m, quad a) {
-  return QUAD_BOTH_HALVES(_mm_andnot_pd, m, a);
-}
-
-HOT_INLINE quad quad_min(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_min_pd, a, b);
-}
-
-HOT_INLINE quad quad_max(quad a, quad b) {
-  return QUAD_BOTH_HALVES(_mm_max_pd, a, b);
 }
 
 HOT_INLINE quad quad_sqrt(quad a) {
@@ -145,5 +111,3 @@ HOT_INLINE __m128d quad_scale_half(__m128d a, __m128d shifted) {
 HOT_INLINE quad quad_scale(quad a, quad shifted) {
   return QUAD_BOTH_HALVES(quad_scale_half, a, shifted);
 }
-
-#endif

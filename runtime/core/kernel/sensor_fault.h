@@ -1,7 +1,6 @@
 /* Sensors that fail: a tendon force or position that contradicts the spring between them, as the other tendons (or the
  * measured angles) have it (docs/reference/semantics.md#sensor-faults). */
-#ifndef TENDONFMU_SENSOR_FAULT_H
-#define TENDONFMU_SENSOR_FAULT_H
+#pragma once
 
 #include "kinematics.h"
 #include "rows_in_use.h"
@@ -403,5 +402,3 @@ COLD_STATIC void forget_unwatched(tendonfmu_finger* f) {
     }
   }
 }
-
-#endif

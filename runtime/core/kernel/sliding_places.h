@@ -1,6 +1,5 @@
 /* Friction that slides at all times (presliding): what every place remembers, and the share of |F| that acts. */
-#ifndef TENDONFMU_SLIDING_PLACES_H
-#define TENDONFMU_SLIDING_PLACES_H
+#pragma once
 
 #include "finger_memory.h"
 #include "presliding_step.h"
@@ -48,5 +47,3 @@ HOT_INLINE void advance_sliding_places(tendonfmu_finger* f, double step, int fir
     advance_layer(f, &f->extensions.overruled, step, first, 0);
   }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* One sample of the finger, as a recipe. Compiled once for each instruction set: step_plain.c, step_sse2.c, step_avx2.c
  * include a quad and then this. */
-#ifndef TENDONFMU_STEP_KERNEL_H
-#define TENDONFMU_STEP_KERNEL_H
+#pragma once
 
 #include "bias_tracker.h"
 #include "contact_detector.h"
@@ -343,5 +342,3 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   estimate_variance(f, mean_force);
   return SAMPLE_TAKEN;
 }
-
-#endif

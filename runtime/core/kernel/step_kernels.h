@@ -1,5 +1,4 @@
-#ifndef TENDONFMU_STEP_KERNELS_H
-#define TENDONFMU_STEP_KERNELS_H
+#pragma once
 
 #include "kernel_choice.h"
 
@@ -7,6 +6,4 @@ extern const step_kernel step_plain;
 #if defined(__x86_64__) || defined(_M_X64)
 extern const step_kernel step_sse2;
 extern const step_kernel step_avx2;
-#endif
-
 #endif

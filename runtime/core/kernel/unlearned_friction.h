@@ -1,7 +1,6 @@
 /* What the bias has not learned yet: how friction stood before the first sample shows in the residual as motion turns
  * it over (docs/reference/semantics.md#unlearned-start). */
-#ifndef TENDONFMU_UNLEARNED_FRICTION_H
-#define TENDONFMU_UNLEARNED_FRICTION_H
+#pragma once
 
 #include "bias_tracker.h"
 #include "friction_bound.h"
@@ -107,5 +106,3 @@ HOT_INLINE void add_unlearned(tendonfmu_finger* f) {
     quad_store(unlearned, quad_min(sum, most));
   }
 }
-
-#endif
