@@ -30,8 +30,8 @@ from scipy.integrate import solve_ivp
 from evidence import tables
 from evidence.runner import INDEX_RIG, parser
 from tendonfmu.arrays import Array
-from tendonfmu.simulate import Plant, build_plant_fmu, read_rig
-from tendonfmu.simulate.plant import SolverError
+from tendonfmu.simulate import build_plant_fmu, read_rig
+from tendonfmu.simulate.plant import Plant, SolverError
 
 COMPARED = ("joint_position", "tendon_force", "friction_torque")
 
