@@ -199,6 +199,7 @@ class Configured:
     """Base of an estimator as in scikit-learn, which keeps its finger, its options and the function of its progress."""
 
     Options: ClassVar[type[Options]]
+    EARLIER: ClassVar[Mapping[str, str]] = {}  # names of earlier versions -> options
 
     def __init__(self, finger: Any, *, progress: Callable[..., Any] | None = None, **options: Any) -> None:
         unknown = set(options) - set(self.Options.each())
@@ -206,6 +207,14 @@ class Configured:
             raise TypeError(f"{type(self).__name__}: unexpected options {', '.join(sorted(unknown))}")
         self.finger, self.progress = finger, progress
         self.options = self.Options(**options)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an option, as scikit-learn's estimators have them."""
+        options = self.__dict__.get("options")
+        name = self.EARLIER.get(name, name)
+        if options is None or name not in options.each():
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(options, name)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return the constructor arguments by name."""

@@ -102,6 +102,7 @@ class FrictionFit(Configured):
     """
 
     Options: ClassVar[type[Options]] = FrictionFitOptions
+    EARLIER: ClassVar[Mapping[str, str]] = EARLIER
     options: FrictionFitOptions
 
     def __init__(
