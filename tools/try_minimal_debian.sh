@@ -16,7 +16,7 @@ root=${1:-$(mktemp -d)}
 package_settings() {
   local path
   for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/apt/keyrings \
-    /usr/share/keyrings /etc/pip.conf /root/.config/pip /root/.netrc /etc/resolv.conf /etc/hosts; do
+    /usr/share/keyrings /etc/pip.conf "$HOME/.config/pip" "$HOME/.netrc" /etc/resolv.conf /etc/hosts; do
     if [ -e "$path" ]; then echo "$path"; fi
   done
 }
@@ -34,6 +34,7 @@ make_debian() {
   sources=$(find /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list -type f 2>/dev/null | head -n 1)
   mmdebstrap --variant=minbase "$suite" "$root" ${sources:+"$sources"}
   package_settings | xargs tar -ch 2>/dev/null | tar -x -C "$root"
+  if [ -d "$root$HOME/.config/pip" ]; then mkdir -p "$root/srv/.config" && cp -r "$root$HOME/.config/pip" "$root/srv/.config/"; fi
   if [ -e "$certificates" ]; then cp "$certificates" "$root/etc/machine-certificates.crt"; fi
 }
 
@@ -43,11 +44,11 @@ in_debian() {
   mapfile -t settings < <(settings_of_environment)
   unshare --mount bash -euo pipefail -c '
     mount -t proc proc "$0/proc" && mount --rbind /sys "$0/sys" && mount --rbind /dev "$0/dev"
-    exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root CI="${CI:-}" "${@:2}" bash -euo pipefail -c "$1"
+    exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv CI="${CI:-}" "${@:2}" bash -euo pipefail -c "$1"
   ' "$root" "$1" "${settings[@]}" </dev/null
 }
 
-fresh_clone() { git clone --quiet --no-hardlinks . "$root/root/$1"; }
+fresh_clone() { git clone --quiet --no-hardlinks . "$root/srv/$1"; }
 
 # The first block of commands of a page.
 commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed 's/^    //'; }
@@ -57,7 +58,7 @@ trial() {
   fresh_clone "$name"
   echo "--- $page"
   commands_of "$page"
-  in_debian "cd /root/$name; set -x; $(commands_of "$page")"
+  in_debian "cd /srv/$name; set -x; $(commands_of "$page")"
   echo "--- $page: done in $((SECONDS - started)) s"
 }
 
