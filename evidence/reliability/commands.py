@@ -20,7 +20,7 @@ import pandas as pd
 
 from evidence.reliability.binaries import answers
 from evidence.reliability.programs import small
-from evidence.reliability.row import Outcome, Row, Run, with_wrong
+from evidence.reliability.row import Measure, Outcome, Run, with_wrong
 from evidence.runner import EXAMPLES
 
 DEMO = EXAMPLES / "demo_recording"
@@ -240,19 +240,4 @@ def no_room(run: Run) -> Outcome:
     return Outcome(number, with_wrong(result, wrong), not wrong and leaked == 0)
 
 
-ROWS = [
-    Row(
-        "R17",
-        "Commands that are killed",
-        "200 kills",
-        "a machine that loses power: files are not flushed to the disk (fsync)",
-        kills,
-    ),
-    Row(
-        "R18",
-        "No room, no right, no memory",
-        f"{len(SMALL_COMMANDS)} commands",
-        "quotas, network disks; the kernel's out-of-memory killer (R17)",
-        no_room,
-    ),
-]
+ROWS: dict[str, Measure] = {"R17": kills, "R18": no_room}
