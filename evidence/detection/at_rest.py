@@ -25,7 +25,7 @@ from evidence.detection.slots import Case, Slot, cut, made, slots
 from evidence.runner import INDEX_FINGER, parser, publish, say
 from tendonfmu.detect import free_parts
 from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
-from tendonfmu.model import Instance, read_finger
+from tendonfmu.model import native, read_finger
 from tendonfmu.recordings import Recording
 
 RATE, CONFIDENCE = 6.0, 0.9  # 1/h
@@ -76,7 +76,7 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
 def pushed(description: dict[str, Any], arrays: Arrays, slot: Slot) -> dict[str, Any]:
     """What becomes of a push."""
     time, angle = arrays["time"], arrays["true_joint_position"]
-    alarm = Instance.from_description(json.dumps(description), 1).run(inputs(arrays))["contact_at_rest"].ravel()
+    alarm = native.run_recording(description, inputs(arrays))["contact_at_rest"].ravel()
     during = (time >= slot.push) & (time <= slot.top)
     before = angle[(time >= slot.push - 0.1) & (time < slot.push)].mean(axis=0)
     is_found = bool(alarm[during].any())

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from evidence import tables
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.counting import stretches
 from tendonfmu.model import native
@@ -262,8 +263,7 @@ def pumped(take: Take, keys: Keys) -> float:
 
 def residual_rms(take: Take, keys: Keys) -> float:
     """N·m, with nothing taken for contact, after the first second."""
-    residual = take.run({**SILENT, "bias.forget_rate": 5.0, **keys})["residual"][round(RATE) :]
-    return float(np.sqrt(np.mean(residual**2)))
+    return tables.rms(take.run({**SILENT, "bias.forget_rate": 5.0, **keys})["residual"][round(RATE) :])
 
 
 def stiffened(seed: int, follows: bool, rest: float = 0.2, count: int = 20) -> tuple[Take, Numbers]:
@@ -343,4 +343,4 @@ def after_rests(made: tuple[Take, Numbers], keys: Keys) -> float:
     take, exits = made
     residual = take.run({**SILENT, **keys})["residual"]
     chosen = (exits[:, None] + np.arange(round(WINDOW * RATE))).astype(int)
-    return float(np.sqrt(np.mean(residual[chosen] ** 2)))
+    return tables.rms(residual[chosen])

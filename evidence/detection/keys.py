@@ -202,7 +202,7 @@ def forgetting(absorbable: bool, lengths: Sequence[float] = cases.RESTS) -> Tria
         for drift in cases.DRIFTS:
             spread = {"bias.drift_variance": drift, **keys}
             rests = [cases.after_rests(cases.rests(seed, length, drift, absorbable), spread) for length in lengths]
-            values.append(float(np.sqrt(np.mean(np.square(rests)))))
+            values.append(tables.rms(rests))
         return values
 
     when = "during the rest" if absorbable else "as the finger moves off"
