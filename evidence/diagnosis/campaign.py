@@ -149,7 +149,8 @@ def _absorbed(effect: str, k: int, seed: int) -> Case:
 def _unknown(count: int, seed: int) -> Iterator[Case]:
     kinds = itertools.cycle(itertools.product(UNKNOWN_STRENGTHS, UNKNOWN))
     for k, (strength, effect) in zip(range(count), kinds, strict=False):
-        name, given = f"{effect}_{strength:g}_{k}", {"effect": effect, "strength": strength}
+        given: dict[str, Any] = {"effect": effect, "strength": strength}
+        name = f"{effect}_{strength:g}_{k}"
         yield _matched(name, "unknown", makers.single, seed + 400_000 + k, **given)
 
 

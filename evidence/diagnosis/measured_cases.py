@@ -186,7 +186,7 @@ def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -
     raise ValueError(f"strength {strength}: no sound magnitude of this effect has it; tried up to {magnitude:g}")
 
 
-def window(columns: Columns, begin: float, end: float) -> Columns:
+def window(columns: Mapping[str, Array], begin: float, end: float) -> Columns:
     """Both ends included, with the times of the whole."""
     rows = (columns["time"] >= begin) & (columns["time"] <= end)
     return {name: values[rows] for name, values in columns.items()}
@@ -251,7 +251,7 @@ def markdown(rows: Sequence[Row]) -> str:
     made = [row for row in rows if "impossible" not in row]
     made.sort(key=lambda row: (MACHINES.index(row["machine"]), row["strength"]))
     lines = by(
-        [row | {"strength": row["strength"] or "nothing hidden"} for row in made], ("machine", "strength"), cells
+        [{**row, "strength": row["strength"] or "nothing hidden"} for row in made], ("machine", "strength"), cells
     )
     return table(("machine", "strength", "cases", "detected", "true cause in the set", "first"), lines) + "\n"
 
