@@ -28,7 +28,7 @@ FINGERS = (
     INDEX_FINGER,
     CALIBRATED,
     HERE / "small_finger.json",
-    EXAMPLES / "demo_recording" / "two_joints_hidden.json",
+    EXAMPLES / "demo_recording" / "two_joints.json",
 )
 LEVELS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 
@@ -57,7 +57,7 @@ def restored(run: Run) -> Outcome:
         for k, cut in enumerate(cuts):
             last, kernel = str(cut + 1500), kernels[k % len(kernels)]
             saved = run.work / f"{name}.state"
-            whole = called(program, "rest", model, str(cut), last, kernel)
+            whole = called(program, "continue", model, "-", str(cut), last, kernel)
             called(program, "save", model, str(cut), kernel, saved)
             for other in kernels:
                 tried += 1
