@@ -52,14 +52,14 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
         return rests
 
     free, other = rests_of(parts[::2]), rests_of(parts[1::2])
-    rule, reasons = learn_rest(finger.data, free, 1, RATE, CONFIDENCE)
+    rule, reasons = learn_rest(finger.data, free, RATE, CONFIDENCE)
     if rule is None:
         raise RuntimeError(f"no rule: {reasons}")
     say(json.dumps(dict(rule.keys)))
     joints = len(finger.data["joints"])
     never = {**rule.keys, "threshold": [1e9] * joints, "creep": None, "innovation": None}
-    minutes = sum(float(rest.time[-1]) for rest in find_rests(finger.data, other, 1, never)) / 60.0
-    alarms = count_alarms(finger.data, other, 1, rule.keys)
+    minutes = sum(float(rest.time[-1]) for rest in find_rests(finger.data, other, never)) / 60.0
+    alarms = count_alarms(finger.data, other, rule.keys)
     at_rest = {**finger.data, "contact": {"threshold": [1e9] * joints, "rest": dict(rule.keys)}}
     rows = []
     for part, pretension in itertools.product(parts, PRETENSIONS):

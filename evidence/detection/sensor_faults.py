@@ -74,7 +74,7 @@ def learned(data: Mapping[str, Any], recordings: Sequence[Arrays]) -> dict[str, 
         settled = arrays["time"] - arrays["time"][0] >= SETTLING
         force = np.abs(arrays["tendon_force"]).mean(axis=1)
         parts.append(FreePart("training", arrays, force, settled, np.gradient(arrays["time"])))
-    rule = learn_sensors(data, parts, 1)
+    rule = learn_sensors(data, parts)
     say(f"  sensor_fault: {rule}")
     return {**data, "sensor_fault": rule.keys}
 
