@@ -2,8 +2,8 @@
 
 The commands are those of the pages (pages.py finds them), run as they stand there; their seeds are in them
 and in the programs that they call. What each prints and writes as Markdown goes to FOLDER/NAME.md, what else it says to
-FOLDER/NAME.log, its files to FOLDER/work. FOLDER/README.md says how long each took. A table whose file is there is not
-made again. Tables that need recordings of ../shared, or packages, that are not there are skipped, and it says so.
+FOLDER/NAME.log, its files to FOLDER/work. A table whose file is there is not made again. Tables that need recordings
+of ../shared, or packages, that are not there are skipped, and it says so.
 
     python -m evidence --list
     python -m evidence -o FOLDER --only recalibration emps --again
@@ -15,18 +15,14 @@ from __future__ import annotations
 
 import importlib.util
 import itertools
-import json
 import os
 import resource
-import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
-from evidence import tables
 from evidence.pages import Block, blocks_of, pages
 from evidence.runner import ROOT, parser, say, write
 
@@ -37,13 +33,6 @@ PACKAGES = {
     "requirements-peers.lock": ("pythonfmu",),
 }
 LINKED = ("evidence", "docs", "examples", "python_tests")  # that commands of the pages name
-TIMES = "times.json"
-
-
-@dataclass(frozen=True)
-class Took:
-    seconds: float  # of the clock
-    cpu_seconds: float  # of all processors
 
 
 def every_block() -> list[Block]:
@@ -59,78 +48,57 @@ def shared_folder() -> Path | None:
 
 def missing(block: Block, shared: Path | None) -> list[str]:
     """What the block needs and is not there."""
-    return [need for need in block.needs if not _is_there(need, shared)]
 
+    def is_there(need: str) -> bool:
+        if need in PACKAGES:
+            return all(importlib.util.find_spec(name) for name in PACKAGES[need])
+        return shared is not None and (shared / need.removeprefix("../shared/")).is_dir()
 
-def _is_there(need: str, shared: Path | None) -> bool:
-    if need in PACKAGES:
-        return all(importlib.util.find_spec(name) for name in PACKAGES[need])
-    return shared is not None and (shared / need.removeprefix("../shared/")).is_dir()
-
-
-# --- one block --------------------------------------------------------------------------------------------------------
+    return [need for need in block.needs if not is_there(need)]
 
 
 def work_folder(folder: Path, block: Block, shared: Path | None) -> Path:
     """Where the block's commands run: what they name by relative paths is linked."""
-    own = folder / "work" / block.page.stem
-    own.mkdir(parents=True, exist_ok=True)
-    links = {own / name: ROOT / name for name in LINKED}
+    work = folder / "work" / block.page.stem
+    work.mkdir(parents=True, exist_ok=True)
+    links = {work / name: ROOT / name for name in LINKED}
     if shared is not None:
-        links[own.parent / "shared"] = shared
+        links[work.parent / "shared"] = shared
     for link, target in links.items():
         if not link.exists():
             link.symlink_to(target, target_is_directory=True)
-    return own
+    return work
 
 
-def programs(folder: Path) -> Path:
-    """A folder for the PATH whose `python` and `tendonfmu` are those of this Python."""
-    own = folder / "work" / "bin"
-    own.mkdir(parents=True, exist_ok=True)
-    tendonfmu = "-c 'from tendonfmu.cli import main; main()'"
-    for name, arguments in (("python", ""), ("tendonfmu", tendonfmu)):
-        program = own / name
-        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {arguments} "$@"\n', encoding="utf-8")
-        program.chmod(0o755)
-    return own
-
-
-def run(block: Block, folder: Path, shared: Path | None) -> Took | None:
-    """Runs the block's commands and writes NAME.md and NAME.log. None: a command failed."""
-    own = work_folder(folder, block, shared)
-    environment = os.environ | {"PATH": f"{programs(folder)}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "200"}
+def run(block: Block, folder: Path, shared: Path | None) -> str | None:
+    """Runs the block's commands, writes NAME.md and NAME.log, returns the time it took. None: a command failed."""
+    work = work_folder(folder, block, shared)
+    programs = (
+        f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # `python` and `tendonfmu` of this Python
+    )
+    environment = os.environ | {"PATH": programs, "COLUMNS": "200"}
     if shared is not None:
         environment |= {"TENDONFMU_DATA": str(shared / "data")}
     began, clock, before = time.time(), time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     log = folder / f"{block.name}.log"
-    with log.open("w", encoding="utf-8") as said:
+    with log.open("w", encoding="utf-8") as messages:
         ended = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", block.commands],
-            cwd=own, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said, text=True,
+            cwd=work, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages, text=True,
         )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    took = Took(time.monotonic() - clock, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    took = f"{spoken(time.monotonic() - clock)}, processor time {spoken(processor)}"
     if ended.returncode:
-        with log.open("a", encoding="utf-8") as said:
-            said.write(f"{ended.stdout}\nended with status {ended.returncode}\n")
+        with log.open("a", encoding="utf-8") as messages:
+            messages.write(f"{ended.stdout}\nended with status {ended.returncode}\n")
         return None
-    written = [path for path in sorted(own.glob("**/*.md")) if path.stat().st_mtime >= began - 1.0]
-    write(folder / f"{block.name}.md", page_of(block, took, ended.stdout, written))
+    # the tables that they wrote; where they wrote none, what they printed
+    written = [path for path in sorted(work.glob("**/*.md")) if path.stat().st_mtime >= began - 1.0]
+    texts = [path.read_text(encoding="utf-8").strip() for path in written] or [as_markdown(ended.stdout)]
+    head = f"# {block.section or block.page.stem}\n\n```sh\n{block.commands}\n```\n\n{took}"
+    write(folder / f"{block.name}.md", "\n\n".join([head, *texts]) + "\n")
     return took
-
-
-def skipped(log: Path) -> list[str]:
-    """What a command has left out for what is not there, in its own words."""
-    return [line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if "SKIPPED" in line]
-
-
-def page_of(block: Block, took: Took, printed: str, written: Sequence[Path]) -> str:
-    """Markdown: the commands, their time, and the tables that they wrote; where they wrote none, what they printed."""
-    head = f"# {block.section or block.page.stem}\n\n```sh\n{block.commands}\n```\n\n{spoken(took)}\n"
-    if written:
-        return head + "".join(f"\n{path.read_text(encoding='utf-8').strip()}\n" for path in written)
-    return f"{head}\n{as_markdown(printed)}\n"
 
 
 def as_markdown(printed: str) -> str:
@@ -143,60 +111,31 @@ def as_markdown(printed: str) -> str:
     return "\n\n".join(parts)
 
 
-# --- all of them ------------------------------------------------------------------------------------------------------
-
-
 def make(blocks: Sequence[Block], folder: Path, again: bool) -> int:
     """Makes what is not there, one after another. Returns how many failed."""
     shared = shared_folder()
-    times = read_times(folder)
     failed = 0
     for block in blocks:
-        lacks = missing(block, shared)
-        if lacks:
+        if lacks := missing(block, shared):
             say(f"SKIPPED: {block.name}: needs {', '.join(lacks)}, which is not there")
         elif (folder / f"{block.name}.md").is_file() and not again:
             say(f"{block.name}: there already")
         else:
             say(f"{block.name}: begins; {known_time(block)}")
-            took = run(block, folder, shared)
-            if took is None:
-                failed += 1
-                say(f"FAILED: {block.name}: see {folder / block.name}.log")
-                continue
-            times[block.name] = took
-            for line in skipped(folder / f"{block.name}.log"):
-                say(f"{block.name}: {line}")
-            say(f"{block.name}: {spoken(took)}")
-        write(folder / TIMES, {name: vars(took) for name, took in times.items()})
-        write(folder / "README.md", index(times))
+            took, log = run(block, folder, shared), folder / f"{block.name}.log"
+            failed += took is None
+            for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+                if "SKIPPED" in line:  # by the command itself
+                    say(f"{block.name}: {line}")
+            say(f"FAILED: {block.name}: see {log}" if took is None else f"{block.name}: {took}")
     return failed
 
 
-def read_times(folder: Path) -> dict[str, Took]:
-    file = folder / TIMES
-    if not file.is_file():
-        return {}
-    return {name: Took(**took) for name, took in json.loads(file.read_text(encoding="utf-8")).items()}
-
-
-def index(times: Mapping[str, Took]) -> str:
-    """What is there, and how long it took."""
-    whole = Took(sum(took.seconds for took in times.values()), sum(took.cpu_seconds for took in times.values()))
-    named = {f"[{name}]({name}.md)": took for name, took in times.items()} | {"all": whole}
-    lines = [[name, _clock(took.seconds), _clock(took.cpu_seconds)] for name, took in named.items()]
-    return tables.table(["table", "time", "processor time"], lines) + "\n"
-
-
-def spoken(took: Took) -> str:
-    return f"{_clock(took.seconds)}, processor time {_clock(took.cpu_seconds)}"
-
-
 def known_time(block: Block) -> str:
-    return "time not measured" if block.minutes is None else f"{_clock(60.0 * block.minutes)} of one core"
+    return "time not measured" if block.minutes is None else f"{spoken(60.0 * block.minutes)} of one core"
 
 
-def _clock(seconds: float) -> str:
+def spoken(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
 
 
@@ -208,7 +147,7 @@ def listing(blocks: Sequence[Block]) -> str:
         needs = f"; needs {', '.join(block.needs)}" if block.needs else ""
         lines.append(f"{block.name:{width}}  {known_time(block)}{needs}  ({block.page.relative_to(ROOT)})")
     unknown = sum(block.minutes is None for block in blocks)
-    total = _clock(60.0 * sum(block.minutes or 0.0 for block in blocks))
+    total = spoken(60.0 * sum(block.minutes or 0.0 for block in blocks))
     return "\n".join([*lines, f"all: {total} of one core, and {unknown} whose time is not measured"])
 
 
@@ -231,10 +170,7 @@ def main() -> None:
         options.error("-o FOLDER is missing")
     folder = given.output.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    began = time.monotonic()
-    failed = make(chosen, folder, given.again)
-    say(f"{folder}: {_clock(time.monotonic() - began)} in all, {failed} failed")
-    sys.exit(1 if failed else 0)
+    sys.exit(1 if make(chosen, folder, given.again) else 0)
 
 
 if __name__ == "__main__":

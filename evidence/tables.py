@@ -72,6 +72,11 @@ def median(values: Iterable[float | None], form: str = ".2f", scale: float = 1.0
     return number(float(np.median(known)), form, scale) if len(known) else NOTHING
 
 
+def rms(values: Any) -> float:
+    """Root of the mean square; NaN without a value."""
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
+
+
 # --- rows -------------------------------------------------------------------------------------------------------------
 
 

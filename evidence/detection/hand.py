@@ -215,9 +215,9 @@ def fitted_file(folder: Path) -> Path:
 
 def pushes_of(folder: Path, take: Take) -> list[dict[str, Any]]:
     """What was true of all pushes of a recording; without the push, a joint moves as in the twin."""
-    # onset, end: s, of the label; torque: [n] N·m of the largest magnitude; posture: "rest", "motion", "reversal";
-    # stuck: nothing moved faster than the description's thresholds; excursion: [n] rad, of each joint during the push;
-    # stays: stuck, and no joint moved farther than the rig's presliding distance
+    # onset: s, of the label; torque: [n] N·m of the largest magnitude; posture: "rest", "motion", "reversal";
+    # stuck: nothing moved faster than the description's thresholds; stays: stuck, and no joint moved farther than the
+    # rig's presliding distance
     rig = read_rig(write_rig(folder, take))
     truth, twin = read_truth(folder, take), read_truth(folder, take.twin)
     label = recording(folder, take).contact
@@ -244,16 +244,11 @@ def pushes_of(folder: Path, take: Take) -> list[dict[str, Any]]:
                 "pretension": take.pretension,
                 "part": take.part,
                 "onset": float(truth["time"][during.start]),
-                "end": float(truth["time"][during.stop - 1]),
-                "force": float(push["force"]),
-                "link": int(push["link"]),
-                "rise": float(push["rise"]),
                 "torque": torque[np.abs(torque).argmax(axis=0), np.arange(torque.shape[1])].tolist(),
                 "posture": _posture(
                     truth["joint_velocity"], twin["joint_velocity"], start, rig.rate, thresholds["joint"]
                 ),
                 "stuck": stuck,
-                "excursion": excursion.tolist(),
                 "stays": stuck and bool(np.all(excursion <= presliding)),
             }
         )

@@ -5,15 +5,17 @@ Everything is known: its true friction (which may be more than the model's), loa
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
+from evidence import tables
 from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.detect.counting import stretches
 from tendonfmu.model import native
 
 Keys = Mapping[str, Any]
@@ -25,7 +27,6 @@ SHARE = 0.03  # friction force over tendon force
 V_MIN = 0.0005 / ARM  # rad/s, the default threshold of the tendon, at the joint
 NOISE = 1e-3  # N·m in the joint torque, white: 0.08 N in each tendon
 THRESHOLD = 8e-3  # N·m, 8 times the noise
-JOINED = 0.1  # s; alarms closer than that are one
 
 ASLEEP = {"bias.drift_variance": 0.0, "bias.initial_variance": 0.0}  # the filter takes nothing up, as in contact
 
@@ -46,7 +47,7 @@ def finger(keys: Mapping[str, Any] | None = None) -> dict[str, Any]:
     for key, value in (keys or {}).items():
         group, name = key.split(".")
         description[group][name] = value
-    return copy.deepcopy(description)
+    return description
 
 
 def friction(pull: Numbers | float) -> Numbers:
@@ -88,11 +89,9 @@ def noise(random: np.random.Generator, count: int, time: float = 0.0) -> Numbers
     if not time:
         return white
     keep = np.exp(-STEP / time)
-    made = np.empty(count)
-    made[0] = white[0]
-    for k, value in enumerate((np.sqrt(1.0 - keep**2) * white[1:]).tolist(), 1):
-        made[k] = keep * made[k - 1] + value
-    return made
+    driven = np.sqrt(1.0 - keep**2) * white
+    driven[0] = white[0]
+    return np.asarray(lfilter([1.0], [1.0, -keep], driven))
 
 
 def strokes(random: np.random.Generator, duration: float) -> tuple[Numbers, Numbers]:
@@ -119,16 +118,16 @@ def direction(velocity: Numbers) -> Numbers:
     return np.where(velocity[np.where(last < 0, first, last)] < 0, -1.0, 1.0)
 
 
-def alarms(contact: Flags) -> list[tuple[int, int]]:
-    """First and last sample of each alarm; those closer than JOINED are one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], contact, [False]]).astype(int)))
-    joined: list[tuple[int, int]] = []
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if joined and first - joined[-1][1] - 1 < JOINED * RATE:
-            joined[-1] = (joined[-1][0], end - 1)
-        else:
-            joined.append((first, end - 1))
-    return joined
+def resting(torque: Numbers, pull: float) -> Take:
+    """A finger at rest with this joint torque."""
+    still = np.zeros(len(torque))
+    return Take(times(len(torque) * STEP), still, still, np.full(len(torque), pull), torque)
+
+
+def alarms(contact: Flags) -> list[list[int]]:
+    """First and last sample of each alarm, as `tendonfmu score` counts them."""
+    spans: list[list[int]] = stretches(times(len(contact) * STEP), contact).tolist()
+    return spans
 
 
 def longest(contact: Flags) -> float:
@@ -192,29 +191,16 @@ def lost(contact: Flags) -> tuple[float, float]:
 # --- a push just above the threshold, and thresholds just above the noise ---------------------------------------------
 
 
-def weak_push(seed: int, over_noise: float = 6.0, correlated: float = 0.0) -> Take:
-    """At rest; a push of 1.2 thresholds from 5 s to the end. The threshold is `over_noise` times the noise.
-
-    correlated: s, 0 is white.
-    """
-    random = np.random.default_rng([seed, 3])
+def weak_push(seed: int, correlated: float) -> Take:
+    """A push of 1.2 thresholds from 5 s to the end. The threshold is 6 times the noise; correlated: s, 0 is white."""
     time = times(10.0)
-    still = np.zeros(len(time))
-    torque = THRESHOLD / over_noise * noise(random, len(time), correlated) + 1.2 * THRESHOLD * (time >= 5.0)
-    return Take(time, still, still, np.full(len(time), LOW), torque)
+    disturbed = noise(np.random.default_rng([seed, 3]), len(time), correlated)
+    return resting(THRESHOLD / 6.0 * disturbed + 1.2 * THRESHOLD * (time >= 5.0), LOW)
 
 
-def share_of_first_second(contact: Flags) -> float:
-    return float(contact[5000:6000].mean())
-
-
-def free_noise(seed: int, over_noise: float = 3.0, correlated: float = 0.0, duration: float = 60.0) -> Take:
-    """At rest, nothing touches; the threshold is only `over_noise` times the noise."""
-    random = np.random.default_rng([seed, 4])
-    time = times(duration)
-    still = np.zeros(len(time))
-    torque = THRESHOLD / over_noise * noise(random, len(time), correlated)
-    return Take(time, still, still, np.full(len(time), LOW), torque)
+def free_noise(seed: int, correlated: float) -> Take:
+    """Nothing touches; the threshold is only 3 times the noise."""
+    return resting(THRESHOLD / 3.0 * noise(np.random.default_rng([seed, 4]), len(times(60.0)), correlated), LOW)
 
 
 # --- a reversal, and a velocity that is not clean ---------------------------------------------------------------------
@@ -277,8 +263,7 @@ def pumped(take: Take, keys: Keys) -> float:
 
 def residual_rms(take: Take, keys: Keys) -> float:
     """N·m, with nothing taken for contact, after the first second."""
-    residual = take.run({**SILENT, "bias.forget_rate": 5.0, **keys})["residual"][round(RATE) :]
-    return float(np.sqrt(np.mean(residual**2)))
+    return tables.rms(take.run({**SILENT, "bias.forget_rate": 5.0, **keys})["residual"][round(RATE) :])
 
 
 def stiffened(seed: int, follows: bool, rest: float = 0.2, count: int = 20) -> tuple[Take, Numbers]:
@@ -301,28 +286,21 @@ def stiffened(seed: int, follows: bool, rest: float = 0.2, count: int = 20) -> t
 # --- a load just after the start, and a wrong start -------------------------------------------------------------------
 
 
-def load_at_start(seed: int, size: float) -> Take:
-    """At rest; 5 ms after the start a load of `size` thresholds comes within 10 ms and stays."""
-    random = np.random.default_rng([seed, 7])
+def absorbed(seed: int, size: float, keys: Keys) -> float:
+    """Share of a load that the bias has taken up at 0.1 s, the same noise without the load taken off."""
+    # 5 ms after the start the load of `size` thresholds comes within 10 ms and stays
     time = times(0.5)
-    still = np.zeros(len(time))
-    torque = NOISE * noise(random, len(time)) + size * THRESHOLD * np.clip((time - 0.005) / 0.01, 0.0, 1.0)
-    return Take(time, still, still, np.full(len(time), PULL), torque)
-
-
-def absorbed(seed: int, size: float, keys: Keys, at: float = 0.1) -> float:
-    """Share of the load that the bias has taken up `at` s, the same noise without the load taken off."""
-    bias = [load_at_start(seed, load).run(keys)["bias_torque"][round(at * RATE)] for load in (size, 0.0)]
-    return float((bias[0] - bias[1]) / (size * THRESHOLD))
+    disturbed = NOISE * noise(np.random.default_rng([seed, 7]), len(time))
+    load = size * THRESHOLD * np.clip((time - 0.005) / 0.01, 0.0, 1.0)
+    loaded, free = (resting(torque, PULL).run(keys)["bias_torque"][100] for torque in (disturbed + load, disturbed))
+    return float((loaded - free) / (size * THRESHOLD))
 
 
 def wrong_start(seed: int) -> Take:
-    """At rest, nothing touches; the first sample is off by half a threshold (a spike, a motor just switched on)."""
-    random = np.random.default_rng([seed, 8])
+    """Nothing touches; the first sample is off by half a threshold (a spike, a motor just switched on)."""
     time = times(3.0)
-    still = np.zeros(len(time))
-    torque = NOISE * noise(random, len(time)) + 0.5 * THRESHOLD * (time < 0.5 * STEP)
-    return Take(time, still, still, np.full(len(time), PULL), torque)
+    disturbed = NOISE * noise(np.random.default_rng([seed, 8]), len(time))
+    return resting(disturbed + 0.5 * THRESHOLD * (time < 0.5 * STEP), PULL)
 
 
 def half_life(take: Take, keys: Keys) -> float:
@@ -365,4 +343,4 @@ def after_rests(made: tuple[Take, Numbers], keys: Keys) -> float:
     take, exits = made
     residual = take.run({**SILENT, **keys})["residual"]
     chosen = (exits[:, None] + np.arange(round(WINDOW * RATE))).astype(int)
-    return float(np.sqrt(np.mean(residual[chosen] ** 2)))
+    return tables.rms(residual[chosen])

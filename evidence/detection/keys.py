@@ -105,9 +105,9 @@ def release_ratio() -> Trial:
     }
 
     def measure(seed: int, keys: Keys) -> Sequence[float]:
-        pushed = [cases.weak_push(seed, 6.0, correlated).run(keys)["contact"] for correlated in (0.0, 0.02)]
-        false = [cases.free_noise(seed, 3.0, correlated).run(keys)["contact"] for correlated in (0.0, 0.02)]
-        seen = map(cases.share_of_first_second, pushed)
+        pushed = [cases.weak_push(seed, correlated).run(keys)["contact"] for correlated in (0.0, 0.02)]
+        false = [cases.free_noise(seed, correlated).run(keys)["contact"] for correlated in (0.0, 0.02)]
+        seen = (contact[5000:6000].mean() for contact in pushed)  # in the push's first second
         return *seen, cases.longest(false[0]), false[0].mean(), cases.longest(false[1])
 
     return Trial("`contact.release_ratio`, `contact.hold_time`", units, settings, measure)
@@ -202,7 +202,7 @@ def forgetting(absorbable: bool, lengths: Sequence[float] = cases.RESTS) -> Tria
         for drift in cases.DRIFTS:
             spread = {"bias.drift_variance": drift, **keys}
             rests = [cases.after_rests(cases.rests(seed, length, drift, absorbable), spread) for length in lengths]
-            values.append(float(np.sqrt(np.mean(np.square(rests)))))
+            values.append(tables.rms(rests))
         return values
 
     when = "during the rest" if absorbable else "as the finger moves off"

@@ -4,15 +4,13 @@ On the virtual index finger (slots.py), any number of descriptions beside one an
 
     python -m evidence.detection.limits -o FOLDER --finger paper=fitted.json --finger recommended=tuned.json
 
-Recordings are kept in the folder. Writes detection_limits.md, and detection_limits.json with a row for every push and
-every disturbance.
+Recordings are kept in the folder. Writes detection_limits.md.
 """
 
 from __future__ import annotations
 
 import functools
 import itertools
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,18 +21,15 @@ from typing import Any
 import numpy as np
 
 from evidence import tables
-from evidence.detection.hand import LEAST_FORCE, Arrays, tendon_velocity
+from evidence.detection.hand import LEAST_FORCE, Arrays
 from evidence.detection.slots import (
     AFTER,
     DISTURBED,
     FALL,
     FORCES,
-    LEAD,
     LONGEST,
-    MOVE,
     PUSH_TIME,
     RATE,
-    STUCK_RISES,
     WARM,
     Case,
     Slot,
@@ -42,11 +37,12 @@ from evidence.detection.slots import (
     made,
     slots,
 )
-from evidence.runner import digest, named_finger, parser, publish, run_cases, write
+from evidence.runner import digest, named_finger, parser, publish, run_cases
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import Event, score_detection
 from tendonfmu.detect.counting import stretches
-from tendonfmu.model import Instance, moment_arms
+from tendonfmu.model import moment_arms
+from tendonfmu.model.native import run_recording
 
 Row = dict[str, Any]
 Rows = Sequence[Row]
@@ -57,17 +53,7 @@ FORCE_STEP, POSITION_STEP, DROPPED, SHIFT = 0.5, 1e-4, 0.5, 1e-3  # N, m, s, m
 SIZES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # N, of pushes in stiction
 
 
-@dataclass(frozen=True)
-class Subject:
-    """A description under a name."""
-
-    name: str
-    data: Mapping[str, Any]
-
-    def run(self, arrays: Arrays, detecting: bool = True) -> Arrays:
-        """Outputs; without detection, the bias always follows."""
-        never = {} if detecting else {"contact": {"threshold": [1e6] * len(self.data["joints"])}}
-        return dict(Instance.from_description(json.dumps({**self.data, **never}), 1).run(arrays))
+Subject = tuple[str, Mapping[str, Any]]  # a description under a name
 
 
 # --- pushes: computing ------------------------------------------------------------------------------------------------
@@ -81,28 +67,25 @@ def pushed_rows(folder: Path, case: Case, subjects: Sequence[Subject]) -> Row:
     for slot in slots(case):
         arrays = cut(whole, slot.begin, slot.end)
         alone = None if twin is None else cut(twin, slot.begin, slot.end)
-        truth = _stuck(arrays, slot, subjects[0].data) if alone is None else {}
-        common = {"kind": case.kind, "pretension": case.pretension, "part": case.part}
-        common |= {"force": slot.force, "rise": slot.rise} | truth
-        rows += [common | {"finger": subject.name} | _pushed(subject, arrays, alone, slot) for subject in subjects]
+        common = {"kind": case.kind, "pretension": case.pretension, "force": slot.force, "rise": slot.rise}
+        common |= _stuck(arrays, slot, subjects[0][1]) if alone is None else {}
+        rows += [common | {"finger": name} | _pushed(data, arrays, alone, slot) for name, data in subjects]
     return {"rows": rows}
 
 
-def _pushed(subject: Subject, arrays: Arrays, twin: Arrays | None, slot: Slot) -> Row:
+def _pushed(data: Mapping[str, Any], arrays: Arrays, twin: Arrays | None, slot: Slot) -> Row:
     """What a description makes of a push; twin: the same slot without it."""
-    # by_chance: found there; lead_alarms: that begin before the push; released: an alarm begins as the push goes
-    out, time = subject.run(arrays), arrays["time"]
+    # by_chance: found there; released: an alarm begins as the push goes
+    out, time = run_recording(data, arrays), arrays["time"]
     # a load that goes is a change too: an alarm of the release has not found the push
     label = (arrays["contact_force"] >= LEAST_FORCE) & (time <= slot.top + 1e-9)
-    score = score_detection(time, label, out["contact"].ravel())
-    event = score.events[0]
-    lead = [begin for begin, _end in score.false_alarms if slot.begin + MOVE <= begin < slot.push]
+    event = score_detection(time, label, out["contact"].ravel()).events[0]
     begins = [float(time[begin]) for begin, _ in stretches(time, out["contact"].ravel())]
     row: Row = {"released": any(slot.top + 1e-9 < begin <= slot.top + FALL + 0.1 for begin in begins)}
-    row |= {"found": event.found, "silent": event.silent, "delay": event.delay, "lead_alarms": len(lead)}
+    row["found"] = event.found
     if twin is None:
         return row
-    alone = subject.run(twin)
+    alone = run_recording(data, twin)
     chance = score_detection(twin["time"], label, alone["contact"].ravel()).events[0].found
     return row | {"by_chance": chance} | _at_alarm(event, (arrays, twin), (out, alone), slot)
 
@@ -130,16 +113,12 @@ def _at_alarm(event: Event, inputs: tuple[Arrays, Arrays], outputs: tuple[Arrays
 
 def _stuck(arrays: Arrays, slot: Slot, data: Mapping[str, Any]) -> Row:
     """What is true of a push at rest."""
-    # stays: "below" no joint moves farther than its presliding distance and all velocities stay below the description's
-    # thresholds, "yields" the former alone, "slides" neither; reach, lost: share of the external torque that springs
-    # and friction take in the end; springs, bristles: N·m/rad along the motion; motor, tension: m, N, largest change of
-    # a tendon's position at the motor and of its force; visible: until the hold begins, the torque of the measured
-    # forces leaves what it was in the half second before by more than twice its range there
+    # slides: a joint moves farther than its presliding distance; reach, lost: share of the external torque that springs
+    # and friction take in the end; springs, bristles: N·m/rad along the motion; tension: N, largest change of a
+    # tendon's force; visible: until the hold begins, the torque of the measured forces leaves what it was in the half
+    # second before by more than twice its range there
     windows = ((slot.push, slot.top), (slot.top - 0.1, slot.top), (slot.push - 0.1, slot.push))
     inside, settled, before = (cut(arrays, *window) for window in windows)
-    speed, limits = inside["true_joint_velocity"], data["velocity_threshold"]
-    slow = np.abs(speed).max() <= limits["joint"]
-    slow &= np.abs(tendon_velocity(moment_arms(data), speed)).max() <= limits["tendon"]
     moved = np.abs(inside["true_joint_position"] - before["true_joint_position"].mean(axis=0)).max()
     change = {
         name: settled[name].mean(axis=0) - before[name].mean(axis=0) for name in arrays if np.ndim(arrays[name]) > 1
@@ -151,14 +130,12 @@ def _stuck(arrays: Arrays, slot: Slot, data: Mapping[str, Any]) -> Row:
     quiet, pushed = torque[first : first + round(0.5 * RATE)], torque[first + round(0.5 * RATE) : last]
     return {
         "visible": bool(np.any(np.abs(pushed - quiet.mean(axis=0)).max(axis=0) > 2.0 * np.ptp(quiet, axis=0))),
-        "stays": "slides" if moved > PRESLIDING else "below" if slow else "yields",
-        "moved": float(moved),
+        "slides": bool(moved > PRESLIDING),
         "load": float(np.abs(load).max()),
         "reach": float(springs @ load / (load @ load)),
         "lost": float(-friction @ load / (load @ load)),
         "springs": float(-springs @ turn / (turn @ turn)),
         "bristles": float(friction @ turn / (turn @ turn)),
-        "motor": float(np.abs(change["tendon_position"]).max()),
         "tension": float(np.abs(change["tendon_force"]).max()),
     }
 
@@ -219,7 +196,7 @@ DISTURBANCES = (
 def disturbed_rows(folder: Path, pretension: float, parts: int, subjects: Sequence[Subject]) -> Row:
     """Every disturbance under every description, one recording for each part."""
     twins = [_started(made(folder, Case("still", pretension, part))) for part in range(1, parts + 1)]
-    free = [[subject.run(twin, detecting=False) for twin in twins] for subject in subjects]
+    free = [[_undetecting(data, twin) for twin in twins] for _, data in subjects]
     limit = 2.0 * np.sqrt(np.mean([np.mean(out["residual"][1:] ** 2, axis=0) for out in free[0]], axis=0))
     rows: list[Row] = []
     for number, twin in enumerate(twins):
@@ -229,17 +206,22 @@ def disturbed_rows(folder: Path, pretension: float, parts: int, subjects: Sequen
         tendon = 3 * number % twin["tendon_force"].shape[1]
         for disturbance in DISTURBANCES:
             arrays = disturbance.applied(recordings[disturbance.kind], tendon)
-            for subject, alone in zip(subjects, free, strict=True):
-                shift = disturbance.step * moment_arms(subject.data)[tendon]
+            for (name, data), alone in zip(subjects, free, strict=True):
+                shift = disturbance.step * moment_arms(data)[tendon]
                 late = twin["time"] >= disturbance.begin
                 # what a turning wrist does to the torque is the bias's to take
                 turns = disturbance.kind == "wrist"
-                base = subject.run(recordings["wrist"], detecting=False) if turns else alone[number]
+                base = _undetecting(data, recordings["wrist"]) if turns else alone[number]
                 reference = base["bias_torque"] + np.where(late[:, None], shift, 0.0)
                 span = disturbance.begin, disturbance.end
-                row = {"kind": disturbance.name, "pretension": pretension, "part": number + 1, "finger": subject.name}
-                rows.append(row | recovered(arrays["time"], subject.run(arrays), reference, limit, span))
+                row = {"kind": disturbance.name, "pretension": pretension, "finger": name}
+                rows.append(row | recovered(arrays["time"], run_recording(data, arrays), reference, limit, span))
     return {"rows": rows}
+
+
+def _undetecting(data: Mapping[str, Any], arrays: Arrays) -> Arrays:
+    """Outputs without detection: the bias always follows."""
+    return run_recording({**data, "contact": {"threshold": [1e6] * len(data["joints"])}}, arrays)
 
 
 def _started(arrays: Arrays) -> Arrays:
@@ -252,7 +234,7 @@ def recovered(time: Numbers, out: Arrays, reference: Numbers, limit: Numbers, sp
     """How the state becomes sound again: bias within the limits [n] of a run that nothing disturbs, no contact."""
     # reference: [N, n]; span: begin and end of what disturbs, s; until: s from the end until it stays sound for
     # `SETTLED`, none if it never does; at_once, after: alarms that begin in it (0.1 s after its end included), in the
-    # minute after; longest: s, of an alarm from its begin on; lasting: there is still one at the end; sound: share
+    # minute after; longest: s, of an alarm from its begin on
     begin, end = span
     alarm = out["contact"].ravel()
     sound = np.all(np.abs(out["bias_torque"] - reference) < limit, axis=1) & ~alarm
@@ -267,8 +249,6 @@ def recovered(time: Numbers, out: Arrays, reference: Numbers, limit: Numbers, sp
         "at_once": sum(begin <= a <= end + 0.1 for a, _ in seen),
         "after": sum(a > end + 0.1 for a, _ in seen),
         "longest": max((b - max(a, begin) + step for a, b in seen), default=0.0),
-        "lasting": bool(alarm[minute][-1]),
-        "sound": float(good.mean()),
     }
 
 
@@ -287,100 +267,74 @@ def _percents(rows: Rows, *keys: str) -> list[str]:
 
 def ramp_tables(rows: Rows) -> str:
     """Shares found by size; then what the load was at the alarm and where it went, pushes of all sizes together."""
-    rows = sorted(rows, key=lambda row: row["rise"])
-
-    def sizes(own: Rows) -> list[str]:
-        cells = [tables.count(row["found"] for row in own if row["force"] == force) for force in FORCES]
-        return [*cells, tables.percent(row["found"] for row in own)]
-
-    def loads(own: Rows) -> list[str]:
-        found, missed = ([row for row in own if row["found"] == wanted] for wanted in (True, False))
-        cells = [str(len(found)), str(sum(row["released"] for row in own))]
-        cells += [tables.median(row["force_at"] for row in found)]
-        cells += [tables.median((row["torque_at"] for row in found), ".1f", 1e3)]
-        cells += _percents(found, "held", "reach", "absorbed")
-        return [*cells, str(len(missed)), *_percents(missed, "reach", "absorbed", "left")]
-
-    def quiet(own: Rows) -> list[str]:
-        alarms = tables.events(sum(row["lead_alarms"] for row in own), len(own) * (LEAD - MOVE) / 60, ".2f")
-        return [
-            alarms,
-            tables.percent(not row["silent"] for row in own),
-            tables.percent(row["by_chance"] for row in own),
-        ]
-
     keys = ["finger", "kind", "pretension", "rise"]
-    rows = _sorted(rows, *keys)
-    head = ["finger", "state", "pretension, N", "rise, s"]
-    where = ["found", "as it goes", "force at alarm N", "torque mN·m", "held %", "reaches %", "absorbed %"]
-    where += ["missed", "reaches %", "absorbed %", "left %"]
-    before = ["finger", "state", "alarms per minute before", "in alarm as they began %", "found without pushes %"]
-    return "\n\n".join(
-        [
-            tables.table([*head, *(f"{force:g} N" for force in FORCES), "all, %"], tables.by(rows, keys, sizes), 2),
-            tables.table([*head, *where], tables.by(rows, keys, loads), 2),
-            tables.table(before, tables.by(rows, keys[:2], quiet), 2),
+    rows = _sorted(sorted(rows, key=lambda row: row["rise"]), *keys)
+
+    def cells(group: Rows) -> list[str]:
+        found, missed = ([row for row in group if row["found"] == wanted] for wanted in (True, False))
+        return [
+            *(tables.count(row["found"] for row in group if row["force"] == force) for force in FORCES),
+            str(sum(row["released"] for row in group)),
+            tables.count(row["by_chance"] for row in group),
+            tables.median(row["force_at"] for row in found),
+            tables.median((row["torque_at"] for row in found), ".1f", 1e3),
+            *_percents(found, "held"),
+            *_percents(missed, "reach", "absorbed", "left"),
         ]
-    )
+
+    head = ["finger", "state", "pretension, N", "rise, s", *(f"{force:g} N" for force in FORCES), "as it goes"]
+    head += ["without the push", "at N", "at mN·m", "held %", "missed: reaches %", "in the bias %", "in the output %"]
+    return tables.table(head, tables.by(rows, keys, cells), 2)
 
 
 def stuck_tables(rows: Rows) -> str:
-    """What was found, and medians of the pushes that do not slide, by whether friction holds most of them."""
+    """Medians of the pushes that do not slide, by whether friction holds most of them; then what was found by size."""
     fingers = tables.values_of(rows, "finger")
+
+    def found(group: Rows) -> str:
+        return ", ".join(str(sum(row["found"] for row in tables.where(group, finger=name))) for name in fingers)
+
+    def why(group: Rows) -> list[str]:
+        first = tables.where(group, finger=fingers[0])
+        formats = {"load": (".1f", 1e3), "reach": (".0f", 100), "springs": (".1f", 1), "bristles": (".1f", 1)}
+        formats["tension"] = (".0f", 1e3)
+        medians = [tables.median((row[key] for row in first), *form) for key, form in formats.items()]
+        return [str(len(first)), *medians, found(group), tables.percent(row["visible"] for row in first)]
+
     lines = []
-    for stays in ("below", "yields", "slides"):
-        for rise in STUCK_RISES:
-            for low, high in pairwise(SIZES):
-                own = [row for row in tables.where(rows, stays=stays, rise=rise) if low <= row["force"] < high]
-                first = tables.where(own, finger=fingers[0])
-                seen = [len(first), tables.median((row["load"] for row in first), ".1f", 1e3)]
-                seen.append(tables.percent(row["visible"] for row in first))
-                seen += [tables.percent(row["found"] for row in tables.where(own, finger=name)) for name in fingers]
-                if own:
-                    lines.append([stays, f"{rise:g}", f"{low:g} to {high:g}", *seen])
-
-    def why(own: Rows) -> list[str]:
-        cells = [
-            str(len(own)),
-            tables.median((row["load"] for row in own), ".1f", 1e3),
-            *_percents(own, "reach", "lost"),
-        ]
-        formats = {"springs": (".2f", 1), "bristles": (".2f", 1), "moved": (".2f", 1e3), "motor": (".1f", 1e6)}
-        formats["tension"] = (".3f", 1)
-        cells += [tables.median((row[key] for row in own), *form) for key, form in formats.items()]
-        return [*cells, tables.percent(row["visible"] for row in own)]
-
+    for low, high in pairwise(SIZES):
+        cells = [f"{low:g} to {high:g}"]
+        for slides in (False, True):
+            group = [row for row in tables.where(rows, slides=slides) if low <= row["force"] < high]
+            first = tables.where(group, finger=fingers[0])
+            cells += [str(len(first)), found(group), str(sum(row["visible"] for row in first))]
+        lines.append(cells)
     held = [
-        row | {"friction": "holds" if row["lost"] > 0.5 else "gives way"}
-        for row in tables.where(rows, finger=fingers[0])
-        if row["stays"] != "slides"
+        row | {"friction": "holds" if row["lost"] > 0.5 else "gives way"} for row in tables.where(rows, slides=False)
     ]
     held.sort(key=lambda row: (row["pretension"], row["friction"] != "holds"))
-    head = ["push", "rise, s", "N", "pushes", "torque mN·m", "visible %", *(f"{name}: found %" for name in fingers)]
-    causes = ["pretension, N", "friction", "pushes", "external mN·m", "reaches the springs %", "friction takes %"]
-    causes += ["springs N·m/rad", "bristles N·m/rad", "joint mrad", "motor side µm", "tendon N", "visible %"]
-    return (
-        tables.table(head, lines) + "\n\n" + tables.table(causes, tables.by(held, ["pretension", "friction"], why), 2)
-    )
+    causes = ["pretension, N", "friction", "pushes", "torque mN·m", "reaches the springs %", "springs N·m/rad"]
+    causes += ["bristles N·m/rad", "a force changes by mN", "found", "visible %"]
+    sizes = ["N", "below break-away", "found", "visible", "that slide", "found", "visible"]
+    by_friction = tables.by(held, ["pretension", "friction"], why)
+    return f"{tables.table(causes, by_friction, 2)}\n\n{tables.table(sizes, lines)}"
 
 
 def recovery_table(rows: Rows) -> str:
-    def cells(own: Rows) -> list[str]:
-        until = [row["until"] for row in own if row["until"] is not None]
+    def cells(group: Rows) -> list[str]:
+        until = [row["until"] for row in group if row["until"] is not None]
         return [
-            tables.median(until, with_interval=True),
-            tables.number(max(until, default=math.nan)),
-            f"{len(own) - len(until)} of {len(own)}",
-            f"{np.mean([row['at_once'] for row in own]):.1f}",
-            tables.events(sum(row["after"] for row in own), len(own) * AFTER / 60, ".2f"),
-            f"{max(row['longest'] for row in own):.1f}",
-            f"{sum(row['lasting'] for row in own)} of {len(own)}",
-            f"{100 * np.mean([row['sound'] for row in own]):.1f}",
+            tables.median(until, ".1f", with_interval=True),
+            tables.number(max(until, default=math.nan), ".1f"),
+            f"{len(group) - len(until)} of {len(group)}",
+            str(sum(row["at_once"] for row in group)),
+            str(sum(row["after"] for row in group)),
+            f"{max(row['longest'] for row in group):.1f}",
         ]
 
     keys = ["kind", "finger", "pretension"]
-    head = ["disturbance", "finger", "pretension", "sound again after s", "longest", "never", "alarms by it"]
-    head += ["alarms in the minute after", "longest alarm s", "lasting", "sound % of the minute"]
+    head = ["disturbance", "finger", "pretension", "sound again after s", "at most", "never", "alarms"]
+    head += ["in the minute after", "longest s"]
     return tables.table(head, tables.by(_sorted(rows, *keys), keys, cells), 2)
 
 
@@ -391,11 +345,10 @@ def main() -> None:
     given = options.parse_args()
     folder, numbers = given.output, range(1, given.parts + 1)
     folder.mkdir(parents=True, exist_ok=True)
-    subjects = [Subject(name, data) for name, data in given.finger]
     version = digest(given.finger)
 
     def rows_of(function: Callable[..., Row], cases: dict[str, tuple[Any, ...]]) -> Rows:
-        named = {f"{name}-{version}": (folder, *arguments, subjects) for name, arguments in cases.items()}
+        named = {f"{name}-{version}": (folder, *arguments, given.finger) for name, arguments in cases.items()}
         rows = run_cases(function, named, folder / "scores", given.workers, given.scheduler)
         return list(itertools.chain(*(row["rows"] for row in rows)))
 
@@ -406,7 +359,6 @@ def main() -> None:
         "Pushes in stiction": rows_of(pushed_rows, {case.name: (case,) for case in stuck}),
         "Slow pushes": rows_of(pushed_rows, {case.name: (case,) for case in ramps}),
     }
-    write(folder / "detection_limits.json", parts)
     shown = zip(parts.items(), (recovery_table, stuck_tables, ramp_tables), strict=True)
     publish(folder / "detection_limits.md", tables.page({name: show(rows) for (name, rows), show in shown}))
 

@@ -62,7 +62,7 @@ def matched_findings(folder: Path, reference: Detector, pushes: Sequence[Push], 
     for pretension in PRETENSIONS:
         quiet = takes("free", parts=parts, pretensions=(pretension,))
         pushed = takes(*TWINS, parts=parts, pretensions=(pretension,))
-        free = [_free_means(folder, reference, take) for take in quiet]
+        free = [_means(residual, _rate(time)) for time, residual in (_residual(folder, reference, t) for t in quiet)]
         signals = [push_signals for take in pushed for push_signals in _signals(folder, reference, take, pushes)]
         of_pretension = np.flatnonzero([push["pretension"] == pretension for push in pushes])
         for after in WINDOWS:
@@ -108,11 +108,6 @@ def _residual(folder: Path, reference: Detector, take: Take) -> tuple[Numbers, N
     """(time, residual)."""
     inputs = reference.inputs(recording(folder, take))
     return inputs["time"], reference.residual(inputs)
-
-
-def _free_means(folder: Path, reference: Detector, take: Take) -> Numbers:
-    time, residual = _residual(folder, reference, take)
-    return _means(residual, _rate(time))
 
 
 def _states(folder: Path, reference: Detector, take: Take, after: float) -> Indices:

@@ -34,7 +34,7 @@ from tendonfmu.recordings import read_recording
 Row = dict[str, Any]
 
 FINGERS = (1, 3, 19, 4, 6)
-SIZES = (6.0, 3.0, 1.5)  # times the residual's rms: least sizes of classes
+SIZES = (6.0, 3.0)  # times the residual's rms: least sizes of classes
 STRONG = 0.5  # N
 
 
@@ -82,7 +82,7 @@ def report(rows: Sequence[Row]) -> str:
         own = [row for row in rows if row["finger"] % 2 == parity]
         lines += [line(str(row["finger"]), [row]) for row in own]
         lines += [line(f"**all {name}**", own)] if len(own) > 1 else []
-    head = ["finger", "≥ 6 × rms", "3 to 6", "1.5 to 3", "false alarms in min", "median delay, ms", "CPU time, s"]
+    head = ["finger", "≥ 6 × rms", "3 to 6", "false alarms in min", "median delay, ms", "CPU time, s"]
     return tables.table(head, lines) + "\n"
 
 

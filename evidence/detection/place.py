@@ -1,6 +1,6 @@
 """Where the finger is touched: the force at the fingertip and the link in contact, against the truth of the campaign.
 
-    python -m evidence.detection.place -o FOLDER --finger TUNED.json [--kinds light firm strong]
+    python -m evidence.detection.place -o FOLDER --finger TUNED.json
 
 The recordings are those of hand.py, made in FOLDER where they are missing; the links are added to the finger from the
 rig. Each push counts once, in the middle of its hold. Writes contact_place.md into FOLDER, with the same rule on the
@@ -10,7 +10,6 @@ true torques beside what the product says: what is lost there is lost to the tor
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from evidence import tables
 from evidence.detection.hand import TWINS, Take, read_truth, recording, takes, write_rig
 from evidence.runner import INDEX_RIG, digest, parser, publish, run_cases
 from tendonfmu.arrays import Numbers
-from tendonfmu.model import Instance
+from tendonfmu.model import native
 from tendonfmu.simulate import read_rig
 
 Row = dict[str, Any]
@@ -71,7 +70,7 @@ def touches(folder: Path, take: Take, finger: dict[str, Any]) -> Row:
     # along: where on its link, as a share of its length; bare: the link that the same rule names of the true torques
     rig, chain = read_rig(write_rig(folder, take)), Chain(json.loads(INDEX_RIG.read_text(encoding="utf-8"))["physics"])
     signals, truth = recording(folder, take), read_truth(folder, take)
-    outputs = Instance.from_description(json.dumps(finger), 1).run({"time": signals.time, **signals.groups})
+    outputs = native.run_recording(finger, signals.arrays())
     rows = []
     for push in rig.expanded["pushes"]:
         k = int(np.searchsorted(signals.time, push["start"] + push["rise"] + push["hold"] / 2))
@@ -109,7 +108,7 @@ def of(rows: Sequence[Row], key: str) -> str:
 def links(rows: Sequence[Row]) -> list[str]:
     seen = [row for row in rows if row["contact"]]
     with_link = [row for row in seen if row["named"] > 0]
-    bare = [row for row in rows if row["bare"] > 0]
+    bare = [row for row in rows if row["bare"] > 0]  # by the true torques
     last = [row for row in with_link if row["named"] == 4]
     return [
         str(len(rows)),
@@ -118,20 +117,15 @@ def links(rows: Sequence[Row]) -> list[str]:
         tables.percent(row["link"] >= row["named"] for row in with_link),
         tables.percent(row["link"] == row["named"] for row in with_link),
         f"{sum(row['link'] == 4 for row in last)} of {len(last)}",
-        tables.percent(row["bare"] > 0 for row in rows),
         tables.percent(row["link"] == row["bare"] for row in bare),
     ]
-
-
-def rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
 
 
 def forces(rows: Sequence[Row]) -> list[str]:
     seen = [row | {"unlikely": row["misfit"] > UNLIKELY} for row in rows if row["contact"]]
     near = [row for row in seen if row["link"] == 4 and row["along"] >= NEAR_TIP]
     known = [row for row in near if row["observable"]]
-    error, strength, std = (rms(tables.column(known, key)) for key in ("error", "strength", "std"))
+    error, strength, std = (tables.rms(tables.column(known, key)) for key in ("error", "strength", "std"))
     return [
         str(len(near)),
         of(near, "observable"),
@@ -151,7 +145,7 @@ def report(rows: Sequence[Row]) -> str:
     classed.sort(key=lambda row: row["pretension"])
     keys, head = ["pretension", "class"], ["pretension N", "push N"]
     on_links = ["pushes", "in contact %", "-1 %", "of those with a link: on it or beyond %", "that very link %"]
-    on_links += ["the last link named: right", "true torques: a link %", "that very link %"]
+    on_links += ["the last link named: right", "that very link, of the true torques %"]
     at_tip = ["pushes near the tip, in contact", "observable", "error rms N", "median N", "rms / rms push %"]
     at_tip += ["rms / rms of its std", "misfit > 3.84", "the same of pushes on other links"]
     sections = [
@@ -164,13 +158,11 @@ def report(rows: Sequence[Row]) -> str:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--finger", type=Path, required=True, metavar="TUNED.json", help="with contact.deviation")
-    options.add_argument("--kinds", nargs="+", default=list(TWINS))
-    options.add_argument("--parts", type=int, default=3, help="recordings of each kind and pretension")
     given = options.parse_args()
     physics = json.loads(INDEX_RIG.read_text(encoding="utf-8"))["physics"]
     parts = [{key: link[key] for key in ("axis", "offset") if key in link} for link in physics["links"]]
     finger = json.loads(given.finger.read_text(encoding="utf-8")) | {"links": parts, "tip": physics["tip"]}
-    chosen = takes(*given.kinds, parts=given.parts)
+    chosen = takes(*TWINS)
     cases = {f"place-{take.name}-{digest(finger)}": (given.output, take, finger) for take in chosen}
     kept = run_cases(touches, cases, given.output / "scores", given.workers, given.scheduler)
     publish(given.output / "contact_place.md", report([row for rows in kept for row in rows["rows"]]))

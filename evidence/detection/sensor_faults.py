@@ -7,9 +7,9 @@ the logarithm, up or down), its position freezes. It begins 1 to 2.5 s into the 
 reads is its last sound value, to the last bit. Sound recordings, those of fingers in numpy and, with --foreign, of a
 folder with case_NN.json, case_NN_train.parquet, case_NN_test.parquet among them, must show none.
 
-    python -m evidence.detection.sensor_faults -o FOLDER [--fingers 1 3 4 6] [--foreign FOLDER]
+    python -m evidence.detection.sensor_faults -o FOLDER [--foreign FOLDER]
 
-Everything is kept in the folder; writes sensor_faults.md and, with a row for each fault, sensor_faults.csv.
+Everything is kept in the folder; writes sensor_faults.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from evidence import tables
 from evidence.fingers import numpy_cases
@@ -32,14 +31,15 @@ from tendonfmu.detect import ContactTuning, TuneWarning
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.detect.sensor_faults import learn_sensors
 from tendonfmu.files import write_table
-from tendonfmu.model import Instance, read_finger
+from tendonfmu.model import read_finger
+from tendonfmu.model.native import run_recording
 from tendonfmu.recordings import read_recording
 from tendonfmu.simulate import read_rig, simulate
 
 Arrays = dict[str, Numbers]
 Row = dict[str, Any]
 
-FINGERS = (1, 3, 4, 6)
+FINGERS = (1, 3, 4, 6)  # numbers of evidence/fingers
 OFF = (0.05, 0.1)  # standard deviation of factors on springs; half of it on moment arms
 NUMPY, NUMPY_SECONDS = range(1, 23), (60.0, 120.0)
 PRETENSIONS = (10.0, 20.0)  # N, of the simulated finger
@@ -74,7 +74,7 @@ def learned(data: Mapping[str, Any], recordings: Sequence[Arrays]) -> dict[str, 
         settled = arrays["time"] - arrays["time"][0] >= SETTLING
         force = np.abs(arrays["tendon_force"]).mean(axis=1)
         parts.append(FreePart("training", arrays, force, settled, np.gradient(arrays["time"])))
-    rule = learn_sensors(data, parts, 1)
+    rule = learn_sensors(data, parts)
     say(f"  sensor_fault: {rule}")
     return {**data, "sensor_fault": rule.keys}
 
@@ -180,10 +180,6 @@ def with_faults(arrays: Arrays, stiffness: Numbers, seed: Sequence[int]) -> tupl
     return {"time": time, "tendon_force": force, "tendon_position": position}, faults
 
 
-def outputs(data: Mapping[str, Any], arrays: Mapping[str, Numbers]) -> dict[str, Any]:
-    return dict(Instance.from_description(json.dumps(data), 1).run(arrays))
-
-
 def widened(flags: Flags, time: Numbers) -> Flags:
     """[N] true within AROUND of a true one."""
     at = time[flags]
@@ -200,8 +196,8 @@ def judged(of: Subject, motion: str, arrays: Arrays, seed: Sequence[int]) -> Ite
     stiffness = np.array([tendon["stiffness"] for tendon in of.data["tendons"]], dtype=float)
     faulty, faults = with_faults(arrays, stiffness, seed)
     time, without_key = faulty["time"], {key: value for key, value in of.data.items() if key != "sensor_fault"}
-    known = widened(outputs(of.data, arrays)["contact"].ravel().astype(bool), time)
-    out, bare = outputs(of.data, faulty), outputs(without_key, faulty)
+    known = widened(run_recording(of.data, arrays)["contact"].ravel().astype(bool), time)
+    out, bare = run_recording(of.data, faulty), run_recording(without_key, faulty)
     for fault in faults:
         during = (time >= fault["begin"]) & (time < fault["end"])
         after = (time >= fault["begin"]) & (time < fault["end"] + AROUND)
@@ -225,7 +221,7 @@ def sound(name: str, described: bool, motion: str, data: Mapping[str, Any], reco
     """Faults that begin in sound recordings, and their hours."""
     begins, hours = 0, 0.0
     for arrays in recordings:
-        flags = outputs(data, arrays)["sensor_fault"].astype(int)
+        flags = run_recording(data, arrays)["sensor_fault"].astype(int)
         begins += int((np.diff(flags, axis=0, prepend=0) > 0).sum())
         hours += float(arrays["time"][-1] - arrays["time"][0]) / 3600.0
     return {"finger": name, "described": described, "motion": motion, "faults": begins, "hours": hours}
@@ -250,21 +246,21 @@ def of_numpy(number: int) -> Row:
     """A finger in numpy, of which only sound recordings are judged."""
     case = numpy_cases.make(number, *NUMPY_SECONDS)
     train, test = (
-        {
-            "time": frame["time"].to_numpy(),
-            **{name: frame.filter(regex=rf"^{name}\[").to_numpy() for name in INPUTS},
-        }
+        {"time": frame["time"].to_numpy()} | {name: frame.filter(regex=rf"^{name}\[").to_numpy() for name in INPUTS}
         for frame in (case.train, case.test)
     )
-    name = f"numpy ({len(NUMPY)} fingers)"
-    return {"faults": [], "sound": [sound(name, True, "free", learned(case.nominal, [train]), [test])]}
+    return sound_alone(f"numpy ({len(NUMPY)} fingers)", case.nominal, train, test)
 
 
 def of_folder(description: Path, count: int) -> Row:
     """A finger of the folder of further recordings, likewise."""
     data = json.loads(description.read_text(encoding="utf-8"))
     train, test = (arrays_of(description.with_name(f"{description.stem}_{kind}.parquet")) for kind in ("train", "test"))
-    return {"faults": [], "sound": [sound(f"foreign ({count} fingers)", True, "free", learned(data, [train]), [test])]}
+    return sound_alone(f"foreign ({count} fingers)", data, train, test)
+
+
+def sound_alone(name: str, data: Mapping[str, Any], train: Arrays, test: Arrays) -> Row:
+    return {"faults": [], "sound": [sound(name, True, "free", learned(data, [train]), [test])]}
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -297,7 +293,6 @@ def report(faults: Sequence[Row], counts: Sequence[Row]) -> str:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("--fingers", type=int, nargs="*", default=FINGERS, help="numbers of evidence/fingers")
     options.add_argument("--foreign", type=Path, help="folder of further recordings")
     given = options.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
@@ -305,14 +300,13 @@ def main() -> None:
     def run(function: Any, cases: Mapping[str, Sequence[Any]]) -> list[Row]:
         return run_cases(function, cases, given.output, given.workers, given.scheduler)
 
-    numbers = [*given.fingers, None]
+    numbers = [*FINGERS, None]
     cases = {f"finger_{number}": (given.output, number, 3 * k) for k, number in enumerate(numbers)}
     files = sorted(given.foreign.glob("case_??.json")) if given.foreign else []
     rows = run(of_subjects, cases)
     rows += run(of_numpy, {f"numpy_{number:02d}": (number,) for number in NUMPY})
     rows += run(of_folder, {f"foreign_{file.stem}": (file, len(files)) for file in files})
     faults, counts = ([one for row in rows for one in row[key]] for key in ("faults", "sound"))
-    pd.DataFrame(faults).to_csv(given.output / "sensor_faults.csv", index=False)
     publish(given.output / "sensor_faults.md", report(faults, counts))
 
 

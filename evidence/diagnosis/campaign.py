@@ -7,11 +7,12 @@ Writes the row of each case as it ends, and FOLDER/rates.md. The same command go
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
 from evidence.diagnosis.makers import Case, Made, Options
 from evidence.judge import Cause, effects_of, holds, is_exactly_at_place, judge
 from evidence.runner import parser, publish, run_cases
-from evidence.tables import NOTHING, Row, table
+from evidence.tables import NOTHING, Row, table, where
 from tendonfmu.diagnosis import Diagnosis, diagnose, residual_of
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import Held, prepare, read_recording
@@ -57,132 +58,116 @@ NUMPY_NULL, NUMPY_SINGLE, NUMPY_UNKNOWN = (1, 2, 3, 4, 5), (6, 8, 9, 10, 11, 12,
 MUJOCO_NULL, MUJOCO_UNKNOWN, MUJOCO_CONTACT = (1, 2, 20), (17, 18, 22), (15,)
 MUJOCO_SINGLE = (3, 5, 6, 8, 10, 11, 12, 13, 14, 16, 21, 24)
 SECOND_JOINT = (6, 10, 12, 16, 17, 18, 24)  # plans whose effect is at joint 2, or at a tendon of it
-FOREIGN_SECONDS, FOREIGN_GAIN, FOREIGN_RATE = 45.0, 4, 500.0  # s, recordings of that length, Hz
+FOREIGN_SECONDS, FOREIGN_RATE = 45.0, 500.0  # s, Hz
 
 ALARMS = ("unexplained", "partly explained")
 NEAR = 1.4  # a case counts as one of the strengths within this factor
 SHOWN = 0.3  # strength from which a motion shows an absorbed effect, and at which two effects must both be named
 COVERAGE = "the gain's interval covers the true gain"
 HEADINGS = ("rate", "goal", "found", "cases", "95 % interval")
+GOALS_AT, GOALS, NO_GOALS = 0.1, ("≥ 98 %", "≥ 97 %", "≥ 93 %", "≤ 1.7"), ("as found",) * 4
 EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", "place")
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Counts:
-    """How many cases of what."""
-
-    null: int = 460
-    per_effect: int = 4  # of each effect and strength
-    strengths: Sequence[float] = STRENGTHS
-    double: int = 60
-    absorbed: int = 80
-    unknown: int = 48
-    contact: int = 16
-    foreign: int = 1  # times this many of each plan
-
-
-WHOLE, USUAL = Counts(), Options()
-
-
-def planned(seed: int, counts: Counts = WHOLE, options: Options = USUAL) -> list[Case]:
+def planned(seed: int) -> list[Case]:
     """All cases, each kind in random order and spread evenly over the whole."""
-    foreign = counts.foreign
     kinds = [
-        _nulls(counts.null, seed, options),
-        _singles(counts, seed, options),
-        _doubles(counts.double, seed, measured(options)),
-        _absorbed(counts.absorbed, seed, options),
-        _unknown(counts.unknown, seed, options),
-        _contacts(counts.contact, seed, options),
-        _foreign("null", NUMPY_NULL, MUJOCO_NULL, 5 * foreign, 5 * foreign, seed),
-        _foreign("single", NUMPY_SINGLE, MUJOCO_SINGLE, foreign, 2 * foreign, seed),
-        _foreign("unknown", NUMPY_UNKNOWN, MUJOCO_UNKNOWN, 2 * foreign, 2 * foreign, seed),
-        _foreign("contact", (), MUJOCO_CONTACT, 0, 2 * foreign, seed),
+        [_matched(f"null_{k}", "null", makers.null, seed + k, wander=(1.0, 3.0)[k % 2]) for k in range(460)],
+        list(_singles(4, seed)),
+        list(_doubles(60, seed)),
+        [_absorbed(ABSORBABLE[k % len(ABSORBABLE)], k, seed) for k in range(80)],
+        list(_unknown(48, seed)),
+        [_matched(f"contact_{k}", "contact", makers.contact, seed + 500_000 + k) for k in range(16)],
+        _foreign("null", NUMPY_NULL, MUJOCO_NULL, 5, 5, seed),
+        _foreign("single", NUMPY_SINGLE, MUJOCO_SINGLE, 1, 2, seed),
+        _foreign("unknown", NUMPY_UNKNOWN, MUJOCO_UNKNOWN, 2, 2, seed),
+        _foreign("contact", (), MUJOCO_CONTACT, 0, 2, seed),
     ]
     random = np.random.default_rng([seed, 68])
-    lists = [list(kind) for kind in kinds]
-    return makers.in_turn([[cases[k] for k in random.permutation(len(cases))] for cases in lists])
-
-
-def measured(options: Options) -> Options:
-    """With the recordings on which the gain is measured."""
-    return replace(options, test=MEASURED_SECONDS, gain_recordings=GAIN_RECORDINGS)
+    return makers.in_turn([[cases[k] for k in random.permutation(len(cases))] for cases in kinds])
 
 
 def _matched(
-    name: str, group: str, maker: Callable[..., Made], seed: int, options: Options, static: bool = False, **given: Any
+    name: str,
+    group: str,
+    maker: Callable[..., Made],
+    seed: int,
+    *,
+    wander: float = 1.0,
+    with_gain: bool = False,
+    static: bool = False,
+    **given: Any,
 ) -> Case:
     """A case whose joints and presliding are the seed's; static: without presliding."""
     rng = np.random.default_rng([seed, 67])
     joints, presliding = int(rng.choice(JOINTS, p=SHARES)), bool(rng.random() < 0.5)
-    options = replace(options, joints=joints, presliding=presliding and not static)
+    options = Options(joints=joints, presliding=presliding and not static, wander=wander)
+    if with_gain:
+        options = replace(options, test=MEASURED_SECONDS, gain_recordings=GAIN_RECORDINGS)
     return Case(name, group, seed, maker, {"options": options, **given})
 
 
-def _nulls(count: int, seed: int, options: Options) -> Iterator[Case]:
-    for k in range(count):
-        wander = 3.0 if k % 2 else 1.0
-        yield _matched(f"null_{k}", "null", makers.null, seed + k, replace(options, wander=wander))
-
-
-def _singles(counts: Counts, seed: int, options: Options) -> Iterator[Case]:
+def _singles(times: int, seed: int) -> Iterator[Case]:
     effects = [effect for effect in BUILDERS if effect != "force_offset"]  # refitting always absorbs it
-    for k in range(counts.per_effect):
-        for rank, strength in enumerate(counts.strengths):
-            case_options = options if strength < LEAST_MEASURED else measured(options)
-            for number, effect in enumerate(effects):
-                case_seed, name = seed + 100_000 + 1000 * k + 100 * rank + number, f"{effect}_{strength:g}_{k}"
-                yield _matched(name, "single", makers.single, case_seed, case_options, effect=effect, strength=strength)
-
-
-def _doubles(count: int, seed: int, options: Options) -> Iterator[Case]:
-    rng = np.random.default_rng([seed, 65])
-    for k in range(count):
-        effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
-        static, case_seed = "presliding" in effects, seed + 200_000 + k
+    for k, (rank, strength), (number, effect) in itertools.product(
+        range(times), enumerate(STRENGTHS), enumerate(effects)
+    ):
         yield _matched(
-            f"double_{k}", "double", makers.double, case_seed, options, static, effects=effects, strength=0.3
+            f"{effect}_{strength:g}_{k}",
+            "single",
+            makers.single,
+            seed + 100_000 + 1000 * k + 100 * rank + number,
+            with_gain=strength >= LEAST_MEASURED,
+            effect=effect,
+            strength=strength,
         )
 
 
-def _absorbed(count: int, seed: int, options: Options) -> Iterator[Case]:
+def _doubles(count: int, seed: int) -> Iterator[Case]:
+    rng = np.random.default_rng([seed, 65])
     for k in range(count):
-        effect = ABSORBABLE[k % len(ABSORBABLE)]
-        name = f"absorbed_{effect}_{k}"
-        yield _matched(name, "absorbed", makers.absorbed, seed + 300_000 + k, options, effect=effect)
+        effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
+        yield _matched(
+            f"double_{k}",
+            "double",
+            makers.double,
+            seed + 200_000 + k,
+            with_gain=True,
+            static="presliding" in effects,
+            effects=effects,
+            strength=0.3,
+        )
 
 
-def _unknown(count: int, seed: int, options: Options) -> Iterator[Case]:
-    kinds = [(effect, strength) for strength in UNKNOWN_STRENGTHS for effect in UNKNOWN]
-    for k in range(count):
-        effect, strength = kinds[k % len(kinds)]
-        name, case_seed = f"{effect}_{strength:g}_{k}", seed + 400_000 + k
-        yield _matched(name, "unknown", makers.single, case_seed, options, effect=effect, strength=strength)
+def _absorbed(effect: str, k: int, seed: int) -> Case:
+    return _matched(f"absorbed_{effect}_{k}", "absorbed", makers.absorbed, seed + 300_000 + k, effect=effect)
 
 
-def _contacts(count: int, seed: int, options: Options) -> Iterator[Case]:
-    for k in range(count):
-        yield _matched(f"contact_{k}", "contact", makers.contact, seed + 500_000 + k, options)
+def _unknown(count: int, seed: int) -> Iterator[Case]:
+    kinds = itertools.cycle(itertools.product(UNKNOWN_STRENGTHS, UNKNOWN))
+    for k, (strength, effect) in zip(range(count), kinds, strict=False):
+        given: dict[str, Any] = {"effect": effect, "strength": strength}
+        name = f"{effect}_{strength:g}_{k}"
+        yield _matched(name, "unknown", makers.single, seed + 400_000 + k, **given)
 
 
 def _foreign(
     group: str, in_numpy: Sequence[int], in_mujoco: Sequence[int], times_numpy: int, times_mujoco: int, seed: int
-) -> Iterator[Case]:
+) -> list[Case]:
     """Every plan so many times, numpy and MuJoCo in turn."""
     first = seed + 600_000
-    lists = [
+    lists = (
         [_numpy(group, number, k, first + k) for k in range(times_numpy) for number in in_numpy],
         [_mujoco(group, number, k, first + 100 * number + k) for k in range(times_mujoco) for number in in_mujoco],
-    ]
-    for rank in range(max(map(len, lists))):
-        yield from (cases[rank] for cases in lists if rank < len(cases))
+    )
+    return [case for pair in itertools.zip_longest(*lists) for case in pair if case is not None]
 
 
 def _numpy(group: str, number: int, k: int, seed: int) -> Case:
-    arguments = {"number": number, "seconds": FOREIGN_SECONDS, "gain_recordings": FOREIGN_GAIN}
+    arguments = {"number": number, "seconds": FOREIGN_SECONDS, "gain_recordings": GAIN_RECORDINGS}
     return Case(f"numpy_{group}_{number:02d}_{k}", group, seed, makers.numpy_finger, arguments)
 
 
@@ -325,45 +310,9 @@ def mean(what: str, goal: str, values: Sequence[float]) -> Line:
     return [what, goal, f"{middle:.2f}", str(len(values)), f"{middle - spread:.2f} to {middle + spread:.2f}"]
 
 
-def rates(rows: Sequence[Row]) -> list[Line]:
-    groups = {name: [row for row in rows if row["group"] == name] for name in ("null", "single", "double")}
-    groups |= {name: [row for row in rows if row["group"] == name] for name in ("absorbed", "unknown", "contact")}
-    single, double, absorbed, unknown = (groups[name] for name in ("single", "double", "absorbed", "unknown"))
-    lines = [rate("nothing hidden: a false cause", "≤ 1.5 %", groups["null"], lambda row: row["cause_count"] > 0)]
-    goals = {0.1: ("≥ 98 %", "≥ 97 %", "≥ 93 %", "≤ 1.7")}
-    for strength in (*STRENGTHS, 1.0):
-        some = [row for row in single if strength / NEAR < (row.get("strength") or 0.0) < strength * NEAR]
-        if some or strength == 0.1:
-            lines += _one_effect(f"one effect at {strength:g}", some, goals.get(strength, ("as found",) * 4))
-    of_own_size = [row for row in single if not row.get("strength")]
-    if of_own_size:
-        lines += _one_effect("one effect of a size of its own", of_own_size, ("as found",) * 4)
-    return [
-        *lines,
-        rate("right place, of those named", "≥ 95 %", single, lambda row: row["place"]),
-        rate("two effects at 0.3: both", "≥ 93 %", double, lambda row: row["both"]),
-        rate("two effects at 0.3: exactly both", "≥ 85 %", double, lambda row: row["exactly"]),
-        rate(
-            "absorbed by refitting: “not visible”, with an experiment",
-            "≥ 95 %",
-            absorbed,
-            lambda row: row["not_visible"] and row["experiment"],
-        ),
-        rate("the same where a motion shows it: named after the experiment", "≥ 90 %", absorbed, _named_afterwards),
-        rate("not in the list: unknown", "≥ 95 %", unknown, lambda row: row["unknown"]),
-        rate("not in the list: a wrong confident name", "≤ 5 %", unknown, lambda row: row["wrong_name"]),
-        rate("contact: found as an event", "as found", groups["contact"], lambda row: row["events"] > 0),
-        rate(COVERAGE, "92-98 %", rows, _covered),
-    ]
-
-
-def _one_effect(what: str, rows: Sequence[Row], goals: Sequence[str]) -> list[Line]:
-    return [
-        rate(f"{what}: detected", goals[0], rows, lambda row: row["detected"]),
-        rate(f"{what}: true cause in the set", goals[1], rows, lambda row: row["in_set"]),
-        rate(f"{what}: true cause first", goals[2], rows, lambda row: row["first"]),
-        mean(f"{what}: size of the set", goals[3], [float(row["set_size"]) for row in rows if row["set_size"]]),
-    ]
+def of_group(name: str, holds: Holds) -> Holds:
+    """Rows of other groups are left out."""
+    return lambda row: holds(row) if row["group"] == name else None
 
 
 def _named_afterwards(row: Row) -> bool | None:
@@ -378,25 +327,66 @@ def _covered(row: Row) -> bool | None:
     return bool(low <= true <= high)
 
 
+FALSE_CAUSE = of_group("null", lambda row: row["cause_count"] > 0)
+BOTH = of_group("double", lambda row: row["both"])
+UNKNOWN_SAID = of_group("unknown", lambda row: row["unknown"])
+RATES: Sequence[tuple[str, str, Holds]] = (
+    ("right place, of those named", "≥ 95 %", of_group("single", lambda row: row["place"])),
+    ("two effects at 0.3: both", "≥ 93 %", BOTH),
+    ("two effects at 0.3: exactly both", "≥ 85 %", of_group("double", lambda row: row["exactly"])),
+    (
+        "absorbed by refitting: “not visible”, with an experiment",
+        "≥ 95 %",
+        of_group("absorbed", lambda row: row["not_visible"] and row["experiment"]),
+    ),
+    (
+        "the same where a motion shows it: named after the experiment",
+        "≥ 90 %",
+        of_group("absorbed", _named_afterwards),
+    ),
+    ("not in the list: unknown", "≥ 95 %", UNKNOWN_SAID),
+    ("not in the list: a wrong confident name", "≤ 5 %", of_group("unknown", lambda row: row["wrong_name"])),
+    ("contact: found as an event", "as found", of_group("contact", lambda row: row["events"] > 0)),
+    (COVERAGE, "92-98 %", _covered),
+)
+PARTS: Mapping[str, Holds] = {
+    "nothing hidden: a false cause": FALSE_CAUSE,
+    "one effect: true cause in the set": of_group("single", lambda row: row["in_set"]),
+    "one effect: true cause first": of_group("single", lambda row: row["first"]),
+    "two effects: both": BOTH,
+    "not in the list: unknown": UNKNOWN_SAID,
+    COVERAGE: _covered,
+}
+
+
+def rates(rows: Sequence[Row]) -> list[Line]:
+    single = where(rows, group="single")
+    lines = [rate("nothing hidden: a false cause", "≤ 1.5 %", rows, FALSE_CAUSE)]
+    for strength in (*STRENGTHS, 1.0):
+        some = [row for row in single if strength / NEAR < (row.get("strength") or 0.0) < strength * NEAR]
+        if some or strength == GOALS_AT:
+            lines += _one_effect(f"one effect at {strength:g}", some, GOALS if strength == GOALS_AT else NO_GOALS)
+    of_own_size = [row for row in single if not row.get("strength")]
+    if of_own_size:
+        lines += _one_effect("one effect of a size of its own", of_own_size, NO_GOALS)
+    return [*lines, *(rate(what, goal, rows, holds) for what, goal, holds in RATES)]
+
+
+def _one_effect(what: str, rows: Sequence[Row], goals: Sequence[str]) -> list[Line]:
+    return [
+        rate(f"{what}: detected", goals[0], rows, lambda row: row["detected"]),
+        rate(f"{what}: true cause in the set", goals[1], rows, lambda row: row["in_set"]),
+        rate(f"{what}: true cause first", goals[2], rows, lambda row: row["first"]),
+        mean(f"{what}: size of the set", goals[3], [float(row["set_size"]) for row in rows if row["set_size"]]),
+    ]
+
+
 def rates_by_part(rows: Sequence[Row]) -> list[Line]:
     """The rates that differ most, by what made the recordings and by number of joints."""
-    parts = [(rig, [row for row in rows if row["rig"] == rig]) for rig in sorted({row["rig"] for row in rows})]
-    joints = sorted({row["joints"] for row in rows})
-    by_joints = [(f"{n} joint{'s' * (n > 1)}", [row for row in rows if row["joints"] == n]) for n in joints]
-    parts = parts * (len(parts) > 1) + by_joints * (len(by_joints) > 1)
-
-    def of_group(name: str, holds: Holds) -> Holds:
-        return lambda row: holds(row) if row["group"] == name else None
-
-    questions: Mapping[str, Holds] = {
-        "nothing hidden: a false cause": of_group("null", lambda row: row["cause_count"] > 0),
-        "one effect: true cause in the set": of_group("single", lambda row: row["in_set"]),
-        "one effect: true cause first": of_group("single", lambda row: row["first"]),
-        "two effects: both": of_group("double", lambda row: row["both"]),
-        "not in the list: unknown": of_group("unknown", lambda row: row["unknown"]),
-        COVERAGE: _covered,
-    }
-    lines = [rate(f"{what}; {part}", "", some, holds) for what, holds in questions.items() for part, some in parts]
+    rigs = {rig: where(rows, rig=rig) for rig in sorted({row["rig"] for row in rows})}
+    joints = {f"{n} joint{'s' * (n > 1)}": where(rows, joints=n) for n in sorted({row["joints"] for row in rows})}
+    parts = [part for groups in (rigs, joints) if len(groups) > 1 for part in groups.items()]
+    lines = [rate(f"{what}; {part}", "", some, holds) for what, holds in PARTS.items() for part, some in parts]
     return [line for line in lines if line[3] != "0"]
 
 
@@ -424,10 +414,9 @@ def markdown(rows: Sequence[Row]) -> str:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--only", nargs="+", metavar="NAME", help="of these cases only")
     options.add_argument("--minutes", type=float, default=math.inf, help="begin no case after these")
     given = options.parse_args()
-    cases = {case.name: (case,) for case in planned(given.seed) if not given.only or case.name in given.only}
+    cases = {case.name: (case,) for case in planned(given.seed)}
     rows = run_cases(
         run_case, cases, given.output, given.workers, given.scheduler, keep_errors=True, stop_after=60 * given.minutes
     )

@@ -14,13 +14,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
+from unittest import mock
 
 import numpy as np
 
@@ -113,17 +113,6 @@ class Streams:
         return (self.motion if self.normals_of_motion >= 0 else self.noise).standard_normal(*given)
 
 
-@contextmanager
-def with_numbers(simulator: ModuleType, numbers: Mapping[str, Any]) -> Iterator[None]:
-    """The module's constants are these inside."""
-    before = {name: getattr(simulator, name) for name in numbers}
-    vars(simulator).update(numbers)
-    try:
-        yield
-    finally:
-        vars(simulator).update(before)
-
-
 def record(simulator: ModuleType | None, difference: Difference, how: How) -> Recorded:
     """Means of as many samples as make RATE of the simulator's rate."""
     frame, measured, arms = _mujoco(difference, how) if simulator is None else _numpy(simulator, difference, how)
@@ -140,7 +129,7 @@ def record(simulator: ModuleType | None, difference: Difference, how: How) -> Re
 
 def _numpy(simulator: ModuleType, difference: Difference, how: How) -> tuple[Any, Array, Array]:
     streams = Streams(how, normals_of_motion=1 if simulator is numpy_maxwell else 0)
-    with with_numbers(simulator, difference.numbers(simulator)):
+    with mock.patch.dict(vars(simulator), difference.numbers(simulator)):  # the module's constants
         made = simulator.simulate(difference.hidden, how.seconds, cast(np.random.Generator, streams))
     return numpy_cases.recording(made), made["measured"], simulator.ARMS
 

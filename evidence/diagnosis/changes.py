@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -120,14 +119,10 @@ def answer_of(change: Change, asked: str, run: Run) -> dict[str, Any]:
     }
 
 
-def cases_of(bed: str, half: str, at_most: int | None = None) -> dict[str, tuple[str, int]]:
-    """Cases of a half, evenly spread if there are more than so many, in an order that is drawn, always the same: those
-    that can be run in some minutes are a fair part of all."""
-    numbers = [number for number in sorted(makers(bed)) if number % 2 in HALVES[half]]
-    if at_most is not None and at_most < len(numbers):
-        numbers = [numbers[k] for k in np.linspace(0, len(numbers) - 1, at_most).round().astype(int)]
-    drawn = [numbers[k] for k in np.random.default_rng(0).permutation(len(numbers))]
-    return {f"{bed}_{number:04d}": (bed, number) for number in drawn}
+def cases_of(bed: str, half: str) -> dict[str, tuple[str, int]]:
+    """Cases of a half, in an order that is drawn, always the same: a run that is cut has a fair part of all."""
+    numbers = np.random.default_rng(0).permutation([n for n in sorted(makers(bed)) if n % 2 in HALVES[half]])
+    return {f"{bed}_{number:04d}": (bed, number) for number in numbers.tolist()}
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -206,11 +201,9 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("bed", choices=MODULES)
     options.add_argument("--half", choices=HALVES, default="all", help="cases of odd or even number")
-    options.add_argument("--at-most", type=int, help="so many cases, evenly spread over the bed")
-    options.add_argument("--minutes", type=float, default=math.inf, help="begin no case after these")
     given = options.parse_args()
-    cases = cases_of(given.bed, given.half, given.at_most)
-    rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler, stop_after=60.0 * given.minutes)
+    cases = cases_of(given.bed, given.half)
+    rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler)
     publish(given.output / "changes.md", markdown(rows))
 
 

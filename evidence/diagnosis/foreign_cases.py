@@ -231,10 +231,8 @@ def median_and_most(values: Sequence[float]) -> str:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--half", choices=HALVES, default="all", help="cases of odd or even number")
-    options.add_argument("--only", nargs="+", metavar="NAME", help="of these cases only")
     given = options.parse_args()
-    cases = {name: case for name, case in cases_of(given.half).items() if not given.only or name in given.only}
-    rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler)
+    rows = run_cases(run_case, cases_of(given.half), given.output, given.workers, given.scheduler)
     publish(given.output / "table.md", markdown(rows))
 
 

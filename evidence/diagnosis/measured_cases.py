@@ -13,7 +13,7 @@ import json
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from evidence.diagnosis.campaign import causes_of
+from evidence.diagnosis.change_measured import KINEMATICS, less, recording
 from evidence.diagnosis.measured import (
     CLOSE,
     EFFECTS,
@@ -43,11 +44,10 @@ from evidence.diagnosis.measured import (
     speed_of,
 )
 from evidence.judge import Truth, judge
-from evidence.runner import DATA, parser, publish, run_cases
-from evidence.tables import Row, count, number, table, where
+from evidence.runner import parser, publish, run_cases
+from evidence.tables import Row, by, count, table
 from tendonfmu.diagnosis import diagnose
 from tendonfmu.files.tables import write_table
-from tendonfmu.recordings.converters import convert_file
 
 MACHINES = ("emps", "davinci")
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
@@ -169,36 +169,25 @@ FREE: Mapping[str, Callable[[Machine], Machine]] = {
 # --- hiding -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Hidden:
-    """A machine with an effect in its recordings."""
-
-    machine: Machine
-    magnitude: float
-    strength: float  # variance of what survives refitting, over that of what the model leaves
-    share: float  # and over the effect's own variance
-
-
-def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -> Hidden:
+def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -> Machine:
     """The effect at a strength. machine: freed of it. Raises ValueError where no magnitude has the strength."""
     before, nuisance = residuals(machine), bent(machine)
-    noise = before - nuisance @ (nuisance.T @ before)
+    noise = less(before, nuisance)
     magnitude = first_magnitude(effect, machine)
     for _ in range(ROUNDS):
         if not magnitude <= effect.most:
             break
-        made = put(machine, effect, sign * magnitude)
-        added = residuals(made) - before
-        left = added - nuisance @ (nuisance.T @ added)
+        changed = put(machine, effect, sign * magnitude)
+        left = less(residuals(changed) - before, nuisance)
         reached = float(left @ left) / float(noise @ noise)
         if abs(reached / strength - 1.0) < CLOSE:
-            share = float(left @ left) / max(float((added - added.mean()) @ (added - added.mean())), 1e-300)
-            return Hidden(made, sign * magnitude, reached, share)
+            return changed
         magnitude *= float(np.sqrt(strength / reached))
     raise ValueError(f"strength {strength}: no sound magnitude of this effect has it; tried up to {magnitude:g}")
 
 
-def part_of(columns: Columns, begin: float, end: float) -> Columns:
+def window(columns: Mapping[str, Array], begin: float, end: float) -> Columns:
+    """Both ends included, with the times of the whole."""
     rows = (columns["time"] >= begin) & (columns["time"] <= end)
     return {name: values[rows] for name, values in columns.items()}
 
@@ -206,16 +195,12 @@ def part_of(columns: Columns, begin: float, end: float) -> Columns:
 @cache
 def machine_of(name: str, part: int) -> Machine:
     """A part of the recordings, with the diagnosed model."""
-    model = diagnosed_model(name)
     if name == "emps":
-        columns = convert_file("emps", DATA / "emps" / "DATA_EMPS.mat", {"decimation": 1})
-        return Machine(name, model, {"emps": part_of(columns, *WINDOWS[part % len(WINDOWS)])}, 3)
-    drawn = np.random.default_rng([part, 26]).permutation(RUNS)[:CHOSEN]
-    folder = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
-    runs = {
-        run: convert_file("davinci", folder / f"{run}.TXT", {"pretension": 13.0}) for run in sorted(map(str, drawn))
-    }
-    return Machine(name, model, {run: part_of(columns, 0.0, SECONDS) for run, columns in runs.items()}, 1)
+        parts = {name: window(recording(name, "plain"), *WINDOWS[part % len(WINDOWS)])}
+    else:
+        drawn = np.random.default_rng([part, 26]).permutation(RUNS)[:CHOSEN]
+        parts = {run: window(recording(name, run), 0.0, SECONDS) for run in sorted(map(str, drawn))}
+    return Machine(name, diagnosed_model(name), parts, KINEMATICS[name])
 
 
 # --- cases and tables -------------------------------------------------------------------------------------------------
@@ -223,35 +208,27 @@ def machine_of(name: str, part: int) -> Machine:
 
 def run_case(name: str, effect: str, strength: float, part: int) -> dict[str, Any]:
     """part: of the recordings; it also gives the sign of an effect that has two."""
-    machine = machine_of(name, part)
-    row: dict[str, Any] = {"machine": name, "effect": effect, "strength": strength}
-    names: tuple[str, ...] = ()
+    machine, row = machine_of(name, part), {"machine": name, "effect": effect, "strength": strength}
     if effect != NOTHING:
-        names = EFFECTS[effect].names
+        sign = -1.0 if effect == "gain" and part % 2 else 1.0
         try:
-            hidden = hide(
-                FREE[effect](machine), EFFECTS[effect], strength, -1.0 if effect == "gain" and part % 2 else 1.0
-            )
+            machine = hide(FREE[effect](machine), EFFECTS[effect], strength, sign)
         except ValueError as impossible:
             return row | {"impossible": str(impossible)}
-        machine = hidden.machine
-        row |= {"magnitude": hidden.magnitude, "share": hidden.share}
     with tempfile.TemporaryDirectory() as scratch:
         finger = Path(scratch) / "nominal.json"
         finger.write_text(json.dumps(machine.model), encoding="utf-8")
-        files = [Path(scratch) / f"{recording}.parquet" for recording in machine.recordings]
+        files = [Path(scratch) / f"{run}.parquet" for run in machine.recordings]
         for file, columns in zip(files, machine.recordings.values(), strict=True):
             write_table(file, columns)
         diagnosis = diagnose(finger, files, [], kinematics=machine.kinematics, seed=part)
-    judgement = judge(causes_of(diagnosis), Truth(names))
+    judgement = judge(causes_of(diagnosis), Truth(EFFECTS[effect].names if effect != NOTHING else ()))
     return row | {
         "verdict": diagnosis.verdict,
         "causes": " ".join(cause.effect for cause in diagnosis.causes),
         "detected": bool(diagnosis.causes),
         "in_set": judgement.in_set,
         "first": judgement.first,
-        "set_size": judgement.set_size,
-        "invisible": any(entry.where.effect in names for entry in diagnosis.invisible),
     }
 
 
@@ -271,32 +248,18 @@ def cases_of(parts: int) -> dict[str, tuple[str, str, float, int]]:
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    rows = [row for row in rows if "impossible" not in row]
-    by_strength, by_effect = [], []
-    for machine in MACHINES:
-        for strength in (0.0, *STRENGTHS):
-            some = where(rows, machine=machine, strength=strength)
-            if some:
-                by_strength.append(
-                    [machine, f"{strength:g}" if strength else "nothing hidden", len(some), *cells(some)]
-                )
-        for effect in FREE:
-            for strength in STRENGTHS:
-                some = where(rows, machine=machine, effect=effect, strength=strength)
-                if some:
-                    survives = number(float(np.mean([row["share"] for row in some])), ".0f", 100.0)
-                    sizes = [row["set_size"] for row in some if row["in_set"]]
-                    size = number(float(np.mean(sizes)) if sizes else None, ".1f")
-                    unseen = count((row["invisible"] for row in some), with_interval=True)
-                    by_effect.append([machine, effect, f"{strength:g}", f"{survives} %", *cells(some), size, unseen])
-    first = ("machine", "strength", "cases", "detected", "true cause in the set", "first")
-    second = ("machine", "hidden", "strength", "survives", "detected", "in the set", "first", "set", "not visible")
-    return table(first, by_strength) + "\n\n" + table(second, by_effect, 2) + "\n"
+    made = [row for row in rows if "impossible" not in row]
+    made.sort(key=lambda row: (MACHINES.index(row["machine"]), row["strength"]))
+    lines = by(
+        [{**row, "strength": row["strength"] or "nothing hidden"} for row in made], ("machine", "strength"), cells
+    )
+    return table(("machine", "strength", "cases", "detected", "true cause in the set", "first"), lines) + "\n"
 
 
 def cells(rows: Sequence[Row]) -> list[str]:
+    """Strength 0: nothing is hidden, so no cause is true."""
     answers = [[row[key] for row in rows if row[key] is not None] for key in ("detected", "in_set", "first")]
-    return [count(hits, with_interval=True) if hits else "" for hits in answers]
+    return [str(len(rows)), *(count(hits, with_interval=True) if hits else "" for hits in answers)]
 
 
 def main() -> None:

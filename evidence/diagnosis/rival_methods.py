@@ -7,7 +7,7 @@ slow bias can mend by plain least squares, as with independent samples.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -155,6 +155,9 @@ def by_random_cv(data: Plain, power: Numbers) -> Trial | None:
     return best if best is not None and gain(best) > 0.0 else None
 
 
+STEPWISE: Mapping[str, Choice] = {"correlation": by_correlation, "bic": by_bic, "random_cv": by_random_cv}
+
+
 def by_sindy(data: Plain) -> list[Trial]:
     """Causes with a coefficient that is left, the largest first."""
     import pysindy
@@ -210,21 +213,25 @@ def by_knockoffs(data: Plain) -> list[Trial]:
 
 def one_variable_each(data: Plain) -> tuple[list[Trial], Numbers]:
     """A trial for each place of a candidate, and [R, v] the first principal direction of its columns, of rms 1."""
-    power = np.einsum("rc,rc->c", data.columns, data.columns)
-    shown = power > least_power(power)
     owners: list[Trial] = []
     variables: list[Numbers] = []
+    for trial, columns in columns_by_place(data):
+        variable = columns @ np.linalg.eigh(columns.T @ columns)[1][:, -1]
+        owners.append(trial)
+        variables.append(variable / np.sqrt(np.mean(variable**2)))
+    return owners, np.column_stack(variables)
+
+
+def columns_by_place(data: Plain) -> Iterator[tuple[Trial, Numbers]]:
+    """For each place of a candidate its first trial, and [R, c] its columns of length 1, without those that are
+    rounding."""
+    power = np.einsum("rc,rc->c", data.columns, data.columns)
+    shown = power > least_power(power)
     for where in dict.fromkeys(trial.where for trial in data.trials):
         trials = [trial for trial in data.trials if trial.where == where]
         numbers = [number for trial in trials for number in trial.numbers if shown[number]]
-        if not numbers:
-            continue
-        scaled = data.columns[:, numbers] / np.sqrt(power[numbers])
-        direction = np.linalg.eigh(scaled.T @ scaled)[1][:, -1]
-        variable = scaled @ direction
-        owners.append(trials[0])
-        variables.append(variable / np.sqrt(np.mean(variable**2)))
-    return owners, np.column_stack(variables)
+        if numbers:
+            yield trials[0], data.columns[:, numbers] / np.sqrt(power[numbers])
 
 
 # --- a structural-residual test as fault diagnosis has it (Gertler 1998; Blanke et al. 2016): detect, then isolate ----
@@ -294,18 +301,13 @@ def largest_ratio(values: Numbers, length: int) -> float:
 
 def signature_matrix(data: Plain, relations: list[Numbers]) -> dict[Where, Flags]:
     """[k] for each effect at a place: which residuals it enters."""
-    power = np.einsum("rc,rc->c", data.columns, data.columns)
     joints = len(relations[0])
     signatures: dict[Where, Flags] = {}
-    for where in dict.fromkeys(trial.where for trial in data.trials):
-        numbers = [n for trial in data.trials if trial.where == where for n in trial.numbers]
-        numbers = [n for n in numbers if power[n] > least_power(power)]
-        if not numbers:
-            continue
-        columns = data.columns[:, numbers] / np.sqrt(power[numbers])
-        wide = columns.reshape(-1, joints, len(numbers))
-        share = [np.einsum("bjc,jd->bdc", wide, directions) for directions in relations]
-        signatures[where] = np.array([float(np.mean(np.sum(part**2, axis=(0, 1)))) >= ENTERS for part in share])
+    for trial, columns in columns_by_place(data):
+        by_joint = columns.reshape(-1, joints, columns.shape[1])
+        entering = [np.einsum("bjc,jd->bdc", by_joint, directions) for directions in relations]
+        shares = [float(np.mean(np.sum(part**2, axis=(0, 1)))) for part in entering]
+        signatures[trial.where] = np.array([share >= ENTERS for share in shares])
     return signatures
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import statistics
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from evidence.diagnosis.makers import Case, Made, Options
 from evidence.fingers import foreign
 from evidence.judge import SYNONYMS, Cause, Truth, effects_of, judge
 from evidence.runner import parser, publish, run_cases
-from evidence.tables import NOTHING, Row, table
+from evidence.tables import NOTHING, Row, count, table
 from tendonfmu.diagnosis.cause_search import View, look
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.result import Where
@@ -36,6 +36,7 @@ from tendonfmu.recordings import Held, prepare, read_recording
 
 TRAIN, TEST = 30.0, 15.0  # s
 NULLS = 12
+SEED = 88100  # of the matched rigs
 STRENGTH = 0.3
 OWN = "diagnose"
 
@@ -132,12 +133,7 @@ def rival_answers(made: Made) -> dict[str, Answer]:
 def answers_of(view: View) -> dict[str, Answer]:
     """What each rival says of the residual. sindy and knockoffs only where they are installed."""
     data = rival_methods.plain(view)
-    choices = {
-        "correlation": rival_methods.by_correlation,
-        "bic": rival_methods.by_bic,
-        "random_cv": rival_methods.by_random_cv,
-    }
-    trials = {name: rival_methods.stepwise(data, choose) for name, choose in choices.items()}
+    trials = {name: rival_methods.stepwise(data, choose) for name, choose in rival_methods.STEPWISE.items()}
     for name, rival in (("sindy", rival_methods.by_sindy), ("knockoffs", rival_methods.by_knockoffs)):
         with contextlib.suppress(ModuleNotFoundError):
             trials[name] = rival(data)
@@ -178,50 +174,47 @@ def judged(made: Made, answer: Answer) -> dict[str, Any]:
 
 # --- the table --------------------------------------------------------------------------------------------------------
 
-Verdict = dict[str, Any]
-Cell = Callable[[Sequence[Verdict]], str]
+Verdict = Mapping[str, Any]
+Cell = Callable[[Sequence[Verdict], str], str]
 
 
-def _share(holds: Callable[[Verdict], bool | None]) -> Cell:
-    def cell(verdicts: Sequence[Verdict]) -> str:
-        answers = [holds(verdict) for verdict in verdicts]
-        asked = [answer for answer in answers if answer is not None]
-        return f"{sum(asked)} of {len(asked)}" if asked else NOTHING
-
-    return cell
+def _known(verdicts: Sequence[Verdict], key: str) -> list[Any]:
+    return [verdict[key] for verdict in verdicts if verdict[key] is not None]
 
 
-def _naming(holds: Callable[[Verdict], bool | None]) -> Cell:
-    return lambda verdicts: _share(holds)(verdicts) if all(it["names"] for it in verdicts) else "names nothing"
+def _share(verdicts: Sequence[Verdict], key: str) -> str:
+    return count(_known(verdicts, key))
 
 
-def _mean(key: str) -> Cell:
-    def cell(verdicts: Sequence[Verdict]) -> str:
-        known = [verdict[key] for verdict in verdicts if verdict["names"] and verdict[key] is not None]
-        return f"{statistics.fmean(known):.2f}" if known else NOTHING
-
-    return cell
+def _naming(verdicts: Sequence[Verdict], key: str) -> str:
+    return _share(verdicts, key) if all(verdict["names"] for verdict in verdicts) else "names nothing"
 
 
-def _gain(verdicts: Sequence[Verdict]) -> str:
-    values = [verdict["gain"] for verdict in verdicts if verdict["gain"] is not None]
+def _mean(verdicts: Sequence[Verdict], key: str) -> str:
+    known = _known([verdict for verdict in verdicts if verdict["names"]], key)
+    return f"{statistics.fmean(known):.2f}" if known else NOTHING
+
+
+def _gain(verdicts: Sequence[Verdict], key: str) -> str:
+    values = _known(verdicts, key)
     if not values:
         return NOTHING
     return f"{100 * statistics.median(values):.1f} % ({100 * min(values):.1f} to {100 * max(values):.1f})"
 
 
-LINES: dict[str, tuple[str, Cell]] = {
-    "nothing hidden: names something": ("null", _naming(lambda it: it["false"] > 0)),
-    "one effect: in the set": ("single", _naming(lambda it: it["in_set"])),
-    "one effect: first": ("single", _naming(lambda it: it["first"])),
-    "one effect: at its place, where in the set": ("single", _naming(lambda it: it["at_place"])),
-    "one effect: false causes per case": ("single", _mean("false")),
-    "one effect: effects in the set": ("single", _mean("set_size")),
-    "not on the list: names something": ("unknown", _naming(lambda it: it["false"] > 0)),
-    "not on the list: says there is something, unnamed": ("unknown", _share(lambda it: it["unnamed"])),
-    "nothing hidden: gain, median and range": ("null", _gain),
-    "one effect: gain": ("single", _gain),
-    "not on the list: gain": ("unknown", _gain),
+# by what is asked: the group of cases, how its cell is made, and of which answer
+LINES: dict[str, tuple[str, Cell, str]] = {
+    "nothing hidden: names something": ("null", _naming, "false"),
+    "one effect: in the set": ("single", _naming, "in_set"),
+    "one effect: first": ("single", _naming, "first"),
+    "one effect: at its place, where in the set": ("single", _naming, "at_place"),
+    "one effect: false causes per case": ("single", _mean, "false"),
+    "one effect: effects in the set": ("single", _mean, "set_size"),
+    "not on the list: names something": ("unknown", _naming, "false"),
+    "not on the list: says there is something, unnamed": ("unknown", _share, "unnamed"),
+    "nothing hidden: gain, median and range": ("null", _gain, "gain"),
+    "one effect: gain": ("single", _gain, "gain"),
+    "not on the list: gain": ("unknown", _gain, "gain"),
 }
 
 
@@ -232,9 +225,9 @@ def markdown(rows: Sequence[Row]) -> str:
     lines = []
     for family, is_matched in (("matched", True), ("foreign", False)):
         of_family = [row for row in good if (row["rig"] == "matched") == is_matched]
-        for what, (group, cell) in LINES.items():
+        for what, (group, cell, key) in LINES.items():
             asked = [row["answers"] for row in of_family if row["group"] == group]
-            cells = [cell([answers[who] for answers in asked if who in answers]) for who in names]
+            cells = [cell([answers[who] for answers in asked if who in answers], key) for who in names]
             lines.append([f"{family}, {what}", *cells])
     failed = len(rows) - len(good)
     note = f"\n{failed} of {len(rows)} cases ended in an error and are left out.\n" if failed else ""
@@ -242,10 +235,8 @@ def markdown(rows: Sequence[Row]) -> str:
 
 
 def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("--seed", type=int, default=88100, help="of the matched rigs")
-    given = options.parse_args()
-    cases = {case.name: (case,) for case in all_cases(given.seed)}
+    given = parser(__doc__).parse_args()
+    cases = {case.name: (case,) for case in all_cases(SEED)}
     rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler, keep_errors=True)
     publish(given.output / "rivals.md", markdown(rows))
 

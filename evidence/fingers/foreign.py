@@ -92,12 +92,12 @@ def rough(value: float, rng: np.random.Generator) -> float:
 def law(magnitude: float, speed: float, rng: np.random.Generator, viscous: float = 0.0, peak: float = 1.0) -> Nominal:
     """A rough symmetric law; `peak` is static over coulomb, and 1 leaves the Stribeck effect out."""
     coulomb = rough(magnitude, rng)
-    return {
-        "static": coulomb * peak,
-        "coulomb": coulomb,
-        "stribeck_velocity": speed,
-        "viscous": rough(viscous, rng) if viscous > 0.0 else 0.0,
-    }
+    return level_law(coulomb, speed, rough(viscous, rng) if viscous > 0.0 else 0.0) | {"static": coulomb * peak}
+
+
+def level_law(coulomb: float, speed: float, viscous: float = 0.0) -> Nominal:
+    """A symmetric law without Stribeck effect."""
+    return {"static": coulomb, "coulomb": coulomb, "stribeck_velocity": speed, "viscous": viscous}
 
 
 def description(

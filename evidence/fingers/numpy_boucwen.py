@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, level_law, noisy, quantised
 
 ARMS = np.array([[0.0092, 0.0], [-0.0092, 0.0], [-0.0075, 0.0075], [0.0075, -0.0075]])  # m
 STIFFNESS = 3800.0  # N/m
@@ -68,8 +68,8 @@ def describe(hidden: str) -> Nominal:
     """One law a tendon, before the first joint; covers; joints without friction; no angle sensor."""
     tendons = []
     for arms, start in zip(ARMS, (0.04, 0.07, 0.08, 0.03), strict=True):
-        entry = {"static": start, "coulomb": start, "stribeck_velocity": 0.004, "viscous": 0.0}
-        tendons.append({"stiffness": STIFFNESS, "moment_arms": arms.tolist(), "edge_friction": [entry, None]})
+        edge = [level_law(start, 0.004), None]
+        tendons.append({"stiffness": STIFFNESS, "moment_arms": arms.tolist(), "edge_friction": edge})
     joints = [{"cover": {"stiffness": 0.03, "rest_angle": 0.0}}, {"cover": {"stiffness": 0.018, "rest_angle": 0.0}}]
     if hidden == "cover_stiffness":
         joints[0] = {}

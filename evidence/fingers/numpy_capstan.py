@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, level_law, noisy, quantised
 
 ARMS = np.array([[0.0088, 0.0], [-0.0090, 0.0], [-0.0070, 0.0080], [0.0073, -0.0077]])  # m
 STIFFNESS = np.array([3900.0, 4500.0, 3400.0, 3700.0])  # N/m
@@ -66,17 +66,12 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
 
 def describe(hidden: str) -> Nominal:
     """Edges with three working points where the wrap depends on joint 1; the joints' own friction."""
-
-    def law(share: float) -> dict[str, float]:
-        return {"static": share, "coulomb": share, "stribeck_velocity": 0.005, "viscous": 0.0}
-
     tendons = []
     for i, arms in enumerate(ARMS):
         start = 0.02 if i % 2 else 0.045
-        inner = {"angles": [-0.6, 0.0, 0.6], "laws": [law(0.007), law(0.028), law(0.03)]}
-        edge = [law(start), inner if arms[1] else None]
+        inner = {"angles": [-0.6, 0.0, 0.6], "laws": [level_law(share, 0.005) for share in (0.007, 0.028, 0.03)]}
+        edge = [level_law(start, 0.005), inner if arms[1] else None]
         tendons.append({"stiffness": float(STIFFNESS[i]), "moment_arms": arms.tolist(), "edge_friction": edge})
-    viscous = 0.0 if hidden == "viscous_friction" else 0.003
-    friction = {"static": 0.007, "coulomb": 0.007, "stribeck_velocity": 0.1, "viscous": viscous}
+    friction = level_law(0.007, 0.1, 0.0 if hidden == "viscous_friction" else 0.003)
     joint = {"cover": {"stiffness": 0.018, "rest_angle": 0.05}, "friction": friction}
     return description("capstan_finger", [joint, joint], tendons)

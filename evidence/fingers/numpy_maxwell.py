@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, level_law, noisy, quantised
 
 ARMS = (
     np.array([[9.0, 0, 0], [-8.7, 0, 0], [-7.1, 8.2, 0], [7.4, -7.9, 0], [6.9, -6.4, 7.2], [-7.2, 6.6, -7.0]]) / 1000.0
@@ -68,13 +68,9 @@ def describe(hidden: str) -> Nominal:
     tendons = []
     for i, arms in enumerate(ARMS):
         factors = (0.7, 1.5, 0.9) if i % 2 else (1.3, 0.65, 1.2)
-        edge = [
-            {"static": a, "coulomb": a, "stribeck_velocity": 0.005, "viscous": 0.0} if a else None
-            for a in (SHARE[i] * factors).tolist()
-        ]
+        edge = [level_law(share, 0.005) if share else None for share in (SHARE[i] * factors).tolist()]
         if hidden == "edge_friction" and i == 4:
             edge[1] = None
         tendons.append({"stiffness": float(STIFFNESS[i]), "moment_arms": arms.tolist(), "edge_friction": edge})
-    friction = {"static": 0.0005, "coulomb": 0.0005, "stribeck_velocity": 0.1, "viscous": 0.008}
-    joint = {"cover": {"stiffness": 0.03, "rest_angle": 0.0}, "friction": friction}
+    joint = {"cover": {"stiffness": 0.03, "rest_angle": 0.0}, "friction": level_law(0.0005, 0.1, 0.008)}
     return description("maxwell_finger", [joint] * 3, tendons)

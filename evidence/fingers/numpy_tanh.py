@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evidence.fingers.foreign import Array, Nominal, description, noisy, quantised
+from evidence.fingers.foreign import Array, Nominal, description, level_law, noisy, quantised
 
 ARMS = np.array([[0.009, 0.0], [-0.0088, 0.0], [-0.007, 0.0081], [0.0072, -0.0078]])  # m
 STIFFNESS = 4000.0  # N/m
@@ -52,12 +52,8 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
 
 def describe(hidden: str) -> Nominal:
     """All of it is in the description, with rough numbers; no angle sensor."""
-    entry = {"static": 0.025, "coulomb": 0.025, "stribeck_velocity": 0.005, "viscous": 0.0}
-    inner = {"static": 0.034, "coulomb": 0.034, "stribeck_velocity": 0.005, "viscous": 0.0}
-    joint = {
-        "cover": {"stiffness": 0.018, "rest_angle": 0.0},
-        "friction": {"static": 0.009, "coulomb": 0.009, "stribeck_velocity": 0.1, "viscous": 0.003},
-    }
+    entry, inner = level_law(0.025, 0.005), level_law(0.034, 0.005)
+    joint = {"cover": {"stiffness": 0.018, "rest_angle": 0.0}, "friction": level_law(0.009, 0.1, 0.003)}
     tendons = [
         {"stiffness": STIFFNESS, "moment_arms": arms.tolist(), "edge_friction": [entry, inner if arms[1] else None]}
         for arms in ARMS

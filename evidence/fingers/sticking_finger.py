@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from evidence.fingers.foreign import frame, level_law
+
 ARMS, STIFFNESS = (0.008, -0.0085), (4000.0, 3600.0)  # m, N/m
 EDGES, DRY = (0.03, 0.022), 0.005  # of the tendon force; N·m
 COVER, INERTIA, DAMPING = 0.02, 4e-5, 0.002  # N·m/rad, kg·m², N·m·s/rad
@@ -37,22 +39,18 @@ def described_friction_at(data: Any, force: float) -> float:
 
 def description() -> dict[str, Any]:
     """The right structure, with numbers that are off by 30 %."""
-
-    def law(size: float) -> dict[str, float]:
-        return {"static": size, "coulomb": size, "stribeck_velocity": 0.01, "viscous": 0.0}
-
     return {
         "format": "tendonfmu-finger-1",
         "name": "sticking_finger",
         "joints": [
-            {"name": "joint", "friction": law(1.3 * DRY) | {"viscous": 0.001}, "cover": {"stiffness": 0.7 * COVER}}
+            {"name": "joint", "friction": level_law(1.3 * DRY, 0.01, 0.001), "cover": {"stiffness": 0.7 * COVER}}
         ],
         "tendons": [
             {
                 "name": f"tendon_{k + 1}",
                 "stiffness": STIFFNESS[k],
                 "moment_arms": [ARMS[k]],
-                "edge_friction": [law(0.7 * EDGES[k])],
+                "edge_friction": [level_law(0.7 * EDGES[k], 0.01)],
             }
             for k in range(2)
         ],
@@ -87,15 +85,8 @@ def simulate(seconds: float, seed: int, weight: float = 0.0) -> pd.DataFrame:
             rows.append((time[k], *force, motors[0][k], motors[1][k], q))
     table = np.array(rows)[np.array(rows)[:, 0] >= 0.0]
     noise = rng.normal(size=table.shape) * (0.0, 0.02, 0.02, 1e-6, 1e-6, 1e-4)
-    names = [
-        "time",
-        "tendon_force[1]",
-        "tendon_force[2]",
-        "tendon_position[1]",
-        "tendon_position[2]",
-        "joint_position[1]",
-    ]
-    return pd.DataFrame(table + noise, columns=names)
+    table += noise
+    return frame(table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 5:])
 
 
 def write(folder: Path, seconds: float, seed: int, weight: float = 0.0) -> tuple[Path, Path]:

@@ -5,99 +5,303 @@
 
 The index finger (472 numbers) over 400 s of an `excite` motion at 1 kHz; forces made by the model itself, with other
 numbers than the fit starts from, white noise and a wandering bias. Each way runs in a process of its own, one after the
-other, whose peak memory is the kernel's (ru_maxrss). The product uses all cores, the peers one. They take as many
+other, whose peak memory is the kernel's. The product uses all cores, the peers (peers.py) one. They take as many
 samples as they can finish, and their times are scaled by the samples; the iterations of least squares are its own, on
 the samples that it took. Before any time is worth anything they must agree with the product on those samples.
-ways.py has data and ways, peers.py the peers.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
+import re
+import resource
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-# numpy stays outside: a process starts with the peak memory of the one that it comes from.
-FULL = 400_000  # samples
-AGREEMENT = 0.05  # standard errors between two ways on the same samples
+import numpy as np
 
-# way: what it is, samples that it takes, and the way of the product that it must agree with
-WAYS: dict[str, tuple[str, int, str | None]] = {
-    "command": ("tendonfmu fit, file to report", FULL, None),
-    "batch": ("batch, to convergence", FULL, None),
-    "ekf": ("EKF, both passes", FULL, None),
-    "product": ("numpy JᵀJ of one pass, J given", 20_000, None),
-    "least_squares": ("scipy least_squares, compiled Jacobian, dense", 8_000, "batch_to_the_end"),
-    "symmetric": ("numpy EKF, P − W Wᵀ", 2_000, "ekf_sample_by_sample"),
-    "joseph": ("numpy EKF, Joseph form", 300, "ekf_sample_by_sample"),
-    "filterpy": ("filterpy ExtendedKalmanFilter", 150, "ekf_sample_by_sample"),
-}
-# Of the peers' linear algebra: how their threads share a busy machine would be measured instead.
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-ROOT = Path(__file__).resolve().parents[2]
+from evidence import tables
+from evidence.fit.made_data import model_torques, noise_scale
+from evidence.fit.peers import Task, Watch, least_squares_fit, outer_products, run_filter
+from evidence.runner import INDEX_FINGER, ROOT, parser, plain, say, write
+from tendonfmu.arrays import Array
+from tendonfmu.estimate import Choice, Estimator, FrictionFit, Structure, build_structure
+from tendonfmu.estimate.estimation import Learner
+from tendonfmu.excite import Plan, plan_excitation, read_subject
+from tendonfmu.excite.excitation import START
+from tendonfmu.excite.training_motion import as_array, find_ranges
+from tendonfmu.files import write_table
+from tendonfmu.model import balanced_forces, read_finger
+
+FULL = 400_000  # samples
+RATE = 1000.0  # Hz
+BEGIN = round(START * RATE)  # before it, all joints rest
+PRETENSIONS = (15.0, 30.0)  # N, in turn
+ALTERNATE = 50.0  # s
+SPREAD = 0.3  # of the logarithm of each number of the truth about the description
+FILE = "recording"
+PRIOR_STD, TOLERANCE = 1.0, 0.1  # as `tendonfmu fit` has them
+MOST_CALLS = 40  # of scipy
+AGREEMENT = 0.05  # standard errors between two ways on the same samples
 GOALS = {"batch": 20.0, "ekf": 60.0}  # s
 MOST_MEMORY = 1e9  # bytes, of the product's ways
+# Of the peers' linear algebra: how their threads share a busy machine would be measured instead.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+# --- the data ---------------------------------------------------------------------------------------------------------
 
 
-def run(way: str, folder: Path, **options: float) -> dict[str, Any]:
-    """What ways.py prints. Ends the program where it fails."""
-    command = [sys.executable, "-m", "evidence.fit.ways", way, "--folder", str(folder)]
-    for name, value in options.items():
-        command += [f"--{name}", str(value)]
-    result = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=os.environ | ONE_THREAD, cwd=ROOT)
+def other_numbers(node: Any, draw: Callable[[], float]) -> Any:
+    """The same description with the numbers of its laws and covers multiplied by draws."""
+    if isinstance(node, list):
+        return [other_numbers(inner, draw) for inner in node]
+    if not isinstance(node, dict):
+        return node
+    if "coulomb" in node:
+        coulomb = node["coulomb"] * draw()
+        drop = (node["static"] - node["coulomb"]) * draw()
+        return {
+            **node,
+            "static": coulomb + drop,
+            "coulomb": coulomb,
+            "stribeck_velocity": node["stribeck_velocity"] * draw(),
+            "viscous": node.get("viscous", 0.0) * draw(),
+        }
+    return {
+        key: {**value, "stiffness": value["stiffness"] * draw()}
+        if key == "cover" and value
+        else other_numbers(value, draw)
+        for key, value in node.items()
+    }
+
+
+def make_data(folder: Path, duration: float) -> None:
+    """Writes recording.parquet and .npz: a motion of `excite`, and y = T + b + e by another finger's numbers.
+
+    The forces carry that finger's friction; what the jumps of fig. 5, a random walk and white noise add to it comes as
+    known load, `external_torque` = Rᵀ f0 − y, so that no tendon goes slack however far the bias wanders.
+    """
+    rng = np.random.default_rng(1)
+    subject = read_subject(INDEX_FINGER)
+    truth = other_numbers(subject.finger.data, lambda: float(np.exp(SPREAD * rng.standard_normal())))
+    ranges = as_array(find_ranges(subject, []))
+    alternate = min(ALTERNATE, duration / 2)
+    plan = Plan(ranges, duration=duration, pretensions=PRETENSIONS, alternate=alternate, rate=RATE)
+    motion = plan_excitation(truth, plan)
+    arrays = {"time": motion.time, "joint_position": motion.joint_position, "joint_velocity": motion.joint_velocity}
+    arrays["tendon_force"] = balanced_forces(truth, arrays, motion.pretension)
+    torque, jumps = model_torques(truth, arrays)
+    white, steps = rng.standard_normal((2, *torque.shape))
+    walk = np.sqrt(truth["bias"]["drift_variance"] / RATE) * np.cumsum(steps, axis=0)
+    noise = noise_scale(truth, motion.time, arrays["tendon_force"]) * white
+    arms, stiffness = np.array(subject.finger.moment_arms), [tendon["stiffness"] for tendon in truth["tendons"]]
+    arrays["external_torque"] = arrays["tendon_force"] @ arms - (torque + jumps + walk + noise)
+    arrays["tendon_position"] = motion.joint_position @ arms.T + arrays["tendon_force"] / stiffness
+    columns = {
+        f"{name}[{k}]": column
+        for name, array in arrays.items()
+        if name != "time"
+        for k, column in enumerate(array.T, start=1)
+    }
+    write_table(folder / f"{FILE}.parquet", {"time": motion.time} | columns)
+    np.savez(folder / f"{FILE}.npz", **arrays)
+
+
+def load(folder: Path, samples: int) -> dict[str, Array]:
+    """So many samples of what make_data wrote, from the beginning of the motion on."""
+    with np.load(folder / f"{FILE}.npz") as file:
+        return {name: np.ascontiguousarray(file[name][BEGIN : BEGIN + samples]) for name in file.files}
+
+
+def structure() -> Structure:
+    return build_structure(read_finger(INDEX_FINGER), Choice())
+
+
+def call_with(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """Arguments of Estimator.add_recording and Learner.run."""
+    given = {name: array for name, array in arrays.items() if name != "external_torque"}
+    return {"arrays": given, "kinematics_source": 3, "external_torque": arrays["external_torque"]}
+
+
+# --- the ways ---------------------------------------------------------------------------------------------------------
+
+
+def command(folder: Path) -> dict[str, Any]:
+    """`tendonfmu fit` of the whole file: reading, judging and the report included."""
+    with Watch() as watch:
+        fit = FrictionFit(INDEX_FINGER, kinematics=3).fit([folder / f"{FILE}.parquet"])
+    samples = sum(recording["used"] for recording in fit.report_["recordings"])
+    return watch.times() | {"passes": fit.report_["passes"], "converged": fit.converged_, "samples": samples}
+
+
+def batch(arrays: Mapping[str, Array], tolerance: float = TOLERANCE) -> dict[str, Any]:
+    chosen = structure()
+    estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
+    estimator.add_recording(**call_with(arrays))
+    with Watch() as watch:
+        fit = estimator.fit(prior_std=PRIOR_STD, tolerance=tolerance)
+    figures = {name: getattr(fit, name) for name in ("z", "cost", "passes", "converged")}
+    return watch.times() | figures | {"std": np.sqrt(np.diag(fit.covariance)), "iterations": fit.steps}
+
+
+def ekf(arrays: Mapping[str, Array], passes: int = 2, block: int = 8) -> dict[str, Any]:
+    chosen = structure()
+    learner = Learner(chosen.start.image, chosen.group, chosen.scale, prior_std=PRIOR_STD, block=block)
+    with Watch() as watch:
+        for number in range(passes):
+            if number > 0:
+                learner.begin_pass()
+            learner.run(**call_with(arrays))
+    return {"passes": passes} | watch.times() | {"z": learner.z, "std": np.sqrt(np.diag(learner.covariance))}
+
+
+def task_of(arrays: Mapping[str, Array]) -> Any:
+    """What the peers are given."""
+    chosen = structure()
+    bias = chosen.start.data["bias"]
+    estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
+    estimator.add_recording(**call_with(arrays))
+    columns = {
+        name: np.array([getattr(unknown, name) for unknown in estimator.unknowns])
+        for name in ("start", "lower", "upper", "scale")
+    }
+    force = arrays["tendon_force"]
+    return Task(
+        estimator=estimator,
+        time=arrays["time"],
+        measured=force @ np.array(chosen.start.moment_arms) - arrays["external_torque"],
+        noise=noise_scale(chosen.start.data, arrays["time"], force)[:, 0] ** 2,
+        drift=bias["drift_variance"],
+        initial=bias["initial_variance"],
+        **columns,
+    )
+
+
+def one_product(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """Jᵀ J of a dense Jacobian that is there: a lower bound of any pass that does not use its zeros."""
+    rows, columns = arrays["joint_position"].size, len(Estimator(structure().start.image, structure().group).unknowns)
+    return outer_products(rows, columns)
+
+
+def filtered(kind: str, arrays: Mapping[str, Array]) -> dict[str, Any]:
+    return run_filter(task_of(arrays), kind, PRIOR_STD, len(arrays["time"]))
+
+
+Function = Callable[[Mapping[str, Array]], dict[str, Any]]
+
+# the product's ways on the samples of a peer
+JUDGES: dict[str, Function] = {
+    "batch to the end": partial(batch, tolerance=1e-3),
+    "filter sample by sample": partial(ekf, passes=1, block=1),
+}
+
+
+@dataclass(frozen=True)
+class Way:
+    what: str
+    samples: int  # that it takes
+    run: Function | None  # None: the command, from the file
+    judge: str | None = None  # a key of JUDGES that it must agree with
+
+
+WAYS = {
+    "command": Way("tendonfmu fit, file to report", FULL, None),
+    "batch": Way("batch, to convergence", FULL, batch),
+    "ekf": Way("EKF, both passes", FULL, ekf),
+    "product": Way("numpy JᵀJ of one pass, J given", 20_000, one_product),
+    "least_squares": Way(
+        "scipy least_squares, compiled Jacobian, dense",
+        8_000,
+        lambda arrays: least_squares_fit(task_of(arrays), PRIOR_STD, MOST_CALLS),
+        "batch to the end",
+    ),
+    "symmetric": Way("numpy EKF, P − W Wᵀ", 2_000, partial(filtered, "symmetric"), "filter sample by sample"),
+    "joseph": Way("numpy EKF, Joseph form", 300, partial(filtered, "joseph"), "filter sample by sample"),
+    "filterpy": Way("filterpy ExtendedKalmanFilter", 150, partial(filtered, "filterpy"), "filter sample by sample"),
+}
+
+
+# --- one process for each ---------------------------------------------------------------------------------------------
+
+
+def measured(name: str, folder: Path, samples: int) -> dict[str, Any]:
+    """Figures of a way or a judge, in this process."""
+    function = JUDGES.get(name) or WAYS[name].run
+    if function is None:
+        figures = command(folder)
+    else:
+        arrays = load(folder, samples)
+        try:
+            figures = function(arrays) | {"samples": len(arrays["time"])}
+        except ImportError as missing:
+            figures = {"missing": str(missing)}
+    return figures | {"peak_memory": peak_memory()}
+
+
+def peak_memory() -> int:
+    """Bytes, of this process."""
+    if sys.platform == "darwin":
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    # here getrusage counts what the parent had before it started this program
+    known = re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text(encoding="utf-8"))
+    return 1024 * int(known[1]) if known else 0
+
+
+def apart_from(name: str, folder: Path, samples: int) -> dict[str, Any]:
+    """What `measured` gives, in a process of its own. Ends the program where it fails."""
+    words = [sys.executable, "-m", "evidence.fit.compare", "--one", name, str(folder), str(samples)]
+    result = subprocess.run(words, stdout=subprocess.PIPE, text=True, env=os.environ | ONE_THREAD, cwd=ROOT)
     if result.returncode != 0:
-        sys.exit(f"{way} failed")
+        sys.exit(f"{name} failed")
     return dict(json.loads(result.stdout))
 
 
-def apart(estimate: dict[str, Any], expected: dict[str, Any]) -> float:
-    """Largest difference of two estimates in standard errors."""
-    pairs = zip(estimate["z"], expected["z"], expected["std"], strict=True)
-    return max(abs(own - other) / std for own, other, std in pairs)
-
-
-def measure(way: str, folder: Path, scale: float) -> dict[str, Any]:
+def line_of(name: str, folder: Path, scale: float) -> dict[str, Any]:
     """One line of the table, as JSON: seconds as measured and as scaled to all samples, memory, agreement."""
-    what, samples, judge = WAYS[way]
-    figures = run(way, folder, samples=max(100, min(samples, round(FULL * scale))))
-    line = {"way": way, "what": what}
+    way = WAYS[name]
+    figures = apart_from(name, folder, max(100, min(way.samples, round(FULL * scale))))
+    line = {"way": name, "what": way.what}
+    kept = ("missing", "samples", "seconds", "cpu_seconds", "peak_memory", "iterations", "passes", "converged", "cost")
+    line |= {key: figures[key] for key in kept if key in figures}
     if "missing" in figures:
-        return line | {"missing": figures["missing"]}
-    line |= {name: figures[name] for name in ("samples", "seconds", "cpu_seconds", "peak_memory")}
-    line |= {name: figures[name] for name in ("iterations", "passes", "converged", "cost") if name in figures}
-    line |= {f"{name}_scaled": figures[name] * FULL / figures["samples"] for name in ("seconds", "cpu_seconds")}
-    if judge is not None:
-        line["apart"] = apart(figures, run(judge, folder, samples=figures["samples"]))
+        return line
+    line |= {f"{key}_scaled": figures[key] * FULL / figures["samples"] for key in ("seconds", "cpu_seconds")}
+    if way.judge is not None:
+        judge = apart_from(way.judge, folder, figures["samples"])
+        # largest difference of the two estimates in standard errors
+        pairs = zip(figures["z"], judge["z"], judge["std"], strict=True)
+        line["apart"] = max(abs(value - expected) / std for value, expected, std in pairs)
         if not line["apart"] < AGREEMENT:
-            sys.exit(f"{way} and {judge} are {line['apart']:.3g} standard errors apart: no times are worth showing")
+            sys.exit(
+                f"{name} and {way.judge} are {line['apart']:.3g} standard errors apart: no times are worth showing"
+            )
     return line
 
 
+# --- the table --------------------------------------------------------------------------------------------------------
+
+
 def table_of(lines: list[dict[str, Any]]) -> str:
-    cells = ["| way | samples | iterations | CPU s | 400 s: CPU s | 400 s: wall s | peak memory | apart |"]
-    cells.append("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    head = ["way", "samples", "iterations", "CPU s", "400 s: CPU s", "400 s: wall s", "peak memory", "apart"]
+    rows = []
     for line in lines:
         if "missing" in line:
-            cells.append(f"| {line['what']} | not run: {line['missing']} | | | | | | |")
+            rows.append([line["what"], f"not run: {line['missing']}", *[""] * 6])
             continue
-        values = [
-            line["what"],
-            f"{line['samples']:,}",
-            str(line.get("iterations", "")),
-            f"{line['cpu_seconds']:.3g}",
-            f"{line['cpu_seconds_scaled']:,.4g}",
-            f"{line['seconds_scaled']:,.4g}",
-            f"{line['peak_memory'] / 1e6:,.0f} MB",
-            f"{line['apart']:.0e}" if "apart" in line else "",
-        ]
-        cells.append(f"| {' | '.join(values)} |")
-    return "\n".join(cells)
+        scaled = [f"{line[key]:,.4g}" for key in ("cpu_seconds_scaled", "seconds_scaled")]
+        memory = f"{line['peak_memory'] / 1e6:,.0f} MB"
+        apart = f"{line['apart']:.0e}" if "apart" in line else ""
+        counts = [f"{line['samples']:,}", line.get("iterations", ""), f"{line['cpu_seconds']:.3g}"]
+        rows.append([line["what"], *counts, *scaled, memory, apart])
+    return tables.table(head, rows)
 
 
 def misses(lines: list[dict[str, Any]]) -> list[str]:
@@ -117,26 +321,30 @@ def misses(lines: list[dict[str, Any]]) -> list[str]:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = parser(__doc__, output=None)
     options.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     options.add_argument("--scale", type=float, default=1.0, help="of all samples; less than 1 for a short trial")
     options.add_argument("--output", type=Path, help="JSON of all figures")
+    options.add_argument(
+        "--one", nargs=3, metavar=("WAY", "FOLDER", "SAMPLES"), help="a way, here: used by the program"
+    )
     given = options.parse_args()
+    if given.one:
+        print(json.dumps(plain(measured(given.one[0], Path(given.one[1]), int(given.one[2])))))
+        return
     lines: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as name:
-        duration = max(20.0, given.scale * FULL / 1000.0) + 3.0
-        run("data", Path(name), duration=duration)
+        make_data(Path(name), max(20.0, given.scale * FULL / RATE) + 3.0)
         for way in given.ways:
-            lines.append(measure(way, Path(name), given.scale))
-            print(f"{lines[-1]['what']}: {lines[-1].get('seconds', 0.0):.3g} s", file=sys.stderr)
+            lines.append(line_of(way, Path(name), given.scale))
+            say(f"{lines[-1]['what']}: {lines[-1].get('seconds', 0.0):.3g} s")
     print(table_of(lines))
     machine = f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
     print(f"\n{machine}. Apart: from the product on the same samples, largest difference in standard errors.")
     for miss in misses(lines):
         print(f"MISSED {miss}")
     if given.output is not None:
-        text = json.dumps({"machine": machine, "ways": lines}, indent=1, ensure_ascii=False)
-        given.output.write_text(text + "\n", encoding="utf-8")
+        write(given.output, {"machine": machine, "ways": lines})
 
 
 if __name__ == "__main__":

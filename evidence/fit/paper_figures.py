@@ -23,8 +23,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
+from evidence import tables
 from evidence.runner import EXAMPLES, INDEX_FINGER, parser
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Numbers
+from tendonfmu.detect.counting import stretches
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings import Recording, read_recording
@@ -157,9 +159,9 @@ def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.Da
     finish(figure, axes, folder / f"paper_{number}.png")
     known = ~np.isnan(predicted).any(axis=1)
     for joint in JOINTS:
-        error = rms(predicted[known, joint] - friction[known, joint])
-        missed = rms(predicted[known, joint] - torque[known, joint])
-        moved = rms(torque[known, joint])
+        error = tables.rms(predicted[known, joint] - friction[known, joint])
+        missed = tables.rms(predicted[known, joint] - torque[known, joint])
+        moved = tables.rms(torque[known, joint])
         numbers = f"{1e3 * moved:.1f}, {1e3 * missed:.2f} ({missed / moved:.0%}), {1e3 * error:.2f}"
         row(number, f"joint {joint + 1}: torque, residual, error against the true friction, mN·m rms", numbers)
 
@@ -174,13 +176,14 @@ def figure_8(fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folde
     runs = {name: run_recording(data, recording.arrays()) for name, data in described.items()}
     draw_8(recording.time, joints_of(truth, "joint_torque"), runs["calibrated"], external, force, folder)
     for name, outputs in runs.items():
-        error = [rms(outputs["compensated_torque"][pushed, j] - external[pushed, j]) for j in range(external.shape[1])]
+        error = [
+            tables.rms(outputs["compensated_torque"][pushed, j] - external[pushed, j]) for j in range(external.shape[1])
+        ]
         numbers = ", ".join(f"{1e3 * value:.1f}" for value in error)
         row("8", f"{name}: error of the external torque in contact by joint, mN·m rms", numbers)
         alarm = outputs["contact"].astype(bool).reshape(-1)
-        row(
-            "8", f"{name}: pushes with contact reported, of all", f"{events(pushed, alarm)} of {events(pushed, pushed)}"
-        )
+        reported = [bool(alarm[first : last + 1].any()) for first, last in stretches(recording.time, pushed)]
+        row("8", f"{name}: pushes with contact reported, of all", f"{sum(reported)} of {len(reported)}")
         row("8", f"{name}: time in alarm without a push", f"{np.mean(alarm[~pushed]):.1%}")
 
 
@@ -203,17 +206,7 @@ def draw_8(
     finish(figure, axes, folder / "paper_8.png")
 
 
-def events(label: Flags, alarm: Flags) -> int:
-    """Stretches of the label with at least one sample in alarm."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], label, [False]]).astype(int)))
-    return sum(bool(alarm[start:end].any()) for start, end in edges.reshape(-1, 2))
-
-
 # --- both -------------------------------------------------------------------------------------------------------------
-
-
-def rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def row(figure: str, what: str, value: str) -> None:

@@ -63,7 +63,7 @@ def roughened(nominal: Nominal, std: float, rng: np.random.Generator) -> Nominal
 # --- cases ------------------------------------------------------------------------------------------------------------
 
 
-def cases(half: str, only: Sequence[str]) -> Iterator[tuple[str, str, int]]:
+def cases(half: str) -> Iterator[tuple[str, str, int]]:
     """(name, module, number) of the fingers of a half whose packages are there."""
     for family, name in FAMILIES.items():
         try:
@@ -72,7 +72,7 @@ def cases(half: str, only: Sequence[str]) -> Iterator[tuple[str, str, int]]:
             say(f"SKIPPED: the family {family}: {missing.name} is not installed")
             continue
         for number in module.numbers() if family == "recorded" else module.NUMBERS:
-            if number % 2 == {"odd": 1, "even": 0}[half] and (not only or f"{family}_{number:02d}" in only):
+            if number % 2 == {"odd": 1, "even": 0}[half]:
                 yield f"{family}_{number:02d}", module.__name__, number
 
 
@@ -197,9 +197,8 @@ def report(rows: Sequence[Row]) -> str:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--half", choices=("odd", "even"), default="even", help="cases of odd or even number")
-    options.add_argument("--only", nargs="+", metavar="CASE", default=[], help="only cases of these names")
     given = options.parse_args()
-    named = {name: (module, number) for name, module, number in cases(given.half, given.only)}
+    named = {name: (module, number) for name, module, number in cases(given.half)}
     rows = run_cases(checked, named, given.output, given.workers, given.scheduler)
     publish(given.output / f"{given.half}.md", report([row for case in rows for row in case["rows"]]))
 

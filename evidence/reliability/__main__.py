@@ -1,6 +1,7 @@
 """Makes the table of docs/evidence/reliability.md: python -m evidence.reliability [R7 R8 ...] [--scale 0.1]
 
-A row's result is kept as WORK/ROW.json and not measured again, unless the row is named or --again is given. What is
+The page has what each row tries, its full number and what it leaves open; a row's measurement is made here. Its result
+is kept as WORK/ROW.json and not measured again, unless the row is named or --again is given. What is
 kept of the rows named, or of all, is printed as Markdown, or written with -o. --scale: of the full numbers that the
 page names; --minutes: the most for each row of fuzzing.
 
@@ -18,13 +19,17 @@ from typing import Any
 
 from evidence import tables
 from evidence.reliability import binaries, by_tests, commands, fuzz
-from evidence.reliability.row import Outcome, Row, Run, Unavailable
+from evidence.reliability.row import Measure, Outcome, Run, Unavailable
 from evidence.runner import ROOT, parser, say, write
 
-MODULES = (fuzz, binaries, commands, by_tests)
-ROWS: dict[str, Row] = {
-    row.name: row for row in sorted((r for module in MODULES for r in module.ROWS), key=lambda row: int(row.name[1:]))
-}
+PAGE = ROOT / "docs" / "evidence" / "reliability.md"
+ROWS: dict[str, Measure] = {**fuzz.ROWS, **by_tests.ROWS, **binaries.ROWS, **commands.ROWS}
+
+
+def rows_of_the_page() -> dict[str, list[str]]:
+    """Cells of the table of all rows, by name; the first line is its head."""
+    lines = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    return {cells[0]: cells for cells in lines if len(cells) == 7 and cells[0] != "---"}
 
 
 def processor_seconds() -> float:
@@ -32,11 +37,11 @@ def processor_seconds() -> float:
     return sum(usage.ru_utime + usage.ru_stime for usage in used)
 
 
-def measure(row: Row, run: Run) -> dict[str, Any]:
+def measured(measure: Measure, run: Run) -> dict[str, Any]:
     """What WORK/ROW.json holds. Any error of a row is its result: the others are still measured."""
     before = processor_seconds()
     try:
-        outcome = row.measure(run)
+        outcome = measure(run)
     except Unavailable as missing:
         outcome = Outcome("–", f"SKIPPED: {missing}", True)
     except Exception as error:
@@ -54,16 +59,16 @@ def clock(seconds: float) -> str:
 
 
 def table(work: Path, names: Collection[str]) -> str:
-    """The rows `names`, in the order of ROWS, with what is kept of them."""
+    """The rows `names`, in the order of the page, with what is kept of them."""
+    head, *rows = [cells for name, cells in rows_of_the_page().items() if name in ("row", *names)]
     lines = []
-    for row in (row for name, row in ROWS.items() if name in names):
-        cells = ["0", row.full, "not measured", ""]
-        outcome = kept(row.name, work)
+    for name, title, _, full, _, _, leaves in rows:
+        cells = ["0", full, "not measured", ""]
+        outcome = kept(name, work)
         if outcome is not None:
             mark = "" if outcome["sound"] else "**found:** "
-            cells = [outcome["number"], row.full, mark + outcome["result"], clock(outcome["seconds"])]
-        lines.append([row.name, row.title, *cells, row.leaves])
-    head = ["row", "what is tried", "number", "full number", "result", "time of one core", "what that leaves open"]
+            cells = [outcome["number"], full, mark + outcome["result"], clock(outcome["seconds"])]
+        lines.append([name, title, *cells, leaves])
     return tables.table(head, lines, len(head)) + "\n"
 
 
@@ -80,12 +85,12 @@ def main() -> int:
     if unknown := set(given.rows) - set(ROWS):
         options.error(f"{', '.join(sorted(unknown))}: expected rows of {', '.join(ROWS)}")
     work = given.work.resolve()
-    names = given.rows or list(ROWS)
+    names = given.rows or [name for name in rows_of_the_page() if name in ROWS]
     for name in [] if given.table else names:
         if given.rows or given.again or kept(name, work) is None:
-            say(f"{name}: {ROWS[name].title} ...")
+            say(f"{name} ...")
             (work / name).mkdir(parents=True, exist_ok=True)
-            outcome = measure(ROWS[name], Run(given.scale, given.minutes, work / name))
+            outcome = measured(ROWS[name], Run(given.scale, given.minutes, work / name))
             write(work / f"{name}.json", outcome)
             say(f"{name}: {outcome['number']}: {outcome['result']} ({clock(outcome['seconds'])})")
     if given.output:

@@ -21,14 +21,14 @@ from evidence.reliability.programs import (
     library,
     small,
 )
-from evidence.reliability.row import Outcome, Row, Run, called, spoken
+from evidence.reliability.row import Measure, Outcome, Run, called, spoken
 from evidence.runner import EXAMPLES, INDEX_FINGER
 
 FINGERS = (
     INDEX_FINGER,
     CALIBRATED,
     HERE / "small_finger.json",
-    EXAMPLES / "demo_recording" / "two_joints_hidden.json",
+    EXAMPLES / "demo_recording" / "two_joints.json",
 )
 LEVELS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 
@@ -57,7 +57,7 @@ def restored(run: Run) -> Outcome:
         for k, cut in enumerate(cuts):
             last, kernel = str(cut + 1500), kernels[k % len(kernels)]
             saved = run.work / f"{name}.state"
-            whole = called(program, "rest", model, str(cut), last, kernel)
+            whole = called(program, "continue", model, "-", str(cut), last, kernel)
             called(program, "save", model, str(cut), kernel, saved)
             for other in kernels:
                 tried += 1
@@ -191,42 +191,12 @@ def host(run: Run) -> Outcome:
     return Outcome(number, result, changed == 0)
 
 
-ROWS = [
-    Row(
-        "R5",
-        "Saved state restored in a new process and on the other kernel",
-        "368 states",
-        "states carried between machines of another kind (the step's bits are the same there: R20)",
-        restored,
-    ),
-    Row(
-        "R6",
-        "Saved states of every length, with flipped bits, of another finger, of an older version",
-        "2e5 flips",
-        "two wrong bits at once; FNV-1a finds what happens by accident, not what is forged",
-        damaged,
-    ),
-    Row("R7", "A day of samples", "8.64e7 samples", "a motion that repeats; months", day),
-    Row(
-        "R9",
-        "Instances on threads",
-        "16 × 20,000",
-        "races in an importer; one instance on two threads, which FMI forbids",
-        threads,
-    ),
-    Row(
-        "R10",
-        "Real time",
-        "1e8 steps",
-        "worst case on a quiet machine with a real-time kernel; page faults at the first step",
-        real_time,
-    ),
-    Row(
-        "R11",
-        "Same bits by every compiler",
-        "20,000 samples",
-        "MSVC, which no machine here has; -ffast-math, which the sources do not allow",
-        same_bits,
-    ),
-    Row("R12", "The host's modes", "20,000 samples", "traps that the host unmasks", host),
-]
+ROWS: dict[str, Measure] = {
+    "R5": restored,
+    "R6": damaged,
+    "R7": day,
+    "R9": threads,
+    "R10": real_time,
+    "R11": same_bits,
+    "R12": host,
+}

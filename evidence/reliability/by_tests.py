@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 
-from evidence.reliability.row import Outcome, Row, Run, by_pytest, called
+from evidence.reliability.row import Measure, Outcome, Run, by_pytest, called
 from evidence.runner import ROOT
 
 FMU, PLANT = "python_tests/fmu", "python_tests/simulate"
 LONG = ("-m", "long or not long")
-STATES = (f"{FMU}/test_fmu_states.py", f"{PLANT}/test_plant_fmu_states.py", f"{FMU}/test_fmi3_calls.py")
+REFUSALS = (f"{FMU}/test_fmu_refusals.py", *LONG, "-k")
+STATES = (f"{FMU}/test_fmu_states.py", f"{PLANT}/test_plant_fmu_states.py", f"{FMU}/test_fmi3_calls.py", "-k")
+EXPORTS = (f"{FMU}/test_fmu_library.py", f"{PLANT}/test_plant_fmu_host.py", "-k", "export or needs or stack")
 
 
 def emulated(run: Run) -> Outcome:
@@ -23,115 +25,46 @@ def emulated(run: Run) -> Outcome:
     return Outcome(outcome.number, outcome.result, outcome.sound and "skipped" not in outcome.number)
 
 
-ROWS = [
-    Row(
-        "R2",
-        "Time and step length",
-        "420 pairs",
-        "steps that are allowed and absurd (1e12 s) are carried out",
-        by_pytest(
-            "tests, one for each FMU, of 210 pairs of time and step length",
-            "pass: refused with a message and no byte changed, or carried out with finite outputs",
-            f"{FMU}/test_fmu_refusals.py",
-            *LONG,
-            "-k",
-            "pair_of_time_and_step",
-        ),
+ROWS: dict[str, Measure] = {
+    "R2": by_pytest(
+        "tests, one for each FMU, of 210 pairs of time and step length",
+        "pass: refused with a message and no byte changed, or carried out with finite outputs",
+        *(*REFUSALS, "pair_of_time_and_step"),
     ),
-    Row(
-        "R3",
-        "Values that are no numbers",
-        "all",
-        "values in range that make no finger together: refused with the next sample (R1)",
-        by_pytest(
-            "tests: every Real input and parameter × NaN, ±Inf, the largest double with both signs, in three states of "
-            "both FMUs",
-            "pass: refused by name with no byte changed",
-            f"{FMU}/test_fmu_refusals.py",
-            *LONG,
-            "-k",
-            "value_that_is_no_number",
-        ),
+    "R3": by_pytest(
+        "tests: every Real input and parameter × NaN, ±Inf, the largest double with both signs, in three states of "
+        "both FMUs",
+        "pass: refused by name with no byte changed",
+        *(*REFUSALS, "value_that_is_no_number"),
     ),
-    Row(
-        "R4",
-        "State machine",
-        "all",
-        "more than one call after another (R1)",
-        by_pytest(
-            "tests: 30 functions of FMI 2.0 and 42 of FMI 3.0 × 5 states, NULL, after errors; 28 that FMI 3.0 has and "
-            "the FMU does not offer",
-            "answer as the standard's table says",
-            *STATES,
-            "-k",
-            "allowed or error or no_instance or reset or there_is_not",
-        ),
+    "R4": by_pytest(
+        "tests: 30 functions of FMI 2.0 and 42 of FMI 3.0 × 5 states, NULL, after errors; 28 that FMI 3.0 has and "
+        "the FMU does not offer",
+        "answer as the standard's table says",
+        *(*STATES, "allowed or error or no_instance or reset or there_is_not"),
     ),
-    Row(
-        "R8",
-        "Instances and loads",
-        "1e5 and 1e4",
-        "the simulated finger's library",
-        by_pytest(
-            "tests: 99,999 instances, 9,999 loads and unloads, each in 3 equal rounds",
-            "pass: in the round that left least less than a byte each, and no handle",
-            f"{FMU}/test_fmu_refusals.py",
-            *LONG,
-            "-k",
-            "instances_and_loads",
-        ),
+    "R8": by_pytest(
+        "tests: 99,999 instances, 9,999 loads and unloads, each in 3 equal rounds",
+        "pass: in the round that left least less than a byte each, and no handle",
+        *(*REFUSALS, "instances_and_loads"),
     ),
-    Row(
-        "R13",
-        "Exports",
-        "all",
-        "macOS libraries are read, not loaded",
-        by_pytest(
-            "tests of both libraries",
-            "pass: fmi2* alone, libc and libm alone, no executable stack",
-            f"{FMU}/test_fmu_library.py",
-            f"{PLANT}/test_plant_fmu_host.py",
-            "-k",
-            "export or needs or stack",
-        ),
+    "R13": by_pytest(
+        "tests of both libraries", "pass: fmi2* alone, libc and libm alone, no executable stack", *EXPORTS
     ),
-    Row(
-        "R15",
-        "Logs that end early",
-        "each byte",
-        "logs that are cut in the middle and go on",
-        by_pytest(
-            "formats of logs, cut off at each byte",
-            "formats: each prefix is refused in one line or gives the beginning of the log",
-            "python_tests/recordings/test_log_faults.py",
-            *LONG,
-            "-k",
-            "cut_off",
-        ),
+    "R15": by_pytest(
+        "formats of logs, cut off at each byte",
+        "formats: each prefix is refused in one line or gives the beginning of the log",
+        *("python_tests/recordings/test_log_faults.py", *LONG, "-k", "cut_off"),
     ),
-    Row(
-        "R16",
-        "Archives that are no FMU",
-        "44",
-        "other programs that unpack them",
-        by_pytest(
-            "tests of archives",
-            "pass: refused in one line, or run without the odd member; nothing left, nothing outside",
-            f"{FMU}/test_fmu_archives.py",
-            *LONG,
-        ),
+    "R16": by_pytest(
+        "tests of archives",
+        "pass: refused in one line, or run without the odd member; nothing left, nothing outside",
+        *(f"{FMU}/test_fmu_archives.py", *LONG),
     ),
-    Row(
-        "R19",
-        "The learner",
-        "1e6 steps",
-        "models that are wrong: then it is sure of wrong numbers",
-        by_pytest(
-            "test: 1e6 steps of 8 fingers × 10 recordings, 70 unknowns each",
-            "passes: least eigenvalue of the correlations never 0 or below, NEES within 4 standard deviations",
-            "python_tests/estimate/test_learner_consistency.py",
-            *LONG,
-        ),
+    "R19": by_pytest(
+        "test: 1e6 steps of 8 fingers × 10 recordings, 70 unknowns each",
+        "passes: least eigenvalue of the correlations never 0 or below, NEES within 4 standard deviations",
+        *("python_tests/estimate/test_learner_consistency.py", *LONG),
     ),
-    Row("R20", "Windows and aarch64", "all", "real Windows and real ARM; macOS", emulated),
-]
+    "R20": emulated,
+}

@@ -20,7 +20,7 @@ import pandas as pd
 
 from evidence.reliability.binaries import answers
 from evidence.reliability.programs import small
-from evidence.reliability.row import Outcome, Row, Run, with_wrong
+from evidence.reliability.row import Measure, Outcome, Run, with_wrong
 from evidence.runner import EXAMPLES
 
 DEMO = EXAMPLES / "demo_recording"
@@ -29,10 +29,14 @@ SECONDS = 12.0  # of motion: commands have to end within seconds
 
 COMMANDS: dict[str, list[str]] = {
     "build": ["build", "finger.json", "-o", "out/finger.fmu"],
+    "run": ["run", "finger.json", "free.parquet", "-o", "out/free.csv"],
+    "run to Parquet": ["run", "finger.json", "free.parquet", "-o", "out/free.parquet"],
+    "excite": ["excite", "finger.json", "-o", "out/motion.csv", "--duration", "20"],
     "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json", "--report", "out/report.json"],
     "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
     "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
 }
+KILLED = ("build", "fit", "diagnose", "calibrate")
 
 
 def inputs(folder: Path) -> None:
@@ -115,8 +119,8 @@ def kills(run: Run) -> Outcome:
     total = 0
     wrong: list[str] = []
     left = 0
-    for name, words in COMMANDS.items():
-        folder = run.work / name
+    for name in KILLED:
+        words, folder = COMMANDS[name], run.work / name
         inputs(folder)
         began = time.monotonic()
         status = start(folder, words).wait()
@@ -136,22 +140,12 @@ def kills(run: Run) -> Outcome:
         elif set(results(folder / "out")) != whole:
             wrong.append(f"{name}: other files than without a kill: {sorted(set(results(folder / 'out')) ^ whole)[:4]}")
         left += len(hidden(folder / "out"))
-    number = f"kill -9 {total} times in {', '.join(COMMANDS)}: at random, and as a file is being written"
+    number = f"kill -9 {total} times in {', '.join(KILLED)}: at random, and as a file is being written"
     result = f"no half file, and every command goes on; {left} hidden temporary files left"
     return Outcome(number, with_wrong(result, wrong), not wrong)
 
 
 # --- no room ----------------------------------------------------------------------------------------------------------
-
-SMALL_COMMANDS: dict[str, list[str]] = {
-    "build": ["build", "finger.json", "-o", "out/finger.fmu"],
-    "run": ["run", "finger.json", "free.parquet", "-o", "out/free.csv"],
-    "run to Parquet": ["run", "finger.json", "free.parquet", "-o", "out/free.parquet"],
-    "excite": ["excite", "finger.json", "-o", "out/motion.csv", "--duration", "20"],
-    "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json"],
-    "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
-    "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
-}
 
 
 def refused(folder: Path, name: str, command: list[str], limit: Callable[[], None] | None = None) -> str:
@@ -215,9 +209,9 @@ def no_room(run: Run) -> Outcome:
     folder = run.work / "disk"
     tried = ended = lost = 0
     wrong: list[str] = []
-    names = list(SMALL_COMMANDS)[: run.count(len(SMALL_COMMANDS), 2)]
+    names = list(COMMANDS)[: run.count(len(COMMANDS), 2)]
     for name in names:
-        for title, command, limit in trials(name, SMALL_COMMANDS[name]):
+        for title, command, limit in trials(name, COMMANDS[name]):
             inputs(folder)
             answer = refused(folder, title, command, limit)
             tried += 1
@@ -240,19 +234,4 @@ def no_room(run: Run) -> Outcome:
     return Outcome(number, with_wrong(result, wrong), not wrong and leaked == 0)
 
 
-ROWS = [
-    Row(
-        "R17",
-        "Commands that are killed",
-        "200 kills",
-        "a machine that loses power: files are not flushed to the disk (fsync)",
-        kills,
-    ),
-    Row(
-        "R18",
-        "No room, no right, no memory",
-        f"{len(SMALL_COMMANDS)} commands",
-        "quotas, network disks; the kernel's out-of-memory killer (R17)",
-        no_room,
-    ),
-]
+ROWS: dict[str, Measure] = {"R17": kills, "R18": no_room}

@@ -3,8 +3,8 @@
  *   core_steps trace IMAGE SAMPLES                       a line for each kernel: its name, a hash of all outputs and of
  *                                                        the saved state at the end
  *   core_steps save IMAGE SAMPLES KERNEL FILE            the state after so many samples
- *   core_steps continue IMAGE FILE FROM SAMPLES KERNEL   goes on from it: the hash of the outputs and of the state
- *   core_steps rest IMAGE FROM SAMPLES KERNEL            the same without a stop in between
+ *   core_steps continue IMAGE FILE FROM SAMPLES KERNEL   goes on from it: the hash of the outputs and of the state;
+ *                                                        FILE "-": without a stop in between
  *   core_steps times IMAGE SAMPLES                       times of steps */
 #define _POSIX_C_SOURCE 200809L
 
@@ -52,6 +52,24 @@ static tendonfmu_finger* create(const char* path) {
   return finger;
 }
 
+static tendonfmu_finger* create_on(const char* path, const char* kernel) {
+  tendonfmu_finger* finger = create(path);
+  if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) {
+    fail(kernel, tendonfmu_last_error(finger));
+  }
+  return finger;
+}
+
+/* the saved state, to be freed */
+static unsigned char* state_of(tendonfmu_finger* finger, size_t* size) {
+  *size = tendonfmu_state_size(finger);
+  unsigned char* bytes = malloc(*size);
+  if (!bytes || tendonfmu_save_state(finger, bytes, *size) != TENDONFMU_OK) {
+    fail("saved state", tendonfmu_last_error(finger));
+  }
+  return bytes;
+}
+
 static int step(tendonfmu_finger* finger, long sample) {
   double force[MOST_TENDONS], position[MOST_TENDONS], angle[MOST_JOINTS], velocity[MOST_JOINTS];
   const tendonfmu_inputs inputs = {force, position, angle, velocity};
@@ -59,17 +77,6 @@ static int step(tendonfmu_finger* finger, long sample) {
                 velocity);
   return sample == 0 ? tendonfmu_initialise(finger, 0.0, &inputs)
                      : tendonfmu_step(finger, motion_time(sample), &inputs);
-}
-
-static uint64_t hash_state(tendonfmu_finger* finger, uint64_t hash) {
-  const size_t size = tendonfmu_state_size(finger);
-  unsigned char* bytes = malloc(size);
-  if (!bytes || tendonfmu_save_state(finger, bytes, size) != TENDONFMU_OK) {
-    fail("saved state", tendonfmu_last_error(finger));
-  }
-  hash = motion_hash(hash, bytes, size);
-  free(bytes);
-  return hash;
 }
 
 /* Takes samples first..last-1; the hash of all their Real outputs, then of the state at the end. */
@@ -97,7 +104,11 @@ static uint64_t play(tendonfmu_finger* finger, long first, long last) {
     hash = motion_hash(hash, rows, sizeof rows);
     hash = motion_hash(hash, parts, joints * (tendons + 3) * sizeof *parts);
   }
-  return hash_state(finger, hash);
+  size_t size = 0;
+  unsigned char* bytes = state_of(finger, &size);
+  hash = motion_hash(hash, bytes, size);
+  free(bytes);
+  return hash;
 }
 
 static void trace(const char* image, long samples) {
@@ -111,16 +122,12 @@ static void trace(const char* image, long samples) {
 }
 
 static void save(const char* image, long samples, const char* kernel, const char* path) {
-  tendonfmu_finger* finger = create(image);
-  if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) {
-    fail(kernel, tendonfmu_last_error(finger));
-  }
+  tendonfmu_finger* finger = create_on(image, kernel);
   play(finger, 0, samples);
-  const size_t size = tendonfmu_state_size(finger);
-  unsigned char* bytes = malloc(size);
+  size_t size = 0;
+  unsigned char* bytes = state_of(finger, &size);
   FILE* file = fopen(path, "wb");
-  if (!bytes || !file || tendonfmu_save_state(finger, bytes, size) != TENDONFMU_OK ||
-      fwrite(bytes, 1, size, file) != size || fclose(file)) {
+  if (!file || fwrite(bytes, 1, size, file) != size || fclose(file)) {
     fail(path, "cannot be written");
   }
   free(bytes);
@@ -128,24 +135,17 @@ static void save(const char* image, long samples, const char* kernel, const char
 }
 
 static void go_on(const char* image, const char* path, long first, long last, const char* kernel) {
-  tendonfmu_finger* finger = create(image);
-  size_t size = 0;
-  unsigned char* bytes = read_file(path, &size);
-  if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK ||
-      tendonfmu_restore_state(finger, bytes, size) != TENDONFMU_OK) {
-    fail(path, tendonfmu_last_error(finger));
+  tendonfmu_finger* finger = create_on(image, kernel);
+  if (!strcmp(path, "-")) {
+    play(finger, 0, first);
+  } else {
+    size_t size = 0;
+    unsigned char* bytes = read_file(path, &size);
+    if (tendonfmu_restore_state(finger, bytes, size) != TENDONFMU_OK) {
+      fail(path, tendonfmu_last_error(finger));
+    }
+    free(bytes);
   }
-  free(bytes);
-  printf("%016llx\n", (unsigned long long)play(finger, first, last));
-  tendonfmu_destroy(finger);
-}
-
-static void rest(const char* image, long first, long last, const char* kernel) {
-  tendonfmu_finger* finger = create(image);
-  if (tendonfmu_set_kernel(finger, kernel) != TENDONFMU_OK) {
-    fail(kernel, tendonfmu_last_error(finger));
-  }
-  play(finger, 0, first);
   printf("%016llx\n", (unsigned long long)play(finger, first, last));
   tendonfmu_destroy(finger);
 }
@@ -205,8 +205,6 @@ int main(int count, char** words) {
     save(words[2], atol(words[3]), words[4], words[5]);
   } else if (!strcmp(what, "continue") && count == 7) {
     go_on(words[2], words[3], atol(words[4]), atol(words[5]), words[6]);
-  } else if (!strcmp(what, "rest") && count == 6) {
-    rest(words[2], atol(words[3]), atol(words[4]), words[5]);
   } else if (!strcmp(what, "times") && count == 4) {
     times(words[2], atol(words[3]));
   } else {

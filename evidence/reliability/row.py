@@ -1,4 +1,4 @@
-"""What a row of the table is, and what came of it."""
+"""How a row of docs/evidence/reliability.md is measured, and what came of it."""
 
 from __future__ import annotations
 
@@ -35,13 +35,7 @@ class Run:
         return max(least, round(full * self.scale))
 
 
-@dataclass(frozen=True)
-class Row:
-    name: str  # R1 to R20
-    title: str  # what is tried
-    full: str  # the full number
-    leaves: str  # what stays open after it
-    measure: Callable[[Run], Outcome]
+Measure = Callable[[Run], Outcome]
 
 
 def spoken(count: float) -> str:
@@ -66,9 +60,7 @@ def with_wrong(result: str, wrong: Sequence[str]) -> str:
     return "; ".join([f"{result}; {len(wrong)} wrong", *wrong[:4]])
 
 
-def by_pytest(
-    what: str, result: str, *selected: str, environment: dict[str, str] | None = None
-) -> Callable[[Run], Outcome]:
+def by_pytest(what: str, result: str, *selected: str, environment: dict[str, str] | None = None) -> Measure:
     """Measures a row by tests of the repository; selected: arguments of pytest."""
 
     def measure(run: Run) -> Outcome:
@@ -77,13 +69,9 @@ def by_pytest(
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=settings)
         (run.work / "pytest.log").write_text(done.stdout + done.stderr, encoding="utf-8")
         last = next((line for line in reversed(done.stdout.splitlines()) if re.search(r"\d+ \w+", line)), "no test ran")
-
-        def count(word: str) -> int:
-            match = re.search(rf"(\d+) {word}", last)
-            return int(match[1]) if match else 0
-
-        passed, skipped = count("passed"), count("skipped")
-        failed = count("failed") + count("error") + (not passed)
+        counts = {word: int(count) for count, word in re.findall(r"(\d+) (passed|skipped|failed|error)", last)}
+        passed, skipped = counts.get("passed", 0), counts.get("skipped", 0)
+        failed = counts.get("failed", 0) + counts.get("error", 0) + (not passed)
         number = f"{passed + failed} {what}" + (f"; {skipped} skipped" if skipped else "")
         return Outcome(number, f"{passed} {result}", failed == 0)
 

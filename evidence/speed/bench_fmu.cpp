@@ -78,16 +78,27 @@ class shared_library {
   void* handle_;
 };
 
-// value references of `count` elements of a group
-template <typename References>
-void append_elements(References& to, variable_group_id group, unsigned count) {
-  for (unsigned i = 0; i < count; ++i) {
-    to.push_back(variable_groups[group].base + i);
+// The references that every sample sets and gets: one for each element in FMI 2.0, one for each array in FMI 3.0.
+template <typename Reference>
+struct sample_references {
+  explicit sample_references(bool by_element) {
+    const auto append = [by_element](std::vector<Reference>& to, variable_group_id group, unsigned elements) {
+      for (unsigned i = 0; i < (by_element ? elements : 1); ++i) {
+        to.push_back(variable_groups[group].base + i);
+      }
+    };
+    append(inputs, GROUP_TENDON_FORCE, tendons);
+    append(inputs, GROUP_TENDON_POSITION, tendons);
+    for (const variable_group_id group : {GROUP_COMPENSATED_TORQUE, GROUP_JOINT_TORQUE, GROUP_FRICTION_TORQUE,
+                                          GROUP_BIAS_TORQUE, GROUP_JOINT_ANGLE, GROUP_JOINT_SPEED}) {
+      append(numbers, group, joints);
+    }
+    append(flags, GROUP_JOINT_CONTACT, joints);
+    append(flags, GROUP_CONTACT, 1);
+    append(flags, GROUP_SLACK, tendons);
   }
-}
-
-constexpr std::array real_outputs = {GROUP_COMPENSATED_TORQUE, GROUP_JOINT_TORQUE, GROUP_FRICTION_TORQUE,
-                                     GROUP_BIAS_TORQUE,        GROUP_JOINT_ANGLE,  GROUP_JOINT_SPEED};
+  std::vector<Reference> inputs, numbers, flags;
+};
 
 // An instance that steps: 0 of every call is success.
 class fmi2_runner {
@@ -96,14 +107,6 @@ class fmi2_runner {
     const auto create = library_.find<fmi2InstantiateTYPE>("fmi2Instantiate");
     instance_ = create("bench", fmi2CoSimulation, resources.guid(), ("file://" + resources.path().string()).c_str(),
                        &callbacks_, fmi2False, fmi2False);
-    append_elements(inputs_, GROUP_TENDON_FORCE, tendons);
-    append_elements(inputs_, GROUP_TENDON_POSITION, tendons);
-    for (const variable_group_id group : real_outputs) {
-      append_elements(numbers_, group, joints);
-    }
-    append_elements(flags_, GROUP_JOINT_CONTACT, joints);
-    append_elements(flags_, GROUP_CONTACT, 1);
-    append_elements(flags_, GROUP_SLACK, tendons);
   }
   ~fmi2_runner() { library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")(instance_); }
   fmi2_runner(const fmi2_runner&) = delete;
@@ -115,12 +118,12 @@ class fmi2_runner {
            library_.find<fmi2ExitInitializationModeTYPE>("fmi2ExitInitializationMode")(instance_);
   }
   int set(const fmu_inputs& inputs) {
-    return set_real_(instance_, inputs_.data(), inputs_.size(), inputs.numbers.data());
+    return set_real_(instance_, all_.inputs.data(), all_.inputs.size(), inputs.numbers.data());
   }
   int step(double time) { return do_step_(instance_, time, 1e-3, fmi2True); }
   int get(fmu_outputs& outputs) {
-    return get_real_(instance_, numbers_.data(), numbers_.size(), outputs.numbers.data()) +
-           get_boolean_(instance_, flags_.data(), flags_.size(), outputs.flags.data());
+    return get_real_(instance_, all_.numbers.data(), all_.numbers.size(), outputs.numbers.data()) +
+           get_boolean_(instance_, all_.flags.data(), all_.flags.size(), outputs.flags.data());
   }
 
  private:
@@ -135,7 +138,7 @@ class fmi2_runner {
   fmi2DoStepTYPE* do_step_ = library_.find<fmi2DoStepTYPE>("fmi2DoStep");
   fmi2GetRealTYPE* get_real_ = library_.find<fmi2GetRealTYPE>("fmi2GetReal");
   fmi2GetBooleanTYPE* get_boolean_ = library_.find<fmi2GetBooleanTYPE>("fmi2GetBoolean");
-  std::vector<fmi2ValueReference> inputs_, numbers_, flags_;
+  const sample_references<fmi2ValueReference> all_{true};
 };
 
 class fmi3_runner {
@@ -144,14 +147,6 @@ class fmi3_runner {
     const auto create = library_.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation");
     instance_ = create("bench", resources.guid(), (resources.path().string() + "/").c_str(), false, false, false, false,
                        nullptr, 0, nullptr, say, nullptr);
-    append_elements(inputs_, GROUP_TENDON_FORCE, 1);
-    append_elements(inputs_, GROUP_TENDON_POSITION, 1);
-    for (const variable_group_id group : real_outputs) {
-      append_elements(numbers_, group, 1);
-    }
-    append_elements(flags_, GROUP_JOINT_CONTACT, 1);
-    append_elements(flags_, GROUP_CONTACT, 1);
-    append_elements(flags_, GROUP_SLACK, 1);
   }
   ~fmi3_runner() { library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")(instance_); }
   fmi3_runner(const fmi3_runner&) = delete;
@@ -164,7 +159,7 @@ class fmi3_runner {
            library_.find<fmi3ExitInitializationModeTYPE>("fmi3ExitInitializationMode")(instance_);
   }
   int set(const fmu_inputs& inputs) {
-    return set_real_(instance_, inputs_.data(), inputs_.size(), inputs.numbers.data(), inputs.numbers.size());
+    return set_real_(instance_, all_.inputs.data(), all_.inputs.size(), inputs.numbers.data(), inputs.numbers.size());
   }
   int step(double time) {
     bool events = false, ends = false, early = false;
@@ -173,8 +168,8 @@ class fmi3_runner {
   int get(fmu_outputs& outputs) {
     std::array<bool, joints + 1 + tendons> given;
     const int status =
-        get_real_(instance_, numbers_.data(), numbers_.size(), outputs.numbers.data(), outputs.numbers.size()) +
-        get_boolean_(instance_, flags_.data(), flags_.size(), given.data(), given.size());
+        get_real_(instance_, all_.numbers.data(), all_.numbers.size(), outputs.numbers.data(), outputs.numbers.size()) +
+        get_boolean_(instance_, all_.flags.data(), all_.flags.size(), given.data(), given.size());
     for (std::size_t i = 0; i < given.size(); ++i) {
       outputs.flags[i] = given[i] ? 1 : 0;
     }
@@ -192,7 +187,7 @@ class fmi3_runner {
   fmi3DoStepTYPE* do_step_ = library_.find<fmi3DoStepTYPE>("fmi3DoStep");
   fmi3GetFloat64TYPE* get_real_ = library_.find<fmi3GetFloat64TYPE>("fmi3GetFloat64");
   fmi3GetBooleanTYPE* get_boolean_ = library_.find<fmi3GetBooleanTYPE>("fmi3GetBoolean");
-  std::vector<fmi3ValueReference> inputs_, numbers_, flags_;
+  const sample_references<fmi3ValueReference> all_{false};
   double last_ = 0.0;
 };
 

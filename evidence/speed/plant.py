@@ -13,7 +13,6 @@ whose share is measured with fmi2GetVersion and taken off.
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import math
 import statistics
@@ -33,15 +32,17 @@ from tendonfmu.arrays import Array
 from tendonfmu.simulate import build_plant_fmu, read_rig
 from tendonfmu.simulate.plant import Plant, SolverError
 
+START, SPAN, LONG = 1.5, 0.5, 20.0  # s: where the comparison begins, in motion; simulated by scipy, by the library
+PEER_TOLERANCES = (1e-4, 1e-5)
+ROUNDS = 3
 COMPARED = ("joint_position", "tendon_force", "friction_torque")
 
 
-def plant_at(rig: str, start: float, **settings: Any) -> Plant:
+def started(rig: str, **settings: Any) -> Plant:
     plant = Plant(rig)
     plant.configure(sensors=False, **settings)
     plant.initialise()
-    if start > 0.0:
-        plant.advance(start)
+    plant.advance(START)
     return plant
 
 
@@ -52,24 +53,25 @@ def absolute_tolerance(plant: Plant, tolerance: float, size: int) -> Array:
     return tolerance * np.concatenate([*blocks, np.full(size - 2 * n - 2 * m, 1.0)])
 
 
-def scipy_rows(plant: Plant, y: Array, exact: Array, arguments: argparse.Namespace) -> list[list[str]]:
+def scipy_rows(plant: Plant, exact: Array) -> list[list[str]]:
     lines = []
-    start, end = arguments.start, arguments.start + arguments.span
+    y, end = plant.continuous_state(), START + SPAN
     for name in ("LSODA", "Radau", "BDF"):
-        for tolerance in arguments.peer_tolerances:
+        for tolerance in PEER_TOLERANCES:
             before = time.process_time()
             absolute = absolute_tolerance(plant, tolerance, y.size)
-            solved = solve_ivp(plant.derivative, (start, end), y, name, t_eval=[end], rtol=tolerance, atol=absolute)
+            solved = solve_ivp(plant.derivative, (START, end), y, name, t_eval=[end], rtol=tolerance, atol=absolute)
             used = time.process_time() - before
             if not solved.success:
                 raise SystemExit(f"scipy {name}: {solved.message}")
             error = np.abs(solved.y[: plant.joints, -1] - exact).max()
-            speed = f"{arguments.span / used:.3g}"
-            lines.append([f"scipy {name}", f"{tolerance:.0e}", f"{arguments.span:g}", speed, f"{error:.1e}", "", ""])
+            lines.append(
+                [f"scipy {name}", f"{tolerance:.0e}", f"{SPAN:g}", f"{SPAN / used:.3g}", f"{error:.1e}", "", ""]
+            )
     return lines
 
 
-def library_rows(text: str, tight: dict[str, Array], moments: Array, arguments: argparse.Namespace) -> list[list[str]]:
+def library_rows(text: str, tight: dict[str, Array], moments: Array) -> list[list[str]]:
     """The library's integrators take turns in every round; times are medians."""
     choices: list[tuple[str, str, dict[str, Any]]] = [
         ("CVODE", f"{tolerance:.0e}", {"integrator": "cvode", "relative_tolerance": tolerance})
@@ -81,11 +83,11 @@ def library_rows(text: str, tight: dict[str, Array], moments: Array, arguments: 
     ]
     times: list[list[float]] = [[] for _ in choices]
     ends: list[list[str]] = [[] for _ in choices]
-    for _ in range(arguments.rounds):
+    for _ in range(ROUNDS):
         for k, (_, _, settings) in enumerate(choices):
             before = time.process_time()
             try:
-                plant = plant_at(text, arguments.start, **settings)
+                plant = started(text, **settings)
                 before = time.process_time()
                 got = plant.run(moments)
             except SolverError as failed:
@@ -96,30 +98,28 @@ def library_rows(text: str, tight: dict[str, Array], moments: Array, arguments: 
             ends[k] = [f"{np.abs(got[name] - tight[name]).max():.1e}" for name in COMPARED]
     lines = []
     for (name, label, _), used, end in zip(choices, times, ends, strict=True):
-        speed = f"{arguments.long / statistics.median(used):.3g}"
-        lines.append([name, label, f"{arguments.long:g}", speed, *end])
+        lines.append([name, label, f"{LONG:g}", f"{LONG / statistics.median(used):.3g}", *end])
     return lines
 
 
-def rows(arguments: argparse.Namespace) -> list[list[str]]:
-    text = read_rig(arguments.rig).json()
-    reference = plant_at(text, arguments.start, integrator="cvode", relative_tolerance=1e-9)
-    same = plant_at(text, arguments.start, integrator="cvode", relative_tolerance=1e-9)
-    end = arguments.start + arguments.span
-    moments = np.union1d(np.arange(arguments.start, arguments.start + arguments.long, arguments.every)[1:], [end])
+def rows(every: float) -> list[list[str]]:
+    text = read_rig(INDEX_RIG).json()
+    reference, same = (started(text, integrator="cvode", relative_tolerance=1e-9) for _ in range(2))
+    end = START + SPAN
+    moments = np.union1d(np.arange(START, START + LONG, every)[1:], [end])
     tight = reference.run(moments)
     exact = tight["joint_position"][np.searchsorted(moments, end)]
-    of_scipy = scipy_rows(same, same.continuous_state(), exact, arguments)
-    return of_scipy + library_rows(text, tight, moments, arguments)
+    return scipy_rows(same, exact) + library_rows(text, tight, moments)
 
 
 # --- TendonFinger.fmu -------------------------------------------------------------------------------------------------
 
 SETTINGS = {"CVODE": (1, "relative_tolerance", (1e-6, 1e-5, 1e-4)), "fixed step": (2, "step", (1e-3, 5e-4))}
 STEPS = (1e-3, 1e-2)
+SECONDS = 10.0  # simulated
 
 
-def fmu_speed(folder: Path, values: dict[str, float], step: float, new_inputs: bool, seconds: float) -> float:
+def fmu_speed(folder: Path, values: dict[str, float], step: float, new_inputs: bool) -> float:
     """Simulated seconds per CPU second of one run."""
     model = fmpy.read_model_description(folder)
     references = {variable.name: variable.valueReference for variable in model.modelVariables}
@@ -141,7 +141,7 @@ def fmu_speed(folder: Path, values: dict[str, float], step: float, new_inputs: b
     set_real, do_step, get_version = (getattr(fmu.dll, f"fmi2{name}") for name in ("SetReal", "DoStep", "GetVersion"))
     do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
     reference = (ctypes.c_uint * 1)(references["tendon_position_command[1]"])
-    count, command = round(seconds / step), ctypes.c_double()
+    count, command = round(SECONDS / step), ctypes.c_double()
     started = time.process_time()
     for _ in range(count * (2 if new_inputs else 1)):
         get_version()
@@ -155,43 +155,33 @@ def fmu_speed(folder: Path, values: dict[str, float], step: float, new_inputs: b
     used = time.process_time() - called - (called - started)
     fmu.terminate()
     fmu.freeInstance()
-    return seconds / used
+    return SECONDS / used
 
 
-def fmu_rows(rig: Path, seconds: float, rounds: int) -> list[list[str]]:
+def fmu_rows() -> list[list[str]]:
     lines = []
     with tempfile.TemporaryDirectory() as folder:
-        unpacked = Path(fmpy.extract(str(build_plant_fmu(rig, Path(folder) / "finger.fmu")), f"{folder}/fmu"))
+        unpacked = Path(fmpy.extract(str(build_plant_fmu(INDEX_RIG, Path(folder) / "finger.fmu")), f"{folder}/fmu"))
         for name, (integrator, setting, accuracies) in SETTINGS.items():
             for accuracy in accuracies:
                 label = f"{accuracy:g}" if integrator == 1 else f"{1e3 * accuracy:g} ms"
                 for new_inputs in (False, True):
                     case = {"integrator": integrator, setting: accuracy}
-                    best = [
-                        max(fmu_speed(unpacked, case, step, new_inputs, seconds) for _ in range(rounds))
-                        for step in STEPS
-                    ]
+                    best = [max(fmu_speed(unpacked, case, step, new_inputs) for _ in range(ROUNDS)) for step in STEPS]
                     lines.append([name, label, "new each step" if new_inputs else "held", *(f"{x:.0f}" for x in best)])
     return lines
 
 
 def main() -> None:
     options = parser(__doc__, output=None)
-    options.add_argument("--rig", type=Path, default=INDEX_RIG)
-    options.add_argument("--start", type=float, default=1.5, help="s: where the comparison begins, in motion")
-    options.add_argument("--span", type=float, default=0.5, help="s simulated by scipy")
-    options.add_argument("--long", type=float, default=20.0, help="s simulated by the library")
     options.add_argument("--every", type=float, default=0.01, help="s between the library's outputs")
-    options.add_argument("--rounds", type=int, default=3, help="of the library's integrators")
-    options.add_argument("--peer-tolerances", type=float, nargs="+", default=[1e-4, 1e-5])
     options.add_argument("--fmu", action="store_true", help="TendonFinger.fmu instead")
-    options.add_argument("--seconds", type=float, default=10.0, help="s simulated by the FMU")
     given = options.parse_args()
     if given.fmu:
         head = ["integrator", "accuracy", "inputs", *(f"step {1e3 * step:g} ms" for step in STEPS)]
-        print(tables.table(head, fmu_rows(given.rig, given.seconds, given.rounds), 3))
+        print(tables.table(head, fmu_rows(), 3))
         return
-    lines = rows(given)
+    lines = rows(given.every)
     head = ["integrator", "tolerance or step", "simulated s", "per CPU s"]
     print(tables.table([*head, "joint_position [rad]", "tendon_force [N]", "friction_torque [N·m]"], lines))
     print("\nLast columns: largest errors against CVODE at 1e-9 (scipy: at its end).")

@@ -101,7 +101,6 @@ def test_what_is_there_is_not_made_again(tmp_path: Path, capsys: pytest.CaptureF
         assert every_table.make([counts], tmp_path, again) == 0
         assert f"| {runs} |" in (tmp_path / "counts.md").read_text(encoding="utf-8").splitlines()
     assert "counts: there already" in capsys.readouterr().err
-    assert "[counts](counts.md)" in (tmp_path / "README.md").read_text(encoding="utf-8")
 
 
 def test_tables_that_are_written_count_in_place_of_what_is_printed(tmp_path: Path) -> None:

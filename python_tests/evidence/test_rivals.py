@@ -19,7 +19,6 @@ from evidence.diagnosis.rival_methods import (
     by_knockoffs,
     by_parity,
     by_random_cv,
-    detected,
     parity_relations,
     signature_matrix,
     stepwise,
@@ -54,11 +53,6 @@ def test_in_white_noise_the_first_name_is_right(way: Any) -> None:
         assert stepwise(data, way)[0].where == Where("backlash", 1)
 
 
-def test_the_correlation_keeps_its_level_in_white_noise() -> None:
-    drawn = (columns_at_joints(np.random.default_rng(seed), [0, 1, 0]) for seed in range(100))
-    assert sum(bool(stepwise(data, by_correlation)) for data in drawn) <= 5  # 1 % of 100: P(> 5) < 1e-3
-
-
 def test_knockoffs_name_what_is_there() -> None:
     require("knockpy")
     for seed in range(3):
@@ -76,13 +70,6 @@ def test_a_tendons_parity_relation_does_not_see_its_force() -> None:
         assert np.abs(arms @ directions).max() < 1e-15
         assert directions.T @ directions == pytest.approx(np.eye(1))
     assert len(parity_relations(np.array([[0.01], [-0.01]]))) == 1
-
-
-def test_parity_keeps_its_level_in_white_noise() -> None:
-    relations = parity_relations(ARMS)
-    rng = np.random.default_rng(3)
-    alarms = sum(bool(detected(rng.standard_normal((4000, 2)), relations, STEP).any()) for _ in range(200))
-    assert alarms <= 8  # 1 % of 200: P(> 8) < 1e-3
 
 
 def test_parity_names_all_effects_with_the_signature() -> None:
@@ -156,11 +143,6 @@ def test_a_set_without_an_order_is_first_only_alone() -> None:
     assert [ordered[key] for key in ("false", "in_set", "first", "at_place")] == [1, True, False, True]
 
 
-def test_what_a_simulator_has_anyway_is_not_false() -> None:
-    answer = Answer(causes(("inertia", 1, None)))
-    assert judged(made_case(GRAVITY, also=("presliding", "inertia")), answer)["false"] == 0
-
-
 def test_the_table_has_a_column_for_each_and_says_what_names_nothing() -> None:
     def row(named: Answer) -> dict[str, Any]:
         answers = {"diagnose": named, "discrepancy": Answer(gain=0.1, names=False)}
@@ -170,6 +152,6 @@ def test_the_table_has_a_column_for_each_and_says_what_names_nothing() -> None:
     rows = [row(Answer(gain=0.0)), row(Answer(causes(("gravity", 1, None)), gain=0.0)), {"error": "InputError: x"}]
     lines = markdown(rows).splitlines()
     assert lines[0] == "|  | diagnose | discrepancy |"
-    assert "| foreign, nothing hidden: names something | 1 of 2 | names nothing |" in lines
+    assert "| foreign, nothing hidden: names something | 1/2 | names nothing |" in lines
     assert "| foreign, nothing hidden: gain, median and range | 0.0 % (0.0 to 0.0) | 10.0 % (10.0 to 10.0) |" in lines
     assert lines[-1].startswith("1 of 3 cases")

@@ -9,9 +9,9 @@
  * alone. Any number of threads may call at once; nothing is allocated, up to 100 KiB of stack are used.
  *
  * Why not Eigen: its products use only the instructions that the library is compiled for, SSE2 on any x86-64, and they
- * skip no column of zeros. Measured by evidence/speed/bench_symmetric_update.cpp on one core with AVX2, p = 476, k = 128, in
- * GFLOP/s: add_outer_products() 34 (avx2), 13 (portable), Eigen 13; multiply_symmetric() with 2 of 5 columns not zero
- * 31, 8, Eigen 5. With k = 4, a sample of an index finger: 13, 8, Eigen 7 and 13, 5, Eigen 3. */
+ * skip no column of zeros. On one core with AVX2, p = 476, k = 128, in GFLOP/s: add_outer_products() 34 (avx2), 13
+ * (portable), Eigen 13; multiply_symmetric() with 2 of 5 columns not zero 31, 8, Eigen 5. With k = 4, a sample of an
+ * index finger: 13, 8, Eigen 7 and 13, 5, Eigen 3. */
 #pragma once
 
 #include <cstddef>
