@@ -10,6 +10,7 @@ it. Both pass the object on. An option means the same in every command.
 from __future__ import annotations
 
 import math
+import operator
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -131,7 +132,10 @@ class Several:
     def read(self, value: Any) -> list[Any]:
         """Return a list. Raises ValueError if there is anything else in it."""
         alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
-        return [self.item.read(item) for item in ([value] if alone else value)]
+        items = [self.item.read(item) for item in ([value] if alone else value)]
+        # scikit-learn's clone wants back the very list that it passed
+        unchanged = isinstance(value, list) and all(map(operator.is_, items, value))
+        return value if unchanged else items
 
 
 File = str | os.PathLike[str]
@@ -167,6 +171,9 @@ class Options:
     def __post_init__(self) -> None:
         for name, each in self.each().items():
             object.__setattr__(self, name, checked(name, getattr(self, name), each.values))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
     @classmethod
     def each(cls) -> dict[str, Option]:

@@ -410,7 +410,8 @@ def test_parameters_are_read_and_set_as_in_scikit_learn() -> None:
     again = FrictionFit(**fit.get_params())
     assert again.get_params() == fit.get_params()
     assert all(getattr(fit, name) == value for name, value in fit.get_params().items())
-    assert fit.max_passes == fit.passes  # its name in earlier versions
+    assert all(again.get_params()[name] is value for name, value in fit.get_params().items())  # else `clone` refuses
+    assert (fit.max_passes, fit.sides) == (fit.passes, "given")  # names of earlier versions
     assert again.set_params(prior=3.0, share=["tendons"]) is again
     assert (again.options.prior, again.options.share) == (3.0, ["tendons"])
     with pytest.raises(ValueError, match="no parameter 'colour'"):

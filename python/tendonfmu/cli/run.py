@@ -53,11 +53,13 @@ def run(
     from tendonfmu.fmu import check_model, finger_of
     from tendonfmu.interface import run as run_finger
     from tendonfmu.recordings import read_recording
-    from tendonfmu.report import check_page, run_report, write_run_page
+    from tendonfmu.report import run_report
 
     check_model(model)
     check_table(output, model, recording)
     if report is not None:
+        from tendonfmu.report import check_page, write_run_page
+
         check_page(report, model, recording)
         if report.resolve() == output.resolve():
             raise InputError(f"{report}: the same file for outputs and page; expected two names")

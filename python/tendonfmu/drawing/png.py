@@ -57,7 +57,7 @@ def _drawn(sheet: Sheet, figures: Sequence[Any]) -> Figure:
     heights = [max(sheet.panels[k].extent[1] for k in row) for row in rows]
     width = columns * first.extent[0]
     title = wrap(sheet.title, max(int((width - 20) / 9.9), 20))
-    key_rows = _key_rows([50 + 6.8 * len(meaning) for _, meaning in sheet.keys], width)
+    key_rows = _key_rows([_key_length(meaning) for _, meaning in sheet.keys], width)
     top = 16 + 20 * (len(title) + key_rows)
     height = top + sum(heights)
     figure = Figure(figsize=(width / _CSS, height / _CSS), dpi=_DPI, facecolor="white")
@@ -117,6 +117,7 @@ def _draw_head(figure: Figure, sheet: Sheet, title: list[str], rows: int, size: 
     width, height, top = size
     left = 12 / width
     text = "\n".join(title)
+    longest = max((_key_length(meaning) for _, meaning in sheet.keys), default=0.0)
     figure.text(left, 1 - 4 / height, text, fontsize=12, fontweight="bold", color=DARK, va="top", linespacing=1.15)
     if not sheet.keys:
         return
@@ -126,10 +127,15 @@ def _draw_head(figure: Figure, sheet: Sheet, title: list[str], rows: int, size: 
         bbox_to_anchor=(left, 1 - top / height),
         ncols=ceil(len(sheet.keys) / rows),
         frameon=False,
-        fontsize=9,
+        fontsize=min(9.0, 9.0 * (width - 24) / longest),
         borderaxespad=0.0,
         borderpad=0.2,
     )
+
+
+def _key_length(meaning: str) -> float:
+    """Return about how many CSS pixels a key takes."""
+    return 50 + 6.8 * len(meaning)
 
 
 def _key_rows(lengths: Sequence[float], room: float) -> int:

@@ -115,6 +115,11 @@ class FrictionFit(Configured):
     ) -> None:
         super().__init__(finger, progress=progress, method=method, **_with_present_names(options))
 
+    @property
+    def sides(self) -> str:
+        """The option `asymmetric` as earlier versions and reports say it."""
+        return _sides(self.options)
+
     def set_params(self, **params: Any) -> FrictionFit:
         """Set constructor arguments by name and return the object itself."""
         return super().set_params(**_with_present_names(params))

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
-from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
 from tendonfmu.files import counted, report_text, write_text
 from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource
@@ -68,6 +67,8 @@ class TuneResult:
         plotly.graph_objects.Figure
             The chosen bounds have the factor 1.
         """
+        from tendonfmu.drawing import SeriesRow, series_figure  # plotly takes 0.1 s to import
+
         tail = self.report["tail"]
         counted = {
             "as counted": np.array([point["in_sample"]["per_hour"] for point in tail]),
@@ -203,6 +204,8 @@ class ScoreResult:
         plotly.graph_objects.Figure
             A row per joint. Labels are shaded grey, alarms orange.
         """
+        from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
+
         track = self.scored.tracks[recording]
         time, torque = track.recording.time, track.outputs["compensated_torque"]
         rows = []

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from tendonfmu.drawing import ORANGE, SeriesRow, series_figure
 from tendonfmu.files import frame_of, write_table
 from tendonfmu.fmu import columns_of, run_model
 from tendonfmu.fmu import summary as summary_of
@@ -77,6 +76,8 @@ class RunResult:
         plotly.graph_objects.Figure
             A row per joint. Contacts that the finger reports are shaded.
         """
+        from tendonfmu.drawing import ORANGE, SeriesRow, series_figure  # plotly takes 0.1 s to import
+
         outputs = self.outputs
         names = {"joint_torque": "pulled", "friction_torque": "friction", "compensated_torque": "compensated"}
         rows = [

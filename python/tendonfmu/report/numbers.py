@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.statistics import Interval
+
+if TYPE_CHECKING:
+    from tendonfmu.statistics import Interval  # imports scipy
 
 NBSP = "\u00a0"
 Row = tuple[str, ...]

@@ -70,5 +70,5 @@ def write_figures(sheets: Iterable[Drawn], folder: Path) -> dict[Path, str]:
     for sheet, figures in sheets:
         file = folder / f"{sheet.name}.png"
         write_sheet(sheet, figures, file)
-        written[file] = sheet.caption or sheet.title
+        written[file] = sheet.title
     return written
