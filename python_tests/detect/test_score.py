@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from command import Answer, Call
 from repository_paths import ROOT
 from tendonfmu.cli import main
-from tendonfmu.detect.scoring import read_subject, residual_of, run_track, scaled_detection, score_recordings
+from tendonfmu.detect.scoring import Scored, read_subject, residual_of, run_track, scaled_detection, score_recordings
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
@@ -220,6 +221,11 @@ def test_scaled_detection_scales_all_that_decides() -> None:
     }
 
 
+def detection_bars(scored: Scored) -> dict[str, NDArray[np.float64]]:
+    """Style -> [k, 2] begin and end of each stretch."""
+    return {curve.style: curve.x.reshape(-1, 3)[:, :2] for curve in contact_sheet(scored).panels[-1].curves}
+
+
 def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     scored = score_recordings(INDEX, [written(pushes, "rec.parquet")])
@@ -237,11 +243,14 @@ def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatc
     assert rows.heat.values[0, k] == pytest.approx(size[row])
     assert np.isnan(rows.heat.values).any(axis=1).sum() == 1  # the last event is close to the end
     over_time = contact_sheet(scored)
-    *torques, detection = over_time.panels
-    bars = {curve.style: curve.x.reshape(-1, 3)[:, :2] for curve in detection.curves}  # begin and end of each
+    torques, bars = over_time.panels[:-1], detection_bars(scored)
     assert {style: len(stretches) for style, stretches in bars.items()} == {"label": 4, "alarm": 3}
     assert len(torques) == 2 and all(len(panel.stripes["label_stripe"]) == 4 for panel in torques)
     assert bars["alarm"][:, 0].tolist() == [event.alarm for event in events if event.found]
+    spoilt = [replace(event, silent=event is not first) for event in events]  # an alarm just before the first one
+    bars = detection_bars(replace(scored, scores=[replace(scored.scores[0], events=spoilt)]))
+    assert bars["missed"][:, 0].tolist() == [first.alarm]
+    assert first.alarm not in bars["alarm"][:, 0] and len(bars["alarm"]) == 2
     assert [name for _, name in over_time.keys[:4]] == scored.subject.finger.joint_names
     assert scored.roc is not None
     against, over = roc_sheet(scored, scored.roc).panels

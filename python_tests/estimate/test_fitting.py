@@ -338,6 +338,17 @@ def test_an_initial_bias_in_the_description_is_estimated() -> None:
     ]
 
 
+def test_an_initial_bias_of_zero_is_known_where_its_error_is_small_beside_the_noise() -> None:
+    finger = small_finger()
+    finger["bias"].update(initial_torque=[0.0, 0.0], initial_variance=1e-8, drift_variance=1e-9, noise_std=0.01)
+    recording = made_recording()
+    recording.groups["external_torque"] += 0.002  # brings the estimate to 0
+    fit = shared(finger).fit(recording)
+    (bias,) = (entry for entry in fit.report_["parameters"] if entry["path"] == "bias.initial_torque[2]")
+    assert abs(bias["value"]) < 2 * bias["standard_error"] < 0.2 * 0.01
+    assert bias["identified"]
+
+
 def test_several_recordings_have_a_bias_each() -> None:
     """A step of the bias between recordings says nothing about friction."""
     other = made_recording(seed=2)

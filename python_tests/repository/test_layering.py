@@ -100,14 +100,16 @@ def users_of(library: str) -> set[str]:
     }
 
 
-def test_only_exports_are_relative_imports() -> None:
-    relative = {
-        module.name
+def test_the_package_is_imported_by_absolute_names() -> None:
+    """The rules look at `from tendonfmu.PACKAGE import NAME`; only exports are relative."""
+    escaping = {
+        module.relative_to(PACKAGE).as_posix()
         for module in MODULES
         for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and node.level
+        if (isinstance(node, ast.ImportFrom) and node.level > (module.name == "__init__.py"))
+        or (isinstance(node, ast.Import) and any(alias.name.startswith("tendonfmu.") for alias in node.names))
     }
-    assert relative <= {"__init__.py"}
+    assert escaping == set()
 
 
 @pytest.mark.parametrize("library", ONLY)
@@ -134,6 +136,36 @@ def test_few_modules_print() -> None:
     assert printing == {"cli/program.py", "cli/console.py"}
 
 
+# What draws takes arrays that others made. Of the model it has what an FMU's picture consists of, and numpy is its only
+# mathematics. The binding knows the names of signals alone.
+FEW_IMPORTS = {
+    "drawing/*.py": r"tendonfmu\.(arrays|drawing|errors|files|lazy_exports|model\.(DrawnTendon|FingerDrawing)$)",
+    "report/*_figures.py": (
+        r"tendonfmu\.(arrays|detect|diagnosis|drawing|estimate|files|report|statistics|recordings\.flagged_stretches$)"
+    ),
+    "model/native.py": r"tendonfmu\.(_native|arrays|errors|model\.output_names)",
+}
+MATHEMATICS = {"pandas", "pyarrow", "scipy", "sklearn", "statistics"}
+
+
+@pytest.mark.parametrize("modules", FEW_IMPORTS)
+def test_what_draws_computes_nothing_and_the_binding_stands_below_the_model(modules: str) -> None:
+    names = {
+        (module, name)
+        for module, imported in names_by_module().items()
+        if Path(module).match(modules)
+        for name in imported
+    }
+    assert names
+    wrong = {
+        (module, name)
+        for module, name in names
+        if name.split(".")[0] in MATHEMATICS
+        or (name.split(".")[0] == "tendonfmu" and not re.match(FEW_IMPORTS[modules], name))
+    }
+    assert wrong == set()
+
+
 # --- C and C++: the source lists are the architecture -----------------------------------------------------------------
 
 
@@ -150,6 +182,9 @@ def includes_of(file: Path) -> list[tuple[bool, str]]:
     return [(mark == "<", name) for mark, name in INCLUDE.findall(file.read_text(encoding="utf-8"))]
 
 
+HEADERS = {file.name for part in ("runtime", "fmu_src") for file in (ROOT / part).rglob("*.h")}
+
+
 def is_ordered(folder: Path, sources: list[str], known: set[str]) -> list[str]:
     """Includes of headers that belong to files further down the list, or to none. known: headers from outside."""
     wrong: list[str] = []
@@ -161,7 +196,9 @@ def is_ordered(folder: Path, sources: list[str], known: set[str]) -> list[str]:
         for file in own:
             if file.exists():
                 wrong += [
-                    f"{file.name}: {name}" for angle, name in includes_of(file) if not angle and name not in allowed
+                    f"{file.name}: {name}"
+                    for angle, name in includes_of(file)
+                    if name not in allowed and (not angle or Path(name).name in HEADERS)
                 ]
     return wrong
 
@@ -203,6 +240,29 @@ def test_a_source_includes_only_what_stands_above_it(part: str) -> None:
     listed = {(folder / source).with_suffix("") for source in sources}
     files = [file for file in (ROOT / "runtime" / part).rglob("*") if file.suffix in (".c", ".h", ".cpp")]
     assert {file.with_suffix("") for file in files} - {ROOT / "runtime/description/core_inside"} == listed
+
+
+BEYOND_CORE = r"tendonfmu_(estimation|learner|plant)|runtime/(estimation|plant)"
+# Sources and lists of CMake, and what none of them names: neither included nor linked.
+STRANGERS = {
+    "runtime/core/**/*.[ch]": rf"fmi[23]|fmu_src|{BEYOND_CORE}",
+    "runtime/CMakeLists.txt": rf"fmu_src|{BEYOND_CORE}",
+    "runtime/description/*": BEYOND_CORE,
+    "runtime/plant/*": r"tendonfmu_(estimation|learner)|tendonfmu_core|runtime/(core|estimation)|\.\./core",
+    "runtime/include/tendonfmu.h*": BEYOND_CORE,
+    "runtime/include/tendonfmu_[dors]*": BEYOND_CORE,  # description, outputs, result, span
+    "runtime/include/tendonfmu_plant.h": r'#include "',
+    "fmu_src/*.[ch]": BEYOND_CORE,
+    "fmu_src/CMakeLists.txt": r"tendonfmu_(estimation|learner)",
+    "fmu_src/plant_fmu/*": r"tendonfmu_(estimation|learner)",
+}
+
+
+@pytest.mark.parametrize("files", STRANGERS)
+def test_core_and_fmu_do_without_estimation_and_plant(files: str) -> None:
+    texts = {file.name: file.read_text(encoding="utf-8") for file in ROOT.glob(files) if file.is_file()}
+    assert texts
+    assert {name: match[0] for name, text in texts.items() if (match := re.search(STRANGERS[files], text))} == {}
 
 
 def test_kernels_for_one_processor_share_no_inline_function() -> None:
@@ -285,6 +345,40 @@ def tracked() -> list[str]:
     require("git")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
     return [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+TESTS = {file.stem for file in (ROOT / "python_tests").rglob("*.py")} - {"__init__"}
+OF_EVIDENCE = {"detection", "diagnosis", "fingers", "fit", "recordings", "runner"}  # cases and fingers, for all tests
+
+
+@pytest.mark.parametrize(
+    ("files", "strangers"),
+    [
+        ("python/**/*.py", TESTS | {"evidence", "python_tests"}),
+        ("examples/**/*.py", TESTS | {"python_tests"}),
+        ("evidence/**/*.py", TESTS | {"python_tests"}),
+        ("python_tests/support/oracle*.py", {"evidence", "tendonfmu"}),  # the oracle judges them
+    ],
+)
+def test_nothing_imports_tests_and_the_oracle_nothing_that_it_judges(files: str, strangers: set[str]) -> None:
+    wrong = [
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in ROOT.glob(files)
+        for name in imports_of(ast.parse(file.read_text(encoding="utf-8")))
+        if name.split(".")[0] in strangers
+    ]
+    assert wrong == []
+
+
+def test_tests_of_the_product_take_cases_and_fingers_from_the_evidence() -> None:
+    wrong = [
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in (ROOT / "python_tests").rglob("*.py")
+        if "evidence" not in file.relative_to(ROOT).parts
+        for name in imports_of(ast.parse(file.read_text(encoding="utf-8")))
+        if name.split(".")[0] == "evidence" and name.split(".")[1] not in OF_EVIDENCE
+    ]
+    assert wrong == []
 
 
 def lines_of(file: Path) -> int:
