@@ -46,7 +46,11 @@ find_pythons() {
 
 # Compilers that CMake calls: zig for GLIBC 2.17. Its target leaves out a part of AVX-512 that -mavx512f has elsewhere.
 make_compilers() {
-  local zig name
+  local zig name machine
+  # Debian's Python.h includes <x86_64-linux-gnu/python3.11/pyconfig.h>, and zig does not look into /usr/include.
+  machine=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')
+  mkdir -p "$output/headers/$machine"
+  find "/usr/include/$machine" -maxdepth 1 -name 'python3*' -exec ln -sfn {} "$output/headers/$machine/" \; 2>/dev/null || true
   zig=$("$python" -c 'import importlib.util as u; print(u.find_spec("ziglang").submodule_search_locations[0] + "/zig")')
   for name in cc c++; do
     cat >"$output/$name" <<EOF
@@ -54,7 +58,7 @@ make_compilers() {
 for argument in "\$@"; do
   if [ "\$argument" = -mavx512f ]; then set -- "\$@" -mevex512; fi
 done
-exec "$zig" $name -target x86_64-linux-gnu.$glibc "\$@"
+exec "$zig" $name -target x86_64-linux-gnu.$glibc "\$@" -isystem "$output/headers"
 EOF
     chmod +x "$output/$name"
   done

@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tools/setup.sh
 
 suite=bookworm
-root=${1:-$(mktemp -d)}
+folder=${1:-$(mktemp -d)}
 
 # What pip and apt of this machine are told: mirrors, certificates, proxies. No package comes with it.
 package_settings() {
@@ -53,8 +53,11 @@ fresh_clone() { git clone --quiet --no-hardlinks . "$root/srv/$1"; }
 # The first block of commands of a page.
 commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed 's/^    //'; }
 
+# Each page in a Debian of its own: what one installs, the other must not find.
 trial() {
   local name=$1 page=$2 started=$SECONDS
+  root=$folder/$name
+  quietly "making a minimal Debian" make_debian
   fresh_clone "$name"
   echo "--- $page"
   commands_of "$page"
@@ -64,7 +67,6 @@ trial() {
 
 if [ "$(id -u)" -ne 0 ]; then die "needs root: chroot and mounts"; fi
 if ! command -v mmdebstrap >/dev/null; then quietly "installing mmdebstrap" apt_install mmdebstrap; fi
-if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$root"' EXIT; fi
-quietly "making a minimal Debian" make_debian
-trial wheel docs/reference/packages.md
+if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$folder"' EXIT; fi
 trial readme README.md
+trial wheel docs/reference/packages.md

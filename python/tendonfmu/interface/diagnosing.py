@@ -12,7 +12,6 @@ from typing import Any
 from tendonfmu.diagnosis import Cause, reported_causes
 from tendonfmu.diagnosis import Diagnosis as Found
 from tendonfmu.diagnosis import diagnose as find
-from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import check_given_once
 from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource, finger_from_data
@@ -112,6 +111,8 @@ class Diagnosis:
             The figures of diagnosis.html.
         """
         sheets = [sheet for sheet in diagnosis_sheets(self.found) if residuals or sheet.section != "views"]
+        from tendonfmu.drawing import sheets_figure
+
         return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:

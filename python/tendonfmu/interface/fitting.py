@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import sheets_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.fmu import SetParameter, write_parameter_set
 from tendonfmu.interface.notebook import html_of
@@ -131,6 +130,8 @@ class FitResult:
             The figures of `tendonfmu fit --figures` of these kinds.
         """
         picture = self.estimator.picture()
+        from tendonfmu.drawing import sheets_figure
+
         return sheets_figure(repr(self)[1:-1], [*torque_sheets(picture), *law_sheets(picture)])
 
     def _repr_html_(self) -> str:
