@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
@@ -22,7 +21,6 @@ from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.estimate.structure import get_number, set_number, with_sides
 from tendonfmu.model import description_text, native
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.residuals import chi_square_tail, consistency, whiteness
 
 
 @pytest.fixture(autouse=True)
@@ -480,31 +478,6 @@ def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:
     assert resumed.z_ == pytest.approx(whole.z_, rel=0.05)
     with pytest.raises(InputError, match="the interrupted fit has 25 unknowns, this fit has 70"):
         shared(moved_start(), start=file, share=[]).fit(recording)
-
-
-# --- statistics and text ----------------------------------------------------------------------------------------------
-
-
-def test_chi_square_tail_is_that_of_scipy() -> None:
-    for value in (0.0, 1.0, 20.0, 55.5, 400.0, 5000.0):
-        assert chi_square_tail(value, 20) == pytest.approx(float(stats.chi2.sf(value, 20)), rel=1e-9, abs=1e-300)
-
-
-@pytest.mark.parametrize("count", [40, 1000, 100000])
-def test_the_interval_of_the_nis_is_that_of_chi_square(count: int) -> None:
-    low, high = consistency([np.ones((count, 1))])["interval"]
-    expected = stats.chi2.ppf([0.025, 0.975], count) / count
-    assert [low, high] == pytest.approx(list(expected), abs=2e-3 * (expected[1] - expected[0]))
-
-
-def test_whiteness_tells_white_from_coloured() -> None:
-    white = np.random.default_rng(1).standard_normal((5000, 2))
-    white[1000:1500] = np.nan
-    coloured = white.copy()
-    coloured[1:, 1] += 0.2 * np.nan_to_num(white[:-1, 1])
-    found = whiteness([coloured])
-    assert abs(found["lag_one"][0]) < 0.04 and found["ljung_box_p"][0] > 0.01
-    assert found["lag_one"][1] == pytest.approx(0.2 / 1.04, abs=0.04) and found["ljung_box_p"][1] < 1e-6
 
 
 def test_descriptions_are_laid_out_for_people() -> None:
