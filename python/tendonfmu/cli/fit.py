@@ -46,7 +46,7 @@ def fit(
     from tendonfmu.fmu import check_parameter_set_path
     from tendonfmu.interface import FitInterrupted
     from tendonfmu.interface import fit as fit_finger
-    from tendonfmu.report import fit_text, write_fit_page
+    from tendonfmu.report import fit_text
 
     earlier = [Path(file) for file in (options.previous, options.resume) if file is not None]
     inputs = [finger, *recordings, *(compare or []), *earlier]
@@ -78,4 +78,6 @@ def fit(
     if ssv is not None:
         say(f"{ssv}: parameter set for an FMU of the finger")
     if figures is not None:
+        from tendonfmu.report import write_fit_page
+
         say_files(write_fit_page(fitting.picture(), figures))

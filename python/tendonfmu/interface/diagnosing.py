@@ -110,9 +110,9 @@ class Diagnosis:
         plotly.graph_objects.Figure
             The figures of diagnosis.html.
         """
-        sheets = [sheet for sheet in diagnosis_sheets(self.found) if residuals or sheet.section != "views"]
-        from tendonfmu.drawing import sheets_figure
+        from tendonfmu.drawing import sheets_figure  # plotly takes 0.1 s to import
 
+        sheets = [sheet for sheet in diagnosis_sheets(self.found) if residuals or sheet.section != "views"]
         return sheets_figure(repr(self)[1:-1], sheets)
 
     def _repr_html_(self) -> str:

@@ -17,7 +17,7 @@ from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource, native
 from tendonfmu.options import FitOptions
 from tendonfmu.recordings import RecordingSource
-from tendonfmu.report import fit_text, law_sheets, torque_sheets
+from tendonfmu.report import fit_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,9 +129,10 @@ class FitResult:
         plotly.graph_objects.Figure
             The figures of `tendonfmu fit --figures` of these kinds.
         """
-        picture = self.estimator.picture()
-        from tendonfmu.drawing import sheets_figure
+        from tendonfmu.drawing import sheets_figure  # plotly takes 0.1 s to import
+        from tendonfmu.report import law_sheets, torque_sheets
 
+        picture = self.estimator.picture()
         return sheets_figure(repr(self)[1:-1], [*torque_sheets(picture), *law_sheets(picture)])
 
     def _repr_html_(self) -> str:
