@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 suite=bookworm
 folder=${1:-$(mktemp -d)}
 
-# What pip and apt of this machine are told: mirrors, certificates, proxies. No package comes with it.
+# Settings of apt and pip: mirrors, certificates, proxies. No package of this machine comes with them.
 package_settings() {
   local path
   for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/apt/keyrings \
