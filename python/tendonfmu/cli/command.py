@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path, PosixPath, WindowsPath
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
@@ -111,11 +111,11 @@ def _parameters(
     function: Callable[..., None], options: type[Options] | None, after: Mapping[str, str]
 ) -> list[inspect.Parameter]:
     """Return the parameters that typer reads, in the order of the help."""
-    hints = get_type_hints(function, include_extras=True)
     parameters: dict[str, inspect.Parameter] = {}
+    # get_type_hints of Python 3.10 makes Optional[Annotated[...]] of a default None
     given = {
-        name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=parameter.default, annotation=hints[name])
-        for name, parameter in inspect.signature(function).parameters.items()
+        name: parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
     }
     for name, parameter in given.items():
         if name == "options" and options is not None:
