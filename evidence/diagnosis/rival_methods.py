@@ -18,8 +18,8 @@ from scipy.stats import t as student
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
+from tendonfmu.diagnosis.cause import Where
 from tendonfmu.diagnosis.cause_search import View, residual_alone, series_of
-from tendonfmu.diagnosis.result import Where
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.estimate.evaluation import model_over, residuals
 from tendonfmu.recordings.prepared import FitRecording

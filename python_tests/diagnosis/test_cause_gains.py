@@ -10,12 +10,10 @@ import pytest
 
 from fit_cases import small_finger
 from tendonfmu.diagnosis import cause_gains, gain
-from tendonfmu.diagnosis import diagnosis as whole
-from tendonfmu.diagnosis.effects import Place, by_name
-from tendonfmu.diagnosis.effects.friction_law_places import law_of
-from tendonfmu.diagnosis.extension_fit import Accepted
+from tendonfmu.diagnosis import extension_diagnosis as whole
+from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.effects.places import law_of
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.named_cause import NamedCause, is_shown
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 
@@ -73,10 +71,9 @@ def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(
 @pytest.mark.parametrize(("delay", "shown"), [(16e-6, False), (-16e-6, False), (-0.012, True), (0.012, True)])
 def test_a_delay_of_a_hundredth_of_a_sample_is_not_shown(delay: float, shown: bool) -> None:
     """A fit may end there although the search accepted a larger one."""
-    accepted = Accepted(by_name("time_delay"), Place(), {"delay": 0.012}, (1.0,))
-    cause = NamedCause("time_delay", None, None, (accepted,), 0.1, 0.01, 1e-6, ())
+    term = Term(by_name("time_delay"), Place(), {"delay": 0.012}, (1.0,))
     data = {**small_finger(), "extensions": [{"effect": "time_delay", "delay": delay}]}
-    assert is_shown(cause, data, LeastSizes(np.zeros(2), np.zeros(4), 0.002, 0.0)) is shown
+    assert LeastSizes(np.zeros(2), np.zeros(4), 0.002, 0.0).shows_all("time_delay", [term], data) is shown
 
 
 # --- experiments are planned for laws of the nominal description ------------------------------------------------------
@@ -89,7 +86,7 @@ def test_a_shape_says_which_law_of_a_place_it_is_of(shape: dict[str, float], law
     assert law_of(shape) == law
 
 
-def in_nominal(data: Any, effect: Accepted) -> bool:
+def in_nominal(data: Any, effect: Term) -> bool:
     made = whole._Result.__new__(whole._Result)
     search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
     made._searched = cast("Any", search)
@@ -105,9 +102,9 @@ def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytes
     nominal["joints"][0] = {"name": "base", "friction": flat}
     nominal["joints"][1] = {"name": "tip"}
     extended = {**nominal, "joints": [{**nominal["joints"][0], "load_friction": flat}, nominal["joints"][1]]}
-    own, of_load = Accepted(stribeck, Place(1), {"stribeck_velocity": 0.1}), Accepted(stribeck, Place(1), {"load": 1.0})
+    own, of_load = Term(stribeck, Place(1), {"stribeck_velocity": 0.1}), Term(stribeck, Place(1), {"load": 1.0})
     assert in_nominal(nominal, own) and in_nominal(extended, own)
     assert in_nominal(extended, of_load) and not in_nominal(nominal, of_load)
-    assert not in_nominal(nominal, Accepted(stribeck, Place(2), {}))  # no law at joint 2
+    assert not in_nominal(nominal, Term(stribeck, Place(2), {}))  # no law at joint 2
     curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
     assert not in_nominal(curved, own)  # the law has what the effect would add

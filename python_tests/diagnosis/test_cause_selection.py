@@ -11,18 +11,11 @@ from numpy.typing import NDArray
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
-from tendonfmu.diagnosis.cause_selection import CERTAIN, Selection, names_with, rms_gain
+from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
 from tendonfmu.diagnosis.effects import Place, by_name
-from tendonfmu.diagnosis.hypotheses import (
-    EVERYWHERE,
-    HERE,
-    LARGEST_SCALING,
-    LARGEST_SECANT,
-    SOMEWHERE,
-    Hypothesis,
-    hypotheses,
-)
+from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, LARGEST_SECANT, hypotheses
 from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
+from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
 from tendonfmu.statistics.block_grams import standard_error
 
 Numbers = NDArray[np.float64]
@@ -47,7 +40,7 @@ def noise(seed: int) -> Numbers:
     return coloured(np.random.default_rng([seed, 4]))
 
 
-def hypotheses_of(columns: CandidateColumns) -> list[Hypothesis]:
+def hypotheses_of(columns: CandidateColumns) -> list[Cause]:
     """With arms so long that no correction of the torque is too large."""
     return hypotheses(columns, np.full((4, JOINTS), 1e3), np.ones(JOINTS))
 
@@ -64,8 +57,8 @@ def selection_of(
 FOUR = [Made("load_friction", j, i, sign=1, expected=(0.1 * j * i,)) for j in (1, 2) for i in (1, 2)]
 
 
-def keys(found: Sequence[Hypothesis]) -> dict[tuple[object, ...], Hypothesis]:
-    return {(each.level, *each.key): each for each in found}
+def keys(found: Sequence[Cause]) -> dict[tuple[object, ...], Cause]:
+    return {(each.direction.level, *each.key): each for each in found}
 
 
 def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_at_each_place(columns: Numbers) -> None:
@@ -78,38 +71,39 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
         *((SOMEWHERE, name, None, i) for i in (1, 2)),
         *((HERE, name, j, i) for j in (1, 2) for i in (1, 2)),
     }
-    assert [each.level for each in found] == sorted(each.level for each in found)
+    assert [each.direction.level for each in found] == sorted(each.direction.level for each in found)
     # a magnitude of 1 is as much as is ordinary at each place
-    assert by_key[EVERYWHERE, name, None, None].mix[:, 0] == pytest.approx([0.1, 0.2, 0.2, 0.4])
-    assert by_key[SOMEWHERE, name, 2, None].mix[:, 0] == pytest.approx([0.0, 0.0, 0.2, 0.4])
+    assert by_key[EVERYWHERE, name, None, None].direction.mix[:, 0] == pytest.approx([0.1, 0.2, 0.2, 0.4])
+    assert by_key[SOMEWHERE, name, 2, None].direction.mix[:, 0] == pytest.approx([0.0, 0.0, 0.2, 0.4])
     tendon = by_key[SOMEWHERE, name, None, 2]
-    assert tendon.mix[:, 0] == pytest.approx([0.0, 0.2, 0.0, 0.4])
-    assert [(each.proposal.place, each.weights) for each in tendon.members] == [
+    assert tendon.direction.mix[:, 0] == pytest.approx([0.0, 0.2, 0.0, 0.4])
+    assert [(each.place, each.magnitudes) for each in tendon.terms] == [
         (Place(1, 2), (0.2,)),
         (Place(2, 2), (0.4,)),
     ]
-    assert by_key[HERE, name, 2, 1].mix[:, 0] == pytest.approx([0.0, 0.0, 1.0, 0.0])
-    assert all(each.low == [0.0] and each.high == [np.inf] for each in found)
+    assert by_key[HERE, name, 2, 1].direction.mix[:, 0] == pytest.approx([0.0, 0.0, 1.0, 0.0])
+    assert all(each.direction.low == [0.0] and each.direction.high == [np.inf] for each in found)
 
 
 @pytest.mark.parametrize("effect", ["gravity", "force_gain", "backlash", "pulley_eccentricity"])
 def test_effects_of_one_part_are_asked_for_at_single_places(effect: str, columns: Numbers) -> None:
     found = hypotheses_of(candidate_columns(columns[:, :, :2], [Made(effect, 1), Made(effect, 2)]))
-    assert [each.level for each in found] == [HERE, HERE]
+    assert [each.direction.level for each in found] == [HERE, HERE]
 
 
 def test_an_effect_of_the_whole_finger_is_everywhere(columns: Numbers) -> None:
     made = [Made("time_delay", shapes=({"delay": 0.01}, {"delay": -0.01}), secant=True)]
     found = hypotheses_of(candidate_columns(columns[:, :, :2], made))
-    assert [(each.level, each.key) for each in found] == [(EVERYWHERE, ("time_delay", None, None))] * 2
+    assert [(each.direction.level, each.key) for each in found] == [(EVERYWHERE, ("time_delay", None, None))] * 2
     # what a step of 10 ms says of one of 40 ms is nothing
-    assert all(each.high == LARGEST_SECANT and each.low == -np.inf for each in found)
+    assert all(each.direction.high == LARGEST_SECANT and each.direction.low == 0.0 for each in found)
 
 
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:
     made = [Made("cover_stiffness", 1, sign=1), Made("inertia", 1, sign=-1), Made("gravity", 1, sign=0)]
     bounds = {
-        each.effect: (*each.low, *each.high) for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))
+        each.effect: (*each.direction.low, *each.direction.high)
+        for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))
     }
     assert bounds == {"cover_stiffness": (0.0, np.inf), "inertia": (-np.inf, 0.0), "gravity": (-np.inf, np.inf)}
 
@@ -125,10 +119,13 @@ def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None
     arms = np.array([[0.01, 0.01], [0.004, -0.008]])
     reach = np.array([1.0, 0.5])
     found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :4], made), arms, reach)}
-    assert (found["force_gain"].low, found["force_gain"].high) == (-LARGEST_SCALING, LARGEST_SCALING)
-    assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
-    assert found["moment_arm_variation"].high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
-    assert found["load_friction"].high == [np.inf]
+    assert (found["force_gain"].direction.low, found["force_gain"].direction.high) == (
+        -LARGEST_SCALING,
+        LARGEST_SCALING,
+    )
+    assert found["moment_arm"].direction.high == pytest.approx([LARGEST_SCALING * 0.008])
+    assert found["moment_arm_variation"].direction.high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
+    assert found["load_friction"].direction.high == [np.inf]
 
 
 def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> None:
@@ -136,8 +133,10 @@ def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> 
     shapes = ({"stribeck_velocity": 0.1}, {"stribeck_velocity": 0.3}, {"rises": 1.0, "stribeck_velocity": 0.1})
     pulley = tuple({"pulley": 1.0, **shape} for shape in shapes[:2])
     made = [Made("stribeck", 1, 1, shapes=(*shapes, *pulley)), Made("stribeck", 2, 1, shapes=shapes)]
-    found = [each for each in hypotheses_of(candidate_columns(columns[:, :, :8], made)) if each.level == EVERYWHERE]
-    assert [np.flatnonzero(each.mix[:, 0]).tolist() for each in found] == [[0, 3, 5], [1, 4, 6]]
+    found = [
+        each for each in hypotheses_of(candidate_columns(columns[:, :, :8], made)) if each.direction.level == EVERYWHERE
+    ]
+    assert [np.flatnonzero(each.direction.mix[:, 0]).tolist() for each in found] == [[0, 3, 5], [1, 4, 6]]
 
 
 # --- what is a cause --------------------------------------------------------------------------------------------------
@@ -153,13 +152,13 @@ def test_a_cause_is_found_with_its_size_and_its_gain(columns: Numbers, nominal: 
     target = noise(1) + nominal @ np.linspace(-3, 3, 5) + 0.3 * columns[:, :, 2]
     found = selection_of(target, nominal, columns[:, :, :5], APART).best(LEAST_GAIN)
     assert found is not None
-    assert found.hypothesis.key == ("cover_stiffness", 2, None)
-    assert found.judged.magnitudes == pytest.approx([0.3], rel=0.15)
+    assert found.key == ("cover_stiffness", 2, None)
+    assert found.magnitudes == pytest.approx([0.3], rel=0.15)
     assert found.alike == ()
     # variance of the wave over that of the noise, but for what bias and refitting take
     share = 0.3**2 * columns[:, :, 2].var() / (1.0 + 0.3**2 * columns[:, :, 2].var())
-    assert found.gain == pytest.approx(1.0 - np.sqrt(1.0 - share), rel=0.3)
-    assert 0.0 < CERTAIN * found.error < found.gain
+    assert found.gain.value == pytest.approx(1.0 - np.sqrt(1.0 - share), rel=0.3)
+    assert found.gain.low > 0.0
 
 
 def test_what_was_tried_is_left_out(columns: Numbers, nominal: Numbers) -> None:
@@ -167,7 +166,7 @@ def test_what_was_tried_is_left_out(columns: Numbers, nominal: Numbers) -> None:
     selection = selection_of(target, nominal, columns[:, :, :5], APART)
     for tried, effect in (((), "cover_stiffness"), (("cover_stiffness",), "inertia")):
         found = selection.best(LEAST_GAIN, tried)
-        assert found is not None and found.hypothesis.effect == effect
+        assert found is not None and found.effect == effect
     assert selection.best(LEAST_GAIN, ("cover_stiffness", "inertia")) is None
 
 
@@ -176,7 +175,7 @@ def test_what_is_certain_but_not_material_is_no_cause(columns: Numbers, nominal:
     selection = selection_of(target, nominal, columns[:, :, :5], APART)
     first = selection.ranked()[0]
     gain, error = selection.gain(first)
-    assert first.hypothesis.effect == "cover_stiffness"
+    assert first.effect == "cover_stiffness"
     assert CERTAIN * error < gain < LEAST_GAIN
     assert selection.best(LEAST_GAIN) is None
     assert selection.best(0.8 * gain) is not None
@@ -211,7 +210,7 @@ def test_what_cannot_be_told_apart_is_said(columns: Numbers, nominal: Numbers) -
     made = [Made("cover_stiffness", 1), Made("cover_hardening", 1), Made("inertia", 1)]
     found = selection_of(noise(6) + 0.3 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
     assert found is not None
-    assert {found.hypothesis.effect, *(each.effect for each in found.alike)} == {"cover_stiffness", "cover_hardening"}
+    assert {found.effect, *(each.effect for each in found.alike)} == {"cover_stiffness", "cover_hardening"}
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -246,15 +245,15 @@ def test_what_is_beside_explains_nothing_else(columns: Numbers, nominal: Numbers
     made = [Made("backlash", 1), Made("presliding", 1), Made("gravity", 1)]
     target = noise(7) + 0.8 * values[:, :, 0] + 0.3 * values[:, :, 2]
     alone = selection_of(target, nominal, values, made)
-    found = {each.hypothesis.effect: alone.gain(each)[0] for each in alone.ranked()}
+    found = {each.effect: alone.gain(each)[0] for each in alone.ranked()}
     assert found["backlash"] > found["presliding"] > 3 * LEAST_GAIN
-    refused = [each for each in alone.hypotheses if each.effect == "backlash"]
-    beside = Selection(alone.grams, alone.hypotheses, UNSEEN, refused)
-    assert beside.base.sum() == pytest.approx(alone.ranked()[0].error, rel=1e-6)
+    refused = [each for each in alone.causes if each.effect == "backlash"]
+    beside = Selection(alone.grams, alone.causes, UNSEEN, refused)
+    assert beside.base.sum() == pytest.approx(alone.ranked()[0].unseen.sum(), rel=1e-6)
     best = beside.best(LEAST_GAIN)
-    assert best is not None and best.hypothesis.effect == "gravity"
-    assert best.judged.magnitudes == pytest.approx([0.3], rel=0.2)
-    assert "backlash" not in {each.hypothesis.effect for each in beside.ranked()}
+    assert best is not None and best.effect == "gravity"
+    assert best.magnitudes == pytest.approx([0.3], rel=0.2)
+    assert "backlash" not in {each.effect for each in beside.ranked()}
 
 
 # --- places -----------------------------------------------------------------------------------------------------------
@@ -265,8 +264,8 @@ def test_one_effect_at_all_places_is_one_cause(columns: Numbers, nominal: Number
     target = noise(9) + 0.2 * columns[:, :, :4].sum(axis=2)
     found = selection_of(target, nominal, columns[:, :, :4], made).best(LEAST_GAIN)
     assert found is not None
-    assert found.hypothesis.key == ("load_friction", None, None) and len(found.hypothesis.members) == 4
-    assert found.judged.magnitudes == pytest.approx([0.2], rel=0.15)
+    assert found.key == ("load_friction", None, None) and len(found.terms) == 4
+    assert found.magnitudes == pytest.approx([0.2], rel=0.15)
 
 
 @pytest.mark.parametrize(("own", "place"), [((2,), (2, 1)), ((2, 3), (2, None)), ((1, 3), (None, 2))])
@@ -277,7 +276,7 @@ def test_an_effect_of_some_places_is_named_there(
     target = noise(10) + 0.3 * columns[:, :, list(own)].sum(axis=2)
     found = selection_of(target, nominal, columns[:, :, :4], made).best(LEAST_GAIN)
     assert found is not None
-    assert found.hypothesis.key == ("load_friction", *place)
+    assert found.key == ("load_friction", *place)
 
 
 def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) -> None:
@@ -287,8 +286,8 @@ def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) 
     made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
     selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
     best = selection.refined("moment_arm_variation")
-    assert best.hypothesis.tendon == 1
-    assert [each.hypothesis.tendon for each in selection.near(best)] == [2]
+    assert best.tendon == 1
+    assert [each.tendon for each in selection.near(best)] == [2]
 
 
 # --- gains ------------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from command import Call
-from tendonfmu.diagnosis.diagnosis import change_case
+from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.errors import InputError
 from worn_finger import RATE, Columns, described, finger, record, recording, write_files
 
@@ -34,9 +34,8 @@ def one_after_another(first: Columns, second: Columns) -> Columns:
 
 def warnings_of(now: Columns, then: Columns, **data: Any) -> tuple[str, ...]:
     """Of the two recordings beside each other. Raises InputError."""
-    return change_case(
-        finger(described(**data)), [recording(now)], [recording(then, "then.parquet")], [], 3, 0.03, False
-    ).warnings
+    before = [recording(then, "then.parquet")]
+    return read_input(finger(described(**data)), [recording(now)], [], before, 3, 0.03, False).warnings
 
 
 # --- shared samples ---------------------------------------------------------------------------------------------------
@@ -78,7 +77,7 @@ def test_a_recording_of_contact_alone_is_refused(side: str) -> None:
     files = {name: recording(each, f"{name}.parquet") for name, each in columns.items()}
     files[side] = replace(files[side], contact=np.ones(len(NOW["time"]), dtype=bool))
     with pytest.raises(InputError, match=rf"{side}\.parquet.*contact"):
-        change_case(finger(), [files["now"]], [files["then"]], [], 3, 0.03, False)
+        read_input(finger(), [files["now"]], [], [files["then"]], 3, 0.03, False)
 
 
 def test_a_load_beyond_that_of_the_reference_is_warned_of() -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from tendonfmu.diagnosis.changes.gain import gain_of, interval_of
+from tendonfmu.diagnosis.change_search import gain_of, interval_of
 
 Numbers = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ import pytest
 
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.changes.numbers import Number, changed, estimator_of, number_hypotheses, numbers_of
+from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
 from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.effects.description_edit import data_number
-from tendonfmu.diagnosis.hypotheses import EVERYWHERE, HERE, SOMEWHERE, Hypothesis
+from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
 from tendonfmu.estimate.structure import set_number
 from worn_finger import described
 
@@ -61,21 +61,22 @@ def test_every_number_has_an_effect_of_the_contract_and_a_place(seed: int) -> No
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_every_number_can_have_changed(seed: int) -> None:
+def test_every_number_can_have_with_numbers(seed: int) -> None:
     """By itself or with others; and no hypothesis leaves the box of a number."""
     numbers = numbers_of(description(seed))
     first = 7
     found = number_hypotheses(numbers, first + len(numbers), first)
-    assert [each.level for each in found] == sorted(each.level for each in found)
+    assert [each.direction.level for each in found] == sorted(each.direction.level for each in found)
     covered = np.zeros(len(numbers), dtype=bool)
     for each in found:
-        assert each.effect in EFFECTS and not each.members
-        assert not each.mix[:first].any() and each.mix[first:].any(axis=0).all()
-        assert (each.low <= 0.0).all() and (each.high >= 0.0).all()
-        covered |= each.mix[first:].any(axis=1)
-        for bound in (each.low, each.high):
+        assert each.effect in EFFECTS and not each.terms
+        own = each.direction
+        assert not own.mix[:first].any() and own.mix[first:].any(axis=0).all()
+        assert (own.low <= 0.0).all() and (own.high >= 0.0).all()
+        covered |= own.mix[first:].any(axis=1)
+        for bound in (own.low, own.high):
             for k, size in enumerate(bound):
-                moved = each.mix[first:, k] * (size if np.isfinite(size) else 0.0)
+                moved = own.mix[first:, k] * (size if np.isfinite(size) else 0.0)
                 for number, step in zip(numbers, moved, strict=True):
                     slack = 1e-9 * (abs(number.value) + abs(step))  # rounding
                     if each.effect != "asymmetric_friction":
@@ -83,20 +84,20 @@ def test_every_number_can_have_changed(seed: int) -> None:
     assert covered.all()
 
 
-def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Hypothesis]:
+def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Cause]:
     numbers = numbers_of(data)
     return {each.key: each for each in number_hypotheses(numbers, len(numbers), 0)}
 
 
 def test_places_of_one_effect_can_have_changed_together() -> None:
     found = by_key(described())
-    levels = {key: each.level for key, each in found.items() if key[0] == "edge_friction"}
+    levels = {key: each.direction.level for key, each in found.items() if key[0] == "edge_friction"}
     assert levels == {
         ("edge_friction", None, None): EVERYWHERE,
         ("edge_friction", 1, 1): HERE,
         ("edge_friction", 1, 2): HERE,
     }
-    levels = {key: each.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
+    levels = {key: each.direction.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
     assert levels[("edge_friction", None, None)] == EVERYWHERE
     assert {key[1:] for key, level in levels.items() if level == SOMEWHERE} == {
         (1, None),
@@ -111,7 +112,7 @@ def test_both_sides_of_a_law_change_alike_or_against_each_other() -> None:
     data = described(friction=friction)
     numbers = numbers_of(data)
     found = by_key(data)
-    same, against = (found[(effect, 1, None)] for effect in ("joint_friction", "asymmetric_friction"))
+    same, against = (found[(effect, 1, None)].direction for effect in ("joint_friction", "asymmetric_friction"))
     own = {each.path: each for each in numbers if each.effect == "joint_friction"}
     for path, number in own.items():
         assert same.mix[number.index, 0] == pytest.approx(number.value), path
@@ -126,7 +127,7 @@ def test_both_sides_of_a_law_change_alike_or_against_each_other() -> None:
 def test_nothing_added_changes_nothing(seed: int) -> None:
     data = description(seed)
     before = copy.deepcopy(data)
-    assert changed(data, np.zeros(len(numbers_of(data)))) == data == before
+    assert with_numbers(data, np.zeros(len(numbers_of(data)))) == data == before
 
 
 def moved_paths(before: Description, after: Description) -> set[str]:
@@ -146,7 +147,7 @@ def test_adding_to_a_number_moves_it_alone(seed: int) -> None:
             continue
         added = np.zeros(len(numbers))
         added[each.index] = room
-        moved = moved_paths(data, after := changed(data, added))
+        moved = moved_paths(data, after := with_numbers(data, added))
         assert own_paths(each) >= moved and each.path in moved, (each.path, moved)
         assert data == before
         again = numbers_of(after)[each.index]
@@ -165,7 +166,7 @@ def test_static_friction_follows_coulomb_friction() -> None:
     assert number.place == Place(1)
     added = np.zeros(len(numbers_of(data)))
     added[number.index] = 0.003
-    after = changed(data, added)
+    after = with_numbers(data, added)
     expected = copy.deepcopy(data)
     for name in ("static", "coulomb"):
         set_number(expected, f"joints[1].friction.{name}", after["joints"][0]["friction"]["coulomb"])
@@ -177,5 +178,5 @@ def test_what_is_added_stays_in_the_box() -> None:
     data = described()
     numbers = numbers_of(data)
     for sign in (1.0, -1.0):
-        for each in numbers_of(changed(data, sign * np.full(len(numbers), 1e6))):
+        for each in numbers_of(with_numbers(data, sign * np.full(len(numbers), 1e6))):
             assert each.low <= each.value <= each.high

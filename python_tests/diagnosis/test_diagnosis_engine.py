@@ -17,18 +17,17 @@ from numpy.typing import NDArray
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
+from tendonfmu.diagnosis.cause import Cause, Direction, Where, with_error
 from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.diagnosis.diagnosis import PHASES
-from tendonfmu.diagnosis.effects import Place, by_name
-from tendonfmu.diagnosis.effects.presliding import is_spring, usual_time
-from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings, FittedModel
+from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.effects.shapes import is_spring, usual_time
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numbers
+from tendonfmu.diagnosis.extension_search import ExtensionSearch, Trial
 from tendonfmu.diagnosis.gain import residual_of as online_residual
-from tendonfmu.diagnosis.hypotheses import HERE, Hypothesis
-from tendonfmu.diagnosis.named_cause import NamedCause
-from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
-from tendonfmu.diagnosis.search import _Rounds, _Trial, search
+from tendonfmu.diagnosis.search import search
 from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid
 from tendonfmu.diagnosis.signal_choice import choose, least_sizes
 from tendonfmu.diagnosis.span import span_of
@@ -38,7 +37,6 @@ from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance, image_from_json
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.intervals import Interval
 from tendonfmu.statistics.splines import residual_of
 from tendonfmu.tasks.phases import Phases
 
@@ -166,7 +164,7 @@ def test_a_pretension_that_stands_still_tells_no_delay(sound: FitRecording) -> N
 
 def scanned(made: FitRecording) -> Any:
     grid = make_grid([made])
-    nominal = fitted(finger(), [made], FitSettings(threads=1))
+    nominal = fit_numbers(finger(), [made], FitSettings(threads=1))
     return scan(nominal.data, [made], grid, 0.004)
 
 
@@ -227,10 +225,14 @@ def test_what_is_not_trained_on_is_not_judged(hidden: FitRecording) -> None:
 # --- causes -----------------------------------------------------------------------------------------------------------
 
 
-def named(effect: str, place: Place, p_value: float, *others: str) -> NamedCause:
-    alike = tuple(Hypothesis(each, 1, None, HERE, (), *np.zeros((3, 1))) for each in others)
-    accepted = Accepted(by_name(effect), place, {}, (1.0,))
-    return NamedCause(effect, place.joint, place.tendon, (accepted,), 0.1, 0.01, p_value, alike)
+def named(effect: str, place: Place, p_value: float, *others: str) -> Cause:
+    return Cause(
+        Where(effect, place.joint, place.tendon),
+        p_value=p_value,
+        gain=with_error(0.1, 0.01),
+        terms=(Term(by_name(effect), place, {}, (1.0,)),),
+        alike=tuple(Cause(Where(each, 1)) for each in others),
+    )
 
 
 def test_places_of_one_effect_are_one_cause() -> None:
@@ -244,16 +246,10 @@ def test_places_of_one_effect_are_one_cause() -> None:
     )
     load, gravity = found
     assert load.key == ("load_friction", 1, None) and gravity.key == ("gravity", None, None)
-    assert [each.place for each in load.accepted] == [Place(1, 1), Place(1, 2)]
+    assert [each.place for each in load.terms] == [Place(1, 1), Place(1, 2)]
     assert load.p_value == 1e-6
     # each of the places has its own rivals; what is named itself is none
     assert [each.effect for each in load.alike] == ["moment_arm", "force_gain", "inertia"]
-
-
-def test_an_interval_is_the_measured_one_once_there_is_one() -> None:
-    cause = named("gravity", Place(1), 1e-2)
-    assert cause.interval == Interval(0.1, pytest.approx(0.1 - 0.0196), pytest.approx(0.1 + 0.0196))
-    assert replace(cause, measured=Interval(0.2, 0.1, 0.3)).interval == Interval(0.2, 0.1, 0.3)
 
 
 def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
@@ -272,36 +268,32 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     assert "causes" in seen and "contact" in seen
 
 
-class Fitted(_Rounds):
+class Fitted(ExtensionSearch):
     """Rounds whose fits leave what is said here, by effect; None: the fit bears nothing out."""
 
     def __init__(self, errors: Mapping[str, float | None], causes: Sequence[str] = ()) -> None:
         self.errors, self.tried = errors, list[str]()
         self.causes = [named(each, Place(), 1e-9) for each in causes]
 
-    def _named(self, judged: Any, selection: Any) -> NamedCause:
-        return replace(named(judged.hypothesis.effect, Place(1), 1e-9), hypothesis=judged.hypothesis)
+    def _named(self, cause: Cause, selection: Any) -> Cause:
+        return replace(named(cause.effect, Place(1), 1e-9), direction=cause.direction)
 
-    def _tried(self, cause: NamedCause) -> _Trial:
+    def _tried(self, cause: Cause) -> Trial:
         self.tried.append(cause.effect)
         error = self.errors[cause.effect]
         noise = np.random.default_rng(3).uniform(0.9, 1.1, 20)
         model = None if error is None else FittedModel({}, {}, {}, {}, 0.0)
-        return _Trial(cause, model, np.array([np.inf]) if error is None else error * noise)
+        return Trial(cause, model, np.array([np.inf]) if error is None else error * noise)
 
 
 def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
     """The cause that is taken, and its rivals, where columns cannot tell the first from the others."""
 
-    def of(effect: str) -> Hypothesis:
-        return Hypothesis(effect, 1, None, HERE, (), *np.zeros((3, 1)))
+    def of(effect: str) -> Cause:
+        return Cause(Where(effect, 1), direction=Direction(*np.zeros((3, 1))))
 
-    class Columns:
-        def refined(self, effect: str) -> Any:
-            return SimpleNamespace(hypothesis=of(effect))
-
-    picked: Any = SimpleNamespace(judged=Columns().refined(first), hypothesis=of(first), alike=tuple(map(of, alike)))
-    cause = rounds._best_fitted(Columns(), picked).cause  # type: ignore[arg-type]
+    columns: Any = SimpleNamespace(refined=of)
+    cause = rounds._best_fitted(columns, replace(of(first), alike=tuple(map(of, alike)))).cause
     return cause.effect, [each.effect for each in cause.alike]
 
 
@@ -315,7 +307,7 @@ def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, take
     rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)))  # type: ignore[assignment]
     rounds._runs_better = lambda model: True  # type: ignore[method-assign]
     rounds._look = lambda model, candidates: rounds.view  # type: ignore[method-assign]
-    assert rounds._take(_Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
+    assert rounds._take(Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
     assert len(rounds.causes) == len(rounds.models) == int(taken)
 
 

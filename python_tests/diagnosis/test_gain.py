@@ -19,9 +19,8 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.diagnosis.contact_gain import detection_gain
-from tendonfmu.diagnosis.effects import CANDIDATES, Place
+from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
 from tendonfmu.diagnosis.extension_fit import (
-    Accepted,
     FitSettings,
     cause_parameters,
     extended_description,
@@ -68,9 +67,9 @@ def prepared(truth: dict[str, Any], seed: int, holdout: float = 0.0, seconds: fl
     return prepare(described(nominal()), recorded(json.dumps(truth), seed, seconds), 3, Held(holdout, 2.0))
 
 
-def accepted(name: str, place: Place, magnitudes: list[float], **shape: float) -> Accepted:
+def accepted(name: str, place: Place, magnitudes: list[float], **shape: float) -> Term:
     candidate = next(each for each in CANDIDATES if each.name == name)
-    return Accepted(candidate, place, shape, magnitudes)
+    return Term(candidate, place, shape, magnitudes)
 
 
 # --- the interval -----------------------------------------------------------------------------------------------------

@@ -14,10 +14,9 @@ import pytest
 
 from dask_on_loopback import dask_processes
 from real_browser import Elements
-from tendonfmu.diagnosis.changes import history as change_history
-from tendonfmu.diagnosis.changes.history import History, Line, Size, diagnose_history, share_of, times_of
-from tendonfmu.diagnosis.changes.trend import slope
-from tendonfmu.diagnosis.result import ChangedSize, Where
+from tendonfmu.diagnosis import history as change_history
+from tendonfmu.diagnosis.cause import ChangedSize, Where
+from tendonfmu.diagnosis.history import History, Line, Size, diagnose_history, share_of, slope, times_of
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import finite
 from tendonfmu.report.diagnosis_text import Names

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.diagnosis.effects import CANDIDATES, Place
+from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
 from tendonfmu.diagnosis.experiments.discrimination import discriminating_motion
 from tendonfmu.diagnosis.experiments.menu import (
     WIDER,
@@ -25,7 +25,7 @@ from tendonfmu.diagnosis.experiments.menu import (
 )
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.diagnosis.extension_fit import Accepted, FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
@@ -68,8 +68,8 @@ def recording_of(data: dict[str, Any], entry: Entry, seed: int = 0, noise: float
     return replace(found, target=target, recording=replace(found.recording, groups=groups))
 
 
-def accepted(name: str, place: Place, magnitudes: tuple[float, ...] = ()) -> Accepted:
-    return Accepted(next(each for each in CANDIDATES if each.name == name), place, {}, magnitudes)
+def accepted(name: str, place: Place, magnitudes: tuple[float, ...] = ()) -> Term:
+    return Term(next(each for each in CANDIDATES if each.name == name), place, {}, magnitudes)
 
 
 JOINT, LOAD = accepted("joint_friction", Place(2), (0.004, 0.0)), accepted("joint_load_friction", Place(2), (1e-4, 0.0))
@@ -229,6 +229,6 @@ def test_a_wrong_folder_is_refused(planned: Experiments, tmp_path: Path) -> None
 def test_no_question_no_experiment() -> None:
     old = recording_of(FINGER, usual(10.0))
     assert plan_experiments(FINGER, [old], []).best.sentence == ""
-    nowhere = Accepted(GAIN.candidate, Place(tendon=9))
+    nowhere = Term(GAIN.candidate, Place(tendon=9))
     with pytest.raises((InternalError, IndexError, NativeError)):  # a fault of who asks, not of an input
         plan_experiments(FINGER, [old], [Question(nowhere)])

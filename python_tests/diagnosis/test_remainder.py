@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 
 from repetitions import repeated
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
+from tendonfmu.diagnosis.pictures import residual_views, whiteness
 from tendonfmu.diagnosis.remainder import measure_remainder
-from tendonfmu.diagnosis.residual_views import residual_views, whiteness
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.splines import bias_splines
 

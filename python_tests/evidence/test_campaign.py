@@ -13,11 +13,11 @@ from evidence.diagnosis.campaign import STRENGTHS, judged, markdown, mean, plann
 from evidence.diagnosis.makers import Case, Made
 from evidence.judge import Truth
 from optional_parts import require
-from tendonfmu.diagnosis.result import FoundPlace, Where
+from tendonfmu.diagnosis.cause import CausePlace, Where
 
 
-def cause(effect: str, joint: int | None = 1, *others: Where, places: tuple[FoundPlace, ...] = ()) -> Any:
-    places = places or (FoundPlace(joint, None, {}),)
+def cause(effect: str, joint: int | None = 1, *others: Where, places: tuple[CausePlace, ...] = ()) -> Any:
+    places = places or (CausePlace(joint, None, {}),)
     return SimpleNamespace(effect=effect, joint=joint, tendon=None, places=places, confusable_with=others)
 
 
@@ -91,7 +91,7 @@ def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
     assert answer(cause("joint_coupling", 1, *others)) == (True, True, False, 3, True, False)
     assert answer(cause("inertia")) == (True, False, False, 1, None, False)
     assert answer(verdict="unexplained") == (True, False, False, None, None, True)
-    places = (FoundPlace(2, None, {}), FoundPlace(1, None, {}))
+    places = (CausePlace(2, None, {}), CausePlace(1, None, {}))
     assert answer(cause("gravity", None, places=places)) == (True, True, True, 1, True, False)
 
 

@@ -26,7 +26,7 @@ from evidence.diagnosis.rival_methods import (
 from evidence.diagnosis.rivals import Answer, judged, markdown, rival_answers
 from evidence.judge import Truth
 from optional_parts import require
-from tendonfmu.diagnosis.result import Where
+from tendonfmu.diagnosis.cause import Where
 
 ARMS = np.array([[0.01, 0.008], [-0.01, 0.008], [0.0, -0.009]])
 STEP = 0.01

@@ -21,9 +21,10 @@ from matplotlib.image import imread
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
 from repetitions import repeated
+from tendonfmu.diagnosis.cause import CausePlace, Where
 from tendonfmu.diagnosis.reported import reported_causes
-from tendonfmu.diagnosis.result import Diagnosis, FoundPlace, ModelErrors, Where
-from tendonfmu.diagnosis.size import size_of
+from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
+from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.report.diagnosis_files import build_report, report_text
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import (
@@ -233,7 +234,7 @@ def test_a_change_is_told_in_words_of_its_own() -> None:
     ],
 )
 def test_a_size_is_told_in_units_that_suit(effect: str, numbers: dict[str, tuple[float, str]], words: str) -> None:
-    place = FoundPlace(1, None, {f"extensions[1].{name}": number for name, number in numbers.items()})
+    place = CausePlace(1, None, {f"extensions[1].{name}": number for name, number in numbers.items()})
     assert words in size_of(effect, [place], THRESHOLDS).replace("\u00a0", " ")
 
 
@@ -247,7 +248,7 @@ def test_a_size_is_told_in_units_that_suit(effect: str, numbers: dict[str, tuple
 )
 def test_the_size_of_several_places(effect: str, numbers: list[tuple[float, str]], words: str) -> None:
     name = "displacement" if effect == "presliding" else "coulomb"
-    places = [FoundPlace(None, k, {f"extensions[{k}].{name}": number}) for k, number in enumerate(numbers, start=1)]
+    places = [CausePlace(None, k, {f"extensions[{k}].{name}": number}) for k, number in enumerate(numbers, start=1)]
     assert words in size_of(effect, places, THRESHOLDS).replace("\u00a0", " ")
     assert size_of(effect, [replace(place, parameters={}) for place in places], THRESHOLDS) == ""
 

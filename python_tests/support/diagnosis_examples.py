@@ -14,21 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.diagnosis.cause import Cause, CausePlace, ChangedSize, Evidence, Where
 from tendonfmu.diagnosis.result import (
-    Cause,
-    ChangedSize,
     DetectionGain,
     Diagnosis,
     Event,
-    Evidence,
     Experiment,
-    FoundPlace,
     Invisible,
     ModelErrors,
     ResidualView,
     SteadyLoad,
     Unexplained,
-    Where,
 )
 from tendonfmu.statistics.intervals import Interval
 
@@ -134,7 +130,7 @@ GRAVITY = Cause(
     gain=Interval(0.31, 0.27, 0.35),
     confusable_with=(Where("cover_stiffness", joint=2), Where("moment_arm", joint=2, tendon=1)),
     parameters={"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")},
-    places=(FoundPlace(2, None, {"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")}),),
+    places=(CausePlace(2, None, {"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")}),),
     size="12.6 mN·m at most",
     evidence=(evidence(2, "angle of joint 2", "rad", (-0.4, 0.9), lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)),),
 )
@@ -148,8 +144,8 @@ LOAD_FRICTION = Cause(
     confusable_with=(),
     parameters={"extensions[2].coulomb": (2.3e-4, "m"), "extensions[3].coulomb": (1.1e-4, "m")},
     places=(
-        FoundPlace(1, 3, {"extensions[2].coulomb": (2.3e-4, "m")}),
-        FoundPlace(1, 4, {"extensions[3].coulomb": (1.1e-4, "m")}),
+        CausePlace(1, 3, {"extensions[2].coulomb": (2.3e-4, "m")}),
+        CausePlace(1, 4, {"extensions[3].coulomb": (1.1e-4, "m")}),
     ),
     size="0.23 mN·m of friction for each newton of tendon force at the largest of 2 places",
     evidence=(evidence(1, "tendon force", "N", (4.0, 24.0), lambda f: 2.3e-4 * (f - 11.0)),),
@@ -164,7 +160,7 @@ DRIFT = Cause(
     confusable_with=(Where("force_gain", tendon=2), Where("asymmetric_friction", joint=1)),
     parameters={"extensions[4].amplitude": (-0.18, "1"), "extensions[4].time_constant": (22.0, "s")},
     places=(
-        FoundPlace(None, None, {"extensions[4].amplitude": (-0.18, "1"), "extensions[4].time_constant": (22.0, "s")}),
+        CausePlace(None, None, {"extensions[4].amplitude": (-0.18, "1"), "extensions[4].time_constant": (22.0, "s")}),
     ),
     size="18 % less friction in the end, with a time constant of 22 s",
     evidence=(evidence(1, "time", "s", (0.0, 60.0), lambda t: 0.0021 * (np.exp(-t / 22.0) - 0.3)),),
@@ -179,7 +175,7 @@ SMALL = Cause(
     confusable_with=(),
     parameters={},
     size="",
-    places=(FoundPlace(2, None, {}),),
+    places=(CausePlace(2, None, {}),),
 )
 
 INVISIBLE = (
@@ -392,7 +388,7 @@ def many_joints() -> Diagnosis:
             where=Where("edge_friction", j, t),
             title="a tendon rubs at an edge before a joint",
             parameters={f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")},
-            places=(FoundPlace(j, t, {f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")}),),
+            places=(CausePlace(j, t, {f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")}),),
             size="2.1 % of the tendon force",
             evidence=tuple(replace(each, joint=j) for each in cause.evidence[:1]),
         )
@@ -434,7 +430,7 @@ def changed() -> Diagnosis:
         explanation="The tendon rubs on the pulley of this joint.",
         gain=Interval(0.42, 0.38, 0.46),
         parameters={path: (0.036, "1")},
-        places=(FoundPlace(1, 1, {path: (0.036, "1")}),),
+        places=(CausePlace(1, 1, {path: (0.036, "1")}),),
         size="+20 %: 3 % then, 3.6 % now",
         evidence=tuple(_with_reference(each) for each in GRAVITY.evidence),
         changed=ChangedSize("coulomb", "1", Interval(0.03, 0.03, 0.03), grown[1], _less(grown[1], 0.03), tuple(grown)),

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Shape
-from tendonfmu.diagnosis.effects import Place, by_name
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
+from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.block_grams import Grams, Products
@@ -88,14 +88,13 @@ def candidate_columns(values: Array, made: Sequence[Made]) -> CandidateColumns:
     """values: [B, n, c], column after column of what is made."""
     first, proposals = 0, []
     for each in made:
-        shapes = []
         for shape in each.shapes:
-            columns = slice(first, first + each.size)
-            signs, paths = (each.sign,) * each.size, ("",) * each.size
             expected = tuple(each.expected) * (each.size if len(each.expected) == 1 else 1)
-            shapes.append(Shape(shape, columns, paths, signs, expected, each.secant))
+            columns = tuple(Column({"": 1.0}, each.sign, size) for size in expected)
+            variant = Variant({}, shape, secant_rows=({},)) if each.secant else Variant({}, shape, columns)
+            place = Place(each.joint, each.tendon)
+            proposals.append(Proposal(by_name(each.effect), place, variant, slice(first, first + each.size)))
             first += each.size
-        proposals.append(Proposal(by_name(each.effect), Place(each.joint, each.tendon), tuple(shapes)))
     assert first == values.shape[2]
     names = [str(k) for k in range(first)]
     nothing = np.zeros((*values.shape[:2], 0), dtype=np.float32)

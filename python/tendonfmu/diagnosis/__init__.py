@@ -1,10 +1,12 @@
 """Find what a model gets wrong, which cause it has, and what correcting it gains (`tendonfmu diagnose`).
 
-- `series` averages recordings over blocks of time.
-- `search` adds one cause after the other, from the candidates in `effects`.
-- `extension_fit` fits the extended finger; `gain` measures on unseen data; `diagnosis` runs all of these steps.
-- `experiments` finds what to record next.
-- `changes` compares with reference recordings.
+- `series` averages recordings over blocks of time; `cause_search` turns a description and recordings into columns.
+- `cause` is what the search names, from the candidate that is tried to the page.
+- `selection` judges candidates; `extension_search` adds what a description lacks, `change_search` what has changed
+  since a reference.
+- `extension_fit` fits the extended finger; `gain` and `cause_gains` measure on unseen data.
+- `extension_diagnosis` and `change_diagnosis` report; `diagnosis` begins.
+- `experiments` finds what to record next; `effects` holds the table of effects.
 """
 
 from typing import TYPE_CHECKING
@@ -12,32 +14,22 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from .cause import Cause, CausePlace, ChangedSize, Evidence, Where
     from .cause_search import predicted_of, series_of
-    from .changes.history import History, Line, diagnose_history, share_of
     from .diagnosis import diagnose
     from .effects import CANDIDATES
-    from .effects.friction_law_places import thresholds
+    from .effects.places import thresholds
+    from .effects.words import NBSP, quantity
+    from .events import events_of, without_blocks
     from .experiments.discrimination import discriminating_motion
     from .extension_fit import FitSettings, learn_numbers
     from .gain import residual_of, squared_residual
+    from .history import History, Line, diagnose_history, share_of
     from .reported import CONTACT, TITLES, UNKNOWN, reported_causes
-    from .result import (
-        Cause,
-        ChangedSize,
-        DetectionGain,
-        Diagnosis,
-        Event,
-        Evidence,
-        Experiment,
-        FoundPlace,
-        Invisible,
-        ResidualView,
-        Where,
-    )
-    from .search import events_of, without_blocks
+    from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
     from .series import make_grid
     from .signal_choice import estimation_recordings
-    from .size import NBSP, quantity, size_at
+    from .sizes import size_at
     from .sliding import settled, without_stuck
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

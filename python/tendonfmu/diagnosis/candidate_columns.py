@@ -32,30 +32,13 @@ _MOST_MEMORY = 8.0  # GB, for all columns
 
 
 @dataclass(frozen=True)
-class Shape:
-    """A candidate at one point of its grid."""
-
-    shape: Mapping[str, float]  # its non-linear numbers
-    columns: slice  # where its columns are in `CandidateColumns.values`
-    paths: tuple[str, ...]  # for each column, the first number that it moves
-    signs: tuple[int, ...]  # expected sign of each magnitude, 0 for either
-    expected: tuple[float, ...]  # magnitudes of an ordinary effect
-    # whether the column is the difference that the term makes at full strength; the expected magnitude is then 1
-    secant: bool
-
-
-@dataclass(frozen=True)
 class Proposal:
-    """A candidate at a place, with its grid."""
+    """A candidate at a place and one point of its grid."""
 
     candidate: Candidate
     place: Place
-    shapes: tuple[Shape, ...]
-
-    @property
-    def columns(self) -> slice:
-        """All of its columns."""
-        return slice(self.shapes[0].columns.start, self.shapes[-1].columns.stop)
+    variant: Variant
+    columns: slice  # where its columns are in `CandidateColumns.values`
 
 
 @dataclass(frozen=True)
@@ -67,7 +50,7 @@ class CandidateColumns:
     nominal_names: list[str]  # names [u]; a law's numbers are coulomb, drop, rate (1/Stribeck velocity) and viscous
     values: Single  # columns of the candidates [B, n, c]
     names: list[str]  # names [c]
-    proposals: tuple[Proposal, ...]  # which columns belong to which candidate and place
+    proposals: tuple[Proposal, ...]  # which columns belong to which candidate, place and shape
 
 
 def candidate_columns(
@@ -82,18 +65,20 @@ def candidate_columns(
 ) -> CandidateColumns:
     """Compute the columns of the description and of all candidates that it lacks."""
     plain = without_uncertainty(data)
-    found_span = span_of(plain, recordings) if span is None else span
-    proposed = list(_proposed(plain, recordings[0].kinematics, found_span, candidates, worth))
     names, nominal = nominal_directions(plain)
-    variants = [variant for _, _, variants in proposed for variant in variants]
     joints, u = len(data["joints"]), len(names)
-    firsts = np.cumsum([u, *(variant.count for variant in variants)]).tolist()
-    _refuse_too_many(blocks.count * joints * firsts[-1] * 4 / 1e9, firsts[-1])
-    work = _Work(plain, recordings, blocks, np.zeros((blocks.count, joints, firsts[-1]), dtype=np.float32), progress)
-    work.plan(nominal, list(zip(variants, firsts, strict=False)))
+    proposals = list(
+        _proposed(
+            plain, recordings[0].kinematics, span_of(plain, recordings) if span is None else span, candidates, worth
+        )
+    )
+    count = u + (proposals[-1].columns.stop if proposals else 0)
+    _refuse_too_many(blocks.count * joints * count * 4 / 1e9, count)
+    work = _Work(plain, recordings, blocks, np.zeros((blocks.count, joints, count), dtype=np.float32), progress)
+    work.plan(nominal, [(proposal.variant, u + proposal.columns.start) for proposal in proposals])
     prediction = work.run()
-    proposals, labels = _labelled(proposed)
-    return CandidateColumns(prediction, work.values[:, :, :u], names, work.values[:, :, u:], labels, proposals)
+    labels = [label for proposal in proposals for label in _labels(proposal)]
+    return CandidateColumns(prediction, work.values[:, :, :u], names, work.values[:, :, u:], labels, tuple(proposals))
 
 
 class _Work:
@@ -173,14 +158,14 @@ def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _proposed(
     data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
-) -> Iterator[tuple[Candidate, Place, list[Variant]]]:
+) -> Iterator[Proposal]:
+    first = 0
     for candidate in candidates:
         for place in candidate.places(data, kinematics):
-            variants = [variant for variant in candidate.variants(data, place, span) if _is_sane(variant)]
-            if worth is not None:
-                variants = [variant for variant in variants if worth(candidate, place, variant.shape)]
-            if variants:
-                yield candidate, place, variants
+            for variant in candidate.variants(data, place, span):
+                if _is_sane(variant) and (worth is None or worth(candidate, place, variant.shape)):
+                    yield Proposal(candidate, place, variant, slice(first, first + variant.count))
+                    first += variant.count
 
 
 def _is_sane(variant: Variant) -> bool:
@@ -203,24 +188,10 @@ def _bundles(secants: Sequence[tuple[Variant, int]]) -> list[list[tuple[Variant,
     return bundles
 
 
-def _labelled(proposed: Sequence[tuple[Candidate, Place, list[Variant]]]) -> tuple[tuple[Proposal, ...], list[str]]:
-    proposals: list[Proposal] = []
-    labels: list[str] = []
-    for candidate, place, variants in proposed:
-        shapes = []
-        for variant in variants:
-            columns = slice(len(labels), len(labels) + variant.count)
-            secant = bool(variant.secant_rows)
-            expected = (1.0,) if secant else tuple(column.expected for column in variant.columns)
-            paths = ("",) if secant else variant.paths
-            shapes.append(Shape(variant.shape, columns, paths, variant.signs, expected, secant))
-            labels += [_label(candidate, place, variant, path) for path in paths]
-        proposals.append(Proposal(candidate, place, tuple(shapes)))
-    return tuple(proposals), labels
-
-
-def _label(candidate: Candidate, place: Place, variant: Variant, path: str) -> str:
-    parts = (("joint", place.joint), ("tendon", place.tendon))
+def _labels(proposal: Proposal) -> Iterator[str]:
+    """Yield a name for each column of a proposal."""
+    parts = (("joint", proposal.place.joint), ("tendon", proposal.place.tendon))
     where = [f"{word} {number}" for word, number in parts if number is not None]
-    numbers = [f"{key} {value:.4g}" for key, value in variant.shape.items()]
-    return ", ".join([candidate.name, *where, *numbers, *([path] if path else [])])
+    numbers = [f"{key} {value:.4g}" for key, value in proposal.variant.shape.items()]
+    for path in proposal.variant.paths:
+        yield ", ".join([proposal.candidate.name, *where, *numbers, *([path] if path else [])])

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
 from tendonfmu.diagnosis.cause_search import look, predicted_of, series_of
-from tendonfmu.diagnosis.cause_selection import names_with
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import Gain, measure_gain, squared_residual
-from tendonfmu.diagnosis.hypotheses import Hypothesis
-from tendonfmu.diagnosis.named_cause import NamedCause, is_shown
-from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.search import Search
+from tendonfmu.diagnosis.selection import by_gain, confirmed, names_with
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
 from tendonfmu.estimate import get_number
@@ -26,18 +24,15 @@ from tendonfmu.statistics import Interval, gain_interval
 
 # Times the least gain where everything slides: what is left there is small, and the form of any law is a part of it.
 STRICTER = 5.0
-Parameters = Mapping[str, tuple[float, str]]
 
 
 @dataclass(frozen=True)
 class Verified:
     """The causes that unseen data confirm."""
 
-    causes: tuple[NamedCause, ...]  # in order of gain, the largest first; places of one effect are one cause
-    gains: tuple[Interval, ...]  # of each cause
-    parameters: tuple[tuple[Parameters, ...], ...]  # numbers of each place of each cause
+    causes: tuple[Cause, ...]  # in order of gain, the largest first; places of one effect are one cause
     without: tuple[FittedModel, ...]  # for each cause, the fit that lacks it
-    dropped: tuple[NamedCause, ...]  # causes that unseen data do not confirm
+    dropped: tuple[Cause, ...]  # causes that unseen data do not confirm
     gain: Gain
     nominal_data: Data  # descriptions as they run online
     extended_data: Data
@@ -56,41 +51,34 @@ def verify(
 ) -> Verified:
     """Measure the gain of each cause on unseen data and drop the weak ones."""
     bench = _Bench(given, result, training, tests, settings, seed)
-    if result.only_sliding:
-        least_gain *= STRICTER
-    causes, dropped = merged(result.causes), []
-    while True:
-        fit = bench.fit(causes)
-        without = [bench.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
+    least_gain *= STRICTER if result.only_sliding else 1.0
+
+    def judge(causes: list[Cause]) -> tuple[list[Cause], list[int]]:
+        fit, without = bench.fit(causes), bench.each_without(causes)
         gains = bench.gains(fit, without)
         names = _names(causes, gains)
         weak = [
             k
-            for k, gain in enumerate(gains)
+            for k, (cause, gain) in enumerate(zip(causes, gains, strict=True))
             if not (
                 gain.low > 0.0
                 and gain.value >= least_gain * names[k]
                 and bench.runs_better(fit, without[k])
-                and is_shown(causes[k], fit.data, result.estimation.least)
+                and result.estimation.least.shows_all(cause.effect, cause.terms, fit.data)
             )
         ]
         if not weak and causes and not bench.is_sound(causes):
             weak = list(range(len(causes)))  # each corrects what another one spoils
-        if not weak:
-            break
-        worst = min(weak, key=lambda k: gains[k].value)
-        dropped.append(replace(causes[worst], measured=gains[worst]))
-        causes = [*causes[:worst], *causes[worst + 1 :]]
-    order = sorted(range(len(causes)), key=lambda k: -gains[k].value)
-    ranked = [causes[k] for k in order]
-    between = [bench.online(bench.result(ranked[: k + 1])) for k in range(len(ranked) - 1)]
+        return [replace(cause, gain=gain) for cause, gain in zip(causes, gains, strict=True)], weak
+
+    causes, dropped = confirmed(merged(result.causes), judge)
     fit, nominal = bench.result(causes), bench.online(bench.nominal)
     extended = bench.online(fit) if causes else nominal
+    ranked = by_gain(_with_places(bench.nominal, fit, causes))
+    between = [bench.online(bench.result(ranked[: k + 1])) for k in range(len(ranked) - 1)]
     return Verified(
         causes=tuple(ranked),
-        gains=tuple(gains[k] for k in order),
-        parameters=_parameters(bench.nominal, fit, causes, order),
-        without=tuple(without[k] for k in order),
+        without=tuple(bench.each_without(ranked)),
         dropped=tuple(dropped),
         gain=measure_gain(nominal, extended, training, tests, between=between, seed=seed),
         nominal_data=nominal,
@@ -100,7 +88,7 @@ def verify(
     )
 
 
-def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]:
+def _names(causes: Sequence[Cause], gains: Sequence[Interval]) -> list[int]:
     """Return, for each cause, the number of names up to and including it, the largest gain first."""
     counts, named = [1] * len(causes), list[str]()
     for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
@@ -109,41 +97,45 @@ def _names(causes: Sequence[NamedCause], gains: Sequence[Interval]) -> list[int]
     return counts
 
 
-def merged(causes: Sequence[NamedCause]) -> list[NamedCause]:
+def merged(causes: Sequence[Cause]) -> list[Cause]:
     """Merge the places of one effect into one cause."""
-    by_effect: dict[str, NamedCause] = {}
+    by_effect: dict[str, Cause] = {}
     for cause in causes:
         known = by_effect.get(cause.effect)
         if known is None:
             by_effect[cause.effect] = cause
             continue
+        joint = known.joint if known.joint == cause.joint else None
+        tendon = known.tendon if known.tendon == cause.tendon else None
         by_effect[cause.effect] = replace(
             known,
-            joint=known.joint if known.joint == cause.joint else None,
-            tendon=known.tendon if known.tendon == cause.tendon else None,
-            accepted=(*known.accepted, *cause.accepted),
+            where=Where(cause.effect, joint, tendon),
+            terms=(*known.terms, *cause.terms),
             p_value=min(known.p_value, cause.p_value),
             alike=(*known.alike, *cause.alike),
         )
     return [replace(cause, alike=_rivals(cause, by_effect)) for cause in by_effect.values()]
 
 
-def _rivals(cause: NamedCause, named: Collection[str]) -> tuple[Hypothesis, ...]:
-    """Return the best hypothesis of every other effect."""
-    rivals: dict[str, Hypothesis] = {}
+def _rivals(cause: Cause, named: Collection[str]) -> tuple[Cause, ...]:
+    """Return the best rival of every effect that is not named itself."""
+    rivals: dict[str, Cause] = {}
     for other in cause.alike:
         if other.effect not in named:
             rivals.setdefault(other.effect, other)
     return tuple(rivals.values())
 
 
-def _parameters(
-    nominal: FittedModel, model: FittedModel, causes: Sequence[NamedCause], order: Sequence[int]
-) -> tuple[tuple[Parameters, ...], ...]:
-    """Return the numbers of each place of each cause, in this order."""
-    parameters = iter(cause_parameters(nominal.data, [term for cause in causes for term in cause.accepted], model))
-    by_cause = [tuple(next(parameters) for _ in cause.accepted) for cause in causes]
-    return tuple(by_cause[k] for k in order)
+def _with_places(nominal: FittedModel, model: FittedModel, causes: Sequence[Cause]) -> list[Cause]:
+    """Return the causes with the numbers of each of their places in a model that was fitted with all of them."""
+    numbers = iter(cause_parameters(nominal.data, [term for cause in causes for term in cause.terms], model))
+    return [
+        replace(
+            cause,
+            places=tuple(CausePlace(term.place.joint, term.place.tendon, next(numbers)) for term in cause.terms),
+        )
+        for cause in causes
+    ]
 
 
 class _Bench:
@@ -166,7 +158,7 @@ class _Bench:
         self.nominal, self._fit_to, self._everything = result.nominal, list(result.fitted_to), list(result.everything)
         if tests:  # the search has fitted to the same samples
             for count, model in enumerate(result.models):
-                known = [term for cause in result.causes[:count] for term in cause.accepted]
+                known = [term for cause in result.causes[:count] for term in cause.terms]
                 self._fits[frozenset(map(id, known)), result.only_sliding] = model
         else:
             self._hold_out()
@@ -180,25 +172,25 @@ class _Bench:
             [replace(clean, train=clean.train & recording.train) for clean, recording in zip(seen, own, strict=True)]
             for seen in (self._fit_to, self._everything)
         )
-        self.nominal = fitted(self.nominal.data, self._everything, self._settings, given=self.nominal.given)
+        self.nominal = fit_numbers(self.nominal.data, self._everything, self._settings, given=self.nominal.given)
 
-    def fit(self, causes: Sequence[NamedCause]) -> FittedModel:
+    def fit(self, causes: Sequence[Cause]) -> FittedModel:
         """Return the fit that causes are judged by."""
         return self._fit(causes, self._result.only_sliding)
 
-    def result(self, causes: Sequence[NamedCause]) -> FittedModel:
+    def result(self, causes: Sequence[Cause]) -> FittedModel:
         """Return the fit that becomes the extended model."""
-        fitted = self._fit(causes, self.fits_sliding)
+        model = self._fit(causes, self.fits_sliding)
         if not self.fits_sliding:
-            return fitted
-        data = settled(fitted.data, self._trained)
-        return replace(fitted, data=data, values={path: get_number(data, path) for path in fitted.values})
+            return model
+        data = settled(model.data, self._trained)
+        return replace(model, data=data, values={path: get_number(data, path) for path in model.values})
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""
         return squared_residual(self._result.estimation.online(data), self._training)
 
-    def is_sound(self, causes: Sequence[NamedCause]) -> bool:
+    def is_sound(self, causes: Sequence[Cause]) -> bool:
         """Return whether all causes together run better than the nominal model."""
         fit = self.result(causes)
         if self.runs_better(fit, self.nominal) and self.holds(fit):
@@ -208,17 +200,17 @@ class _Bench:
         self.fits_sliding = False
         return self.holds(self.result(causes))
 
-    def _fit(self, causes: Sequence[NamedCause], sliding: bool) -> FittedModel:
-        accepted = [term for cause in causes for term in cause.accepted]
-        key = frozenset(map(id, accepted)), sliding
+    def _fit(self, causes: Sequence[Cause], sliding: bool) -> FittedModel:
+        terms = [term for cause in causes for term in cause.terms]
+        key = frozenset(map(id, terms)), sliding
         if key not in self._fits:
             fit_to = self._fit_to if sliding else self._everything
-            if accepted and self._result.causes:
+            if terms and self._result.causes:
                 fit_to = [
                     replace(clean, train=recording.train)
                     for clean, recording in zip(self._predicted, fit_to, strict=True)
                 ]
-            self._fits[key] = fit_extended(self.nominal, accepted, fit_to, self._settings)
+            self._fits[key] = fit_extended(self.nominal, terms, fit_to, self._settings)
         return self._fits[key]
 
     @cached_property
@@ -227,6 +219,10 @@ class _Bench:
         extended, estimation = self._result.extended.data, self._result.estimation
         series = series_of(extended, estimation.recordings, estimation.grid, self._result.out)
         return predicted_of(extended, estimation.recordings, estimation.grid, series)
+
+    def each_without(self, causes: Sequence[Cause]) -> list[FittedModel]:
+        """Return, for each cause, the fit that lacks it."""
+        return [self.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
 
     def gains(self, model: FittedModel, without: Sequence[FittedModel]) -> list[Interval]:
         after = self._error(model)

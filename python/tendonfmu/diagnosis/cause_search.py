@@ -12,12 +12,13 @@ import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns, without_uncertainty
-from tendonfmu.diagnosis.cause_selection import Selection
+from tendonfmu.diagnosis.cause import Cause, Key
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
-from tendonfmu.diagnosis.hypotheses import Hypothesis, Key, hypotheses
+from tendonfmu.diagnosis.hypotheses import hypotheses
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.regressors import predicted_forces
+from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.series import Grid, Series, block_prediction, make_series
 from tendonfmu.estimate import Estimator
 from tendonfmu.model import moment_arms, native
@@ -57,9 +58,9 @@ class View:
         return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data), reach), self.least)
 
     def beside(self, keys: Collection[Key]) -> Selection:
-        """Return what is missing if these hypotheses are present, each with all its shapes at that place."""
-        known = [hypothesis for hypothesis in self.selection.hypotheses if hypothesis.key in keys]
-        return Selection(self.grams, self.selection.hypotheses, self.least, known) if known else self.selection
+        """Return what is missing if these causes are present, each with all its shapes at that place."""
+        known = [cause for cause in self.selection.causes if cause.key in keys]
+        return Selection(self.grams, self.selection.causes, self.least, known) if known else self.selection
 
     @cached_property
     def residual(self) -> Numbers:
@@ -71,11 +72,12 @@ class View:
         trends = bias_of(self.data, self.series, TRENDS)
         return Confirmation(self.series, self.folds, self.splines, trends, self.columns.nominal)
 
-    def p_value(self, hypothesis: Hypothesis) -> float:
-        """Return the probability of such a result by chance, corrected for all hypotheses that were tried."""
-        used = np.flatnonzero(hypothesis.mix.any(axis=1))
-        columns = self.columns.values[:, :, used].astype(np.float64) @ hypothesis.mix[used]
-        return self.confirmation.p_value(columns, sum(len(proposal.shapes) for proposal in self.columns.proposals))
+    def p_value(self, cause: Cause) -> float:
+        """Return the probability of such a result by chance, corrected for all candidates that were tried."""
+        mix = cause.direction.mix
+        used = np.flatnonzero(mix.any(axis=1))
+        columns = self.columns.values[:, :, used].astype(np.float64) @ mix[used]
+        return self.confirmation.p_value(columns, len(self.columns.proposals))
 
 
 def look(

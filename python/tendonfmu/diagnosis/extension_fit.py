@@ -10,10 +10,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tendonfmu.diagnosis.effects import Term
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import (
     Choice,
@@ -26,33 +27,16 @@ from tendonfmu.estimate import (
     build_structure,
     get_number,
     learn_batch,
+    unknowns,
     verdicts,
     with_values,
 )
 from tendonfmu.model import Finger, description_text, law_path, moment_arms, native
 from tendonfmu.recordings import FitRecording
 
-if TYPE_CHECKING:
-    from tendonfmu.diagnosis.effects.candidate import Candidate, Place
-
-
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
 BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it
 NEW = 3.0  # times its start: prior standard deviation of a new number
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """An accepted cause: a candidate at a place, its non-linear numbers, and its magnitudes as estimated so far."""
-
-    candidate: Candidate
-    place: Place
-    shape: Mapping[str, float] = field(default_factory=dict)
-    magnitudes: Any = ()
-
-    def added_to(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the description with this cause's term."""
-        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
 
 
 @dataclass(frozen=True)
@@ -92,9 +76,11 @@ def fit_numbers(
     *,
     given: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`."""
-    # This is so for `regressors.predicted_forces`: they lack the noise, which a term that scales with the force would
+    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is."""
+    # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
     # otherwise fit by shrinking the force.
+    if not unknowns(data):
+        return FittedModel(data=data, given=data, values={}, errors={}, cost=float("nan"))
     origin = data if given is None else given
     structure, learned = learn_numbers(data, recordings, settings, given=origin)
     numbers = np.asarray(learned.estimator.values(learned.z))
@@ -132,7 +118,7 @@ def learn_numbers(
 
 def fit_extended(
     nominal: FittedModel,
-    causes: Sequence[Accepted],
+    causes: Sequence[Term],
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
 ) -> FittedModel:
@@ -151,21 +137,21 @@ def fit_extended(
 
 
 def cause_parameters(
-    nominal: Mapping[str, Any], causes: Sequence[Accepted], model: FittedModel
+    nominal: Mapping[str, Any], causes: Sequence[Term], model: FittedModel
 ) -> tuple[Mapping[str, tuple[float, str]], ...]:
     """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
     units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(model.data).parameters()}
     return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
 
 
-def extended_description(data: Mapping[str, Any], causes: Sequence[Accepted]) -> Mapping[str, Any]:
+def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Mapping[str, Any]:
     """Return the description with the causes' terms, added one after the other."""
     for cause in causes:
         data = cause.added_to(data)
     return data
 
 
-def added_paths(data: Mapping[str, Any], causes: Sequence[Accepted]) -> tuple[tuple[str, ...], ...]:
+def added_paths(data: Mapping[str, Any], causes: Sequence[Term]) -> tuple[tuple[str, ...], ...]:
     """Return, for each cause, the paths of the numbers that it adds or replaces."""
     added = []
     for cause in causes:
@@ -186,7 +172,7 @@ def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, st
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def possible(data: Mapping[str, Any], causes: Sequence[Accepted]) -> list[Accepted]:
+def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     """Return the causes without those that change a law which only a cause outside of the list would add."""
     kept = []
     for cause in causes:

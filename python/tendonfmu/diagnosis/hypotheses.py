@@ -1,91 +1,74 @@
-"""Which effects may be missing, from coarse to fine: everywhere, at all places of a joint or tendon, at one place.
+"""Which causes there may be, from coarse to fine: everywhere, at all places of a joint or tendon, at one place.
 
-A hypothesis combines columns of single places with one set of magnitudes. One effect at many places is one hypothesis;
-a finer one is taken only if it explains materially more.
+A candidate combines columns of single places with one set of magnitudes. One effect at many places is one candidate;
+a finer one is taken only if it explains materially more. Where recordings are compared with a reference, the numbers
+that the description has may have changed, too.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, Shape
-from tendonfmu.diagnosis.effects import Place
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
+from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction, Where
+from tendonfmu.diagnosis.effects import BY_NAME, SCALING, SHARED, Place, Term, Variant
+from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
+from tendonfmu.model import law_path, native, steps_of
 
-Key = tuple[str, int | None, int | None]
-
-EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one
-# Effects of surfaces and materials. A finger tends to have them at all of its places alike. The others belong to one
-# sensor, link or pulley.
-SHARED = (
-    "viscous_friction",
-    "stribeck",
-    "edge_friction",
-    "pulley_friction",
-    "joint_friction",
-    "joint_load_friction",
-    "preload_friction",
-    "load_friction",
-    "cover_stiffness",
-    "cover_hardening",
-)
-# Corrections of the torque itself: a large one shrinks the torque, and with it everything that is left of it.
-SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
 LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
 LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
 LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
 LARGEST_SECANT = 3.0  # times the step that its column was computed with; the column is not valid beyond
 
-
-@dataclass(frozen=True)
-class Member:
-    """One place of a hypothesis: a proposal with one of its shapes. `weights` multiply the common magnitudes."""
-
-    proposal: Proposal
-    shape: Shape
-    weights: tuple[float, ...]
+_OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
+_OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
 
 
-@dataclass(frozen=True)
-class Hypothesis:
-    """One effect at a place or group of places."""
-
-    effect: str  # as reported; None if everywhere
-    joint: int | None
-    tendon: int | None
-    level: int  # EVERYWHERE, SOMEWHERE or HERE
-    members: tuple[Member, ...]
-    mix: Numbers  # map from magnitudes to candidate columns [c, d]
-    low: Numbers  # bounds of the magnitudes [d]
-    high: Numbers
-    least_gain: float = 0.0  # share of the rms that it must remove to be considered
-
-    @property
-    def key(self) -> Key:
-        return self.effect, self.joint, self.tendon
-
-
-def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Hypothesis]:
-    """Return all hypotheses, the coarse ones first."""
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Cause]:
+    """Return all effects that the description may lack, the coarse ones first."""
     count = columns.values.shape[2]
-    listed = [
-        _single(proposal, shape, count, arms, reach) for proposal in columns.proposals for shape in proposal.shapes
-    ]
+    listed = [_single(proposal, count, arms, reach) for proposal in columns.proposals]
     for effect in SHARED:
-        own = [proposal for proposal in columns.proposals if proposal.candidate.name == effect]
-        listed += _groups(effect, own, count)
-    return sorted(listed, key=lambda hypothesis: hypothesis.level)
+        by_place: dict[Place, list[Proposal]] = {}
+        for proposal in columns.proposals:
+            if proposal.candidate.name == effect:
+                by_place.setdefault(proposal.place, []).append(proposal)
+        for where, level, places in _groups(effect, list(by_place)):
+            for parts in _alike([by_place[place] for place in places]):
+                listed.append(_together(where, level, parts, count))
+    return sorted(listed, key=lambda cause: cause.direction.level)
 
 
-def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers, reach: Numbers) -> Hypothesis:
-    size = shape.columns.stop - shape.columns.start
-    mix = np.zeros((count, size))
-    mix[shape.columns] = np.eye(size)
-    low, high = _bounds(shape)
-    place, name = proposal.place, proposal.candidate.name
+def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, list[Place]]]:
+    """Yield all places, and the places of each joint and tendon if these are several but not all."""
+    if len(places) < 2:
+        return
+    groups: dict[tuple[int | None, int | None], list[Place]] = {(None, None): list(places)}
+    for place in places:
+        if place.joint is not None:
+            groups.setdefault((place.joint, None), []).append(place)
+        if place.tendon is not None:
+            groups.setdefault((None, place.tendon), []).append(place)
+    for (joint, tendon), members in groups.items():
+        whole = (joint, tendon) == (None, None)
+        if len(members) >= 2 and (whole or len(members) < len(places)):
+            yield Where(effect, joint, tendon), EVERYWHERE if whole else SOMEWHERE, members
+
+
+# --- effects that the description lacks -------------------------------------------------------------------------------
+
+
+def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Cause:
+    variant, place, name = proposal.variant, proposal.place, proposal.candidate.name
+    mix = np.zeros((count, variant.count))
+    mix[proposal.columns] = np.eye(variant.count)
+    low, high = _signed(variant)
     if name in SCALING and place.tendon is not None:
         largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
         if name == "moment_arm_variation" and place.joint is not None:
@@ -94,62 +77,179 @@ def _single(proposal: Proposal, shape: Shape, count: int, arms: Numbers, reach: 
     if name == "friction_drift":
         high = np.minimum(high, LARGEST_DRIFT)
     level = EVERYWHERE if place == Place() else HERE
-    member = Member(proposal, shape, (1.0,) * size)
-    least = LEAST_OF_FAST if shape.shape.get("turns", 1.0) != 1.0 else 0.0
-    return Hypothesis(name, place.joint, place.tendon, level, (member,), mix, low, high, least)
+    least = LEAST_OF_FAST if variant.shape.get("turns", 1.0) != 1.0 else 0.0
+    direction = Direction(mix, low, high, level, np.array(variant.expected), _step(variant), least)
+    term = Term(proposal.candidate, place, variant.shape, (1.0,) * variant.count)
+    return _cause(Where(name, place.joint, place.tendon), direction, (term,))
 
 
-def _bounds(shape: Shape) -> tuple[Numbers, Numbers]:
-    signs = np.array(shape.signs)
+def _cause(where: Where, direction: Direction, terms: tuple[Term, ...]) -> Cause:
+    candidate = BY_NAME[where.effect]
+    return Cause(where, candidate.title, candidate.explanation, terms=terms, direction=direction)
+
+
+def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
+    """Return the bounds of the magnitudes [d]."""
+    signs = np.array(variant.signs)
     low, high = np.where(signs > 0, 0.0, -np.inf), np.where(signs < 0, 0.0, np.inf)
-    return low, np.minimum(high, LARGEST_SECANT) if shape.secant else high
+    return low, np.minimum(high, LARGEST_SECANT) if variant.secant_rows else high
 
 
-def _groups(effect: str, proposals: Sequence[Proposal], count: int) -> Iterator[Hypothesis]:
-    """Yield hypotheses of all places, and of the places of each joint and tendon if these are several but not all."""
-    places = {proposal.place for proposal in proposals}
-    if len(places) < 2:
-        return
-    groups: dict[tuple[int | None, int | None], list[Proposal]] = {(None, None): list(proposals)}
-    for proposal in proposals:
-        place = proposal.place
-        if place.joint is not None:
-            groups.setdefault((place.joint, None), []).append(proposal)
-        if place.tendon is not None:
-            groups.setdefault((None, place.tendon), []).append(proposal)
-    for (joint, tendon), members in groups.items():
-        own = {proposal.place for proposal in members}
-        if len(own) < 2 or ((joint, tendon) != (None, None) and own == places):
-            continue
-        level = EVERYWHERE if (joint, tendon) == (None, None) else SOMEWHERE
-        for shapes in _alike(members):
-            yield _together(effect, joint, tendon, level, shapes, count)
+def _step(variant: Variant) -> float:
+    return abs(float(next(iter(variant.shape.values())))) if variant.secant_rows and variant.shape else 1.0
 
 
-def _alike(proposals: Sequence[Proposal]) -> Iterator[list[tuple[Proposal, Shape]]]:
+def _alike(by_place: Sequence[Sequence[Proposal]]) -> Iterator[list[Proposal]]:
     """Yield, for each k, the k-th shape of each law at every place, as long as all laws have one."""
-    laws: list[tuple[Proposal, list[Shape]]] = []
-    for proposal in proposals:
-        by_law: dict[tuple[str, ...], list[Shape]] = {}
-        for shape in proposal.shapes:
-            law = tuple(key for key in ("pulley", "load", "rises") if shape.shape.get(key))
-            by_law.setdefault(law, []).append(shape)
-        laws += [(proposal, shapes) for law, shapes in by_law.items() if "rises" not in law]
-    if not laws or len({len(shapes[0].signs) for _, shapes in laws}) != 1:
+    laws: list[list[Proposal]] = []
+    for proposals in by_place:
+        by_law: dict[tuple[str, ...], list[Proposal]] = {}
+        for proposal in proposals:
+            law = tuple(key for key in ("pulley", "load", "rises") if proposal.variant.shape.get(key))
+            by_law.setdefault(law, []).append(proposal)
+        laws += [same for law, same in by_law.items() if "rises" not in law]
+    if not laws or len({same[0].variant.count for same in laws}) != 1:
         return
-    for k in range(min(len(shapes) for _, shapes in laws)):
-        yield [(proposal, shapes[k]) for proposal, shapes in laws]
+    for k in range(min(map(len, laws))):
+        yield [same[k] for same in laws]
 
 
-def _together(
-    effect: str, joint: int | None, tendon: int | None, level: int, parts: Sequence[tuple[Proposal, Shape]], count: int
-) -> Hypothesis:
+def _together(where: Where, level: int, parts: Sequence[Proposal], count: int) -> Cause:
     """Combine shapes so that a magnitude of 1 is an ordinary effect at every place."""
-    size = len(parts[0][1].signs)
-    mix = np.zeros((count, size))
-    members = []
-    for proposal, shape in parts:
-        mix[np.arange(shape.columns.start, shape.columns.stop), np.arange(size)] = shape.expected
-        members.append(Member(proposal, shape, tuple(shape.expected)))
-    low, high = _bounds(parts[0][1])
-    return Hypothesis(effect, joint, tendon, level, tuple(members), mix, low, high)
+    first = parts[0].variant
+    mix = np.zeros((count, first.count))
+    terms = []
+    for proposal in parts:
+        expected = proposal.variant.expected
+        mix[np.arange(proposal.columns.start, proposal.columns.stop), np.arange(first.count)] = expected
+        terms.append(Term(proposal.candidate, proposal.place, proposal.variant.shape, expected))
+    direction = Direction(mix, *_signed(first), level, np.array(first.expected), _step(first))
+    return _cause(where, direction, tuple(terms))
+
+
+# --- numbers that the description has ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Number:
+    """One unknown of a description's fit."""
+
+    effect: str  # name of the effect
+    place: Place
+    side: int  # of its law: 1 or −1; 0 if both sides are one
+    index: int  # among the unknowns
+    path: str
+    value: float  # start and bounds in the unit of the unknown
+    low: float
+    high: float
+
+
+def numbers_of(data: Data) -> list[Number]:
+    """Return the numbers in the order of `derivative_passes.nominal_directions`."""
+    unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
+    return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
+
+
+def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
+    """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
+    image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
+    return Estimator(image), [parameter.path for parameter in native.Instance(image).parameters()]
+
+
+def _number(data: Data, index: int, unknown: Unknown) -> Number:
+    effect, place, side = _owner(data, unknown.path)
+    return Number(effect, place, side, index, unknown.path, unknown.start, unknown.lower, unknown.upper)
+
+
+def _owner(data: Data, path: str) -> tuple[str, Place, int]:
+    """Return effect, place and side of a number."""
+    law = law_path(path)
+    if law is not None and law.number is not None:
+        side = {"positive": 1, "negative": -1}.get(law.side or "", 0)
+        effect = _OF_NUMBER.get(law.number) or _OF_LAW.get(law.kind, law.kind)
+        return effect, Place(law.joint, law.tendon), side
+    owner, index, *key = steps_of(path)
+    if owner == "joints" and key == ["cover", "stiffness"]:
+        return "cover_stiffness", Place(int(index) + 1), 0
+    if owner == "extensions" and len(key) == 1:
+        row = data["extensions"][index]
+        return row["effect"], Place(row.get("joint"), row.get("tendon")), 0
+    return path, Place(), 0
+
+
+def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Cause]:
+    """Return changes of each effect at each place, of one joint or tendon, and everywhere; the coarse ones first."""
+    by_place: dict[tuple[str, Place], list[Number]] = {}
+    for number in numbers:
+        by_place.setdefault((number.effect, number.place), []).append(number)
+    listed = []
+    for (effect, place), members in by_place.items():
+        where, level = Where(effect, place.joint, place.tendon), EVERYWHERE if place == Place() else HERE
+        if any(member.side for member in members):
+            listed += list(_two_sided(where, members, count, first, level))
+        else:
+            listed.append(_free(where, members, count, first, level))
+    for effect in SHARED:
+        of_effect = {place: members for (name, place), members in by_place.items() if name == effect}
+        for where, level, places in _groups(effect, list(of_effect)):
+            listed.append(
+                _scaled(where, [number for place in places for number in of_effect[place]], count, first, level)
+            )
+    return sorted(listed, key=lambda cause: cause.direction.level)
+
+
+def _changed(where: Where, mix: Numbers, low: Numbers, high: Numbers, level: int) -> Cause:
+    """Return a change of numbers of the description."""
+    candidate = BY_NAME.get(where.effect)
+    if candidate is None:
+        return Cause(where, where.effect.replace("_", " "), direction=Direction(mix, low, high, level))
+    _, look, at = candidate.explanation.partition("Look ")
+    explanation = f"The description has this effect; its number is different now. {look}{at}".strip()
+    return Cause(where, candidate.title, explanation, direction=Direction(mix, low, high, level))
+
+
+def _free(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Cause:
+    """Return a change in which each number is free: of working points, or of a term with several numbers."""
+    mix = np.zeros((count, len(numbers)))
+    for k, number in enumerate(numbers):
+        mix[first + number.index, k] = 1.0
+    value, low, high = (np.array([getattr(number, name) for number in numbers]) for name in ("value", "low", "high"))
+    return _changed(where, mix, low - value, high - value, level)
+
+
+def _two_sided(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Iterator[Cause]:
+    yield _scaled(where, numbers, count, first, level)
+    if where.effect != "stribeck":
+        mix = np.zeros((count, 1))
+        for number in numbers:
+            mix[first + number.index, 0] = number.side
+        most = min(number.value - number.low for number in numbers)
+        apart = Where("asymmetric_friction", where.joint, where.tendon)
+        yield _changed(apart, mix, np.array([-most]), np.array([most]), level)
+
+
+def _scaled(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Cause:
+    """Return a change of all numbers by the same share."""
+    mix = np.zeros((count, 1))
+    size = np.array([abs(number.value) for number in numbers])
+    size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
+    for number, share in zip(numbers, size, strict=True):
+        mix[first + number.index, 0] = share
+    low = max(float((number.low - number.value) / share) for number, share in zip(numbers, size, strict=True))
+    high = min(float((number.high - number.value) / share) for number, share in zip(numbers, size, strict=True))
+    return _changed(where, mix, np.array([low]), np.array([high]), level)
+
+
+def with_numbers(data: Data, added: Numbers) -> dict[str, Any]:
+    """Return the description with `added` [u] added to its unknowns, within their bounds."""
+    estimator, paths = estimator_of(data)
+    z = estimator.start.copy()
+    rows = [k for k, unknown in enumerate(estimator.unknowns) if not unknown.path.startswith("bias.")]
+    z[rows] += added
+    low, high = (np.array([getattr(unknown, end) for unknown in estimator.unknowns]) for end in ("lower", "upper"))
+    before, after = estimator.values(estimator.start), estimator.values(np.clip(z, low, high))
+    result = own_copy(data)
+    for path, one, other in zip(paths, before, after, strict=True):
+        if one != other:
+            set_number(result, path, float(other))
+    return result

@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.effects import Candidate, Place
-from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT, Hypothesis
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.cause import Cause
+from tendonfmu.diagnosis.effects import Candidate, Place, Term
+from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT
+from tendonfmu.model import extended_row
 
 OF_NOISE = 4.0  # standard deviations of the position noise
 OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
@@ -51,22 +53,16 @@ class LeastSizes:
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
         return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
 
-    def resolved(self, hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> bool:
-        """Return whether a hypothesis with these magnitudes [d] is large enough."""
-        if hypothesis.effect == "presliding":  # its size is the distance that was tried, not the magnitude
+    def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
+        """Return whether a candidate with these magnitudes [d] is large enough."""
+        if cause.effect == "presliding":  # its size is the distance that was tried, not the magnitude
             return True
-        least = self.least(hypothesis.effect, hypothesis.joint, hypothesis.tendon)
-        return least == 0.0 or _size(hypothesis, magnitudes) >= BEFORE_FIT * least
+        least = self.least(*cause.key)
+        return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 
-
-def _size(hypothesis: Hypothesis, magnitudes: Sequence[float] | Numbers) -> float:
-    """Return the size of the hypothesis's first number at its first place."""
-    if not hypothesis.members:  # a number that the description already has
-        return abs(float(magnitudes[0]))
-    member = hypothesis.members[0]
-    shape: Mapping[str, float] = member.shape.shape
-    step = abs(float(next(iter(shape.values())))) if member.shape.secant and shape else 1.0
-    return abs(float(magnitudes[0])) * step
+    def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
+        """Return whether the sensors can show the sizes that an effect has in a fitted description."""
+        return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:

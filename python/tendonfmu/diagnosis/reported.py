@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tendonfmu.diagnosis.cause import Cause, Where
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
-from tendonfmu.diagnosis.result import Cause, Diagnosis, Where
-from tendonfmu.diagnosis.size import quantity
+from tendonfmu.diagnosis.effects.words import quantity
+from tendonfmu.diagnosis.result import Diagnosis
 
 CONTACT, UNKNOWN = "contact", "unknown"
 LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference

@@ -14,12 +14,11 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
-from tendonfmu.diagnosis.cause_selection import CERTAIN, rms_gain
-from tendonfmu.diagnosis.effects.presliding import is_spring
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_extended
+from tendonfmu.diagnosis.effects.shapes import is_spring
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_extended, fit_numbers
 from tendonfmu.diagnosis.least_sizes import LeastSizes, noise_of
-from tendonfmu.diagnosis.nominal_fit import fitted
 from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.diagnosis.selection import CERTAIN, rms_gain
 from tendonfmu.diagnosis.series import Grid, make_grid
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import Start, scan
@@ -74,8 +73,8 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
         signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
-    nominal = fitted(finger.data, own, settings)
-    model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+    nominal = fit_numbers(finger.data, own, settings)
+    model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
     least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
     chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
@@ -140,7 +139,7 @@ def starting_point(
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     grid = make_grid(own)
-    nominal = fitted(finger.data, own, settings)
+    nominal = fit_numbers(finger.data, own, settings)
     if known is None:
         least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
         starts = scan(nominal.data, own, grid, least.least("time_delay", None, None))
@@ -152,10 +151,10 @@ def starting_point(
     span = span_of(nominal.data, own)
     compared = []
     for start in tried:
-        model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+        model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
-            model = fit_extended(nominal, start.accepted, own, settings) if start.causes else nominal
+            model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
         compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 

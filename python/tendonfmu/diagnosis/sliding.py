@@ -17,8 +17,7 @@ import numpy as np
 
 from tendonfmu.arrays import Flags
 from tendonfmu.diagnosis.cause_search import residual_alone, series_of
-from tendonfmu.diagnosis.extension_fit import FittedModel
-from tendonfmu.diagnosis.nominal_fit import fitted
+from tendonfmu.diagnosis.extension_fit import FittedModel, fit_numbers
 from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings, part_of, starting_point
 from tendonfmu.model import Finger, effects, sliding_velocity, velocity_threshold
@@ -80,7 +79,7 @@ def sliding_alone(
     if stuck <= WORSE**2 * sliding:
         return None
     start = starting_point(given, part_of(given, free), chosen.signals, chosen.settings).start
-    nominal = fitted(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
+    nominal = fit_numbers(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
     return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start))
 
 

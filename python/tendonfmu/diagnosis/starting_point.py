@@ -18,8 +18,8 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
-from tendonfmu.diagnosis.effects import CANDIDATES, Place
-from tendonfmu.diagnosis.extension_fit import Accepted, extended_description
+from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.model import EFFECT_NUMBERS, moment_arms
@@ -32,27 +32,26 @@ FINE = 0.001  # s
 LARGE = 0.008  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
-_BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
-PRESLIDING, DELAY = _BY_NAME["presliding"], _BY_NAME["time_delay"]
+PRESLIDING, DELAY = by_name("presliding"), by_name("time_delay")
 
 
 @dataclass(frozen=True)
 class Start:
     """One point of the scan."""
 
-    presliding: tuple[Accepted, ...]  # at all places; () for none
+    presliding: tuple[Term, ...]  # at all places; () for none
     delay: float  # by how much forces are late, s
     error: float  # Σ e² on held-out folds, (N·m)²
 
     @property
-    def causes(self) -> list[tuple[Accepted, ...]]:
+    def causes(self) -> list[tuple[Term, ...]]:
         """Return the places of each effect."""
-        late = [(Accepted(DELAY, Place(), {"delay": self.delay}, (1.0,)),)] if self.delay else []
+        late = [(Term(DELAY, Place(), {"delay": self.delay}, (1.0,)),)] if self.delay else []
         return [*late, *([self.presliding] if self.presliding else [])]
 
     @property
-    def accepted(self) -> list[Accepted]:
-        return [accepted for cause in self.causes for accepted in cause]
+    def terms(self) -> list[Term]:
+        return [term for cause in self.causes for term in cause]
 
 
 def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, least_delay: float) -> list[Start]:
@@ -79,18 +78,18 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
     if known is not None and abs(known) >= least_delay:
         for presliding in distances:
             start = Start(presliding, known, 0.0)
-            begin = extended_description(data, start.accepted)
+            begin = extended_description(data, start.terms)
             starts.append(replace(start, error=float(_errors(begin, recordings, grid, moved[:, :, :1] * 0.0)[0])))
     return sorted(starts, key=lambda start: start.error)
 
 
-def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Accepted, ...]]:
+def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Term, ...]]:
     """Return presliding at all places with one distance, for each distance of a grid."""
     places = PRESLIDING.places(data, source)
     if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
         return []
     by_place = [
-        [Accepted(PRESLIDING, place, variant.shape, (1.0,)) for variant in PRESLIDING.variants(data, place, span)]
+        [Term(PRESLIDING, place, variant.shape, (1.0,)) for variant in PRESLIDING.variants(data, place, span)]
         for place in places
     ]
     return [tuple(own) for own in zip(*(each for each in by_place if each), strict=False) if own]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.cause_selection import CERTAIN
 from tendonfmu.diagnosis.remainder import Remainder
 from tendonfmu.diagnosis.result import Unexplained
+from tendonfmu.diagnosis.selection import CERTAIN
 from tendonfmu.statistics import Interval, standard_error
 
 

@@ -15,8 +15,8 @@ from tendonfmu.diagnosis import (
     TITLES,
     UNKNOWN,
     Cause,
+    CausePlace,
     Diagnosis,
-    FoundPlace,
     Invisible,
     Where,
     quantity,
@@ -422,7 +422,7 @@ def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[s
     ]
 
 
-def _at(kind: str, place: FoundPlace, names: Names) -> str:
+def _at(kind: str, place: CausePlace, names: Names) -> str:
     number, all_names = (place.joint, names.joints) if kind == "joint" else (place.tendon, names.tendons)
     if number is not None:
         return _numbered(kind, number, all_names).removeprefix(f"{kind} ")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,9 @@ from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 
 LEAST_SHARE = 0.01  # of the expected size: a fit could not distinguish a smaller number from an absent one
+
+Shape = Mapping[str, float]  # non-linear numbers of a term, by name
+Sizes = Mapping[str, list[tuple[float, str]]]  # last part of a path -> (value, unit) of each number
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Variant:
     """A candidate at one place and one point of the grid of its non-linear numbers."""
 
     base: Data  # the description without the term
-    shape: Mapping[str, float]  # the non-linear numbers here
+    shape: Shape  # the non-linear numbers here
     columns: tuple[Column, ...] = ()  # derivatives to compute
     # what is added at a strength of zero: changes of laws and covers, and rows of `extensions`
     edits: tuple[Edit, ...] = ()
@@ -79,13 +82,18 @@ class Variant:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """First number of each column."""
-        return tuple(column.path for column in self.columns)
+        """First number of each column; "" for a column at full strength."""
+        return ("",) if self.secant_rows else tuple(column.path for column in self.columns)
 
     @property
     def signs(self) -> tuple[int, ...]:
         """Expected sign of each column's magnitude."""
         return (1,) if self.secant_rows else tuple(column.sign for column in self.columns)
+
+    @property
+    def expected(self) -> tuple[float, ...]:
+        """Magnitudes of an ordinary effect."""
+        return (1.0,) if self.secant_rows else tuple(column.expected for column in self.columns)
 
     @property
     def count(self) -> int:
@@ -120,44 +128,74 @@ def _present(column: Column, magnitude: float) -> float:
     return magnitude if abs(magnitude) >= least else (least if magnitude >= 0 else -least)
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """One effect of docs/reference/commands/diagnose.md."""
-
-    name: str  # name of the effect
-    title: str  # A few plain words
-    explanation: str  # what it is physically, and what to look at on the hand
-    sign: int  # expected sign of its magnitudes: +1, −1, or 0 for either
-    excited_by: str  # motion or load that shows it
-    confused_with: tuple[str, ...]  # effects that look alike in many recordings
-    # what its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load"
-    coordinate: str
-    unit: str  # of its main number
-    number: str  # what the main number is called
-    find_places: Callable[[Data, int], list[Place]]  # (data, kinematics) -> places where it is absent and possible
-    # (data, place, span) -> the grid of its non-linear numbers
-    find_shapes: Callable[[Data, Place, Span], list[dict[str, float]]]
-    make: Callable[[Data, Place, Mapping[str, float]], Variant]  # (data, place, shape) -> the variant there
-
-    def places(self, data: Data, kinematics: int = 1) -> list[Place]:
-        """Return the places where it is possible and absent now; `kinematics` is the source, 1 to 3."""
-        return self.find_places(data, kinematics)
-
-    def variants(self, data: Data, place: Place, span: Span) -> list[Variant]:
-        """Return its grid at a place, for recordings of this span."""
-        return [self.make(data, place, shape) for shape in self.find_shapes(data, place, span)]
-
-    def variant(self, data: Data, place: Place, shape: Mapping[str, float]) -> Variant:
-        """Return one point of the grid; `shape` comes from an earlier variant."""
-        return self.make(data, place, shape)
-
-    def extended(
-        self, data: Data, place: Place, shape: Mapping[str, float], magnitudes: Sequence[float]
-    ) -> dict[str, Any]:
-        """Return a description with the term at these magnitudes, ready for `check`, `build` and `fit`."""
-        return self.make(data, place, shape).extended(magnitudes)
+def row_places(data: Data, effect: str) -> set[Place]:
+    """Return the places of the description's extensions of this effect."""
+    rows = data.get("extensions") or []
+    return {Place(row.get("joint"), row.get("tendon")) for row in rows if row["effect"] == effect}
 
 
 def no_shape(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
     """Return the grid of an effect without non-linear numbers."""
     return [{}]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect of docs/reference/commands/diagnose.md."""
+
+    name: str
+    title: str  # a few plain words
+    explanation: str  # what it is physically, and what to look at on the hand
+    excited_by: str  # motion or load that shows it
+    # what its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load"
+    coordinate: str
+    possible_places: Callable[[Data, int], list[Place]]  # (data, kinematics) -> where its law is absent
+    make: Callable[[str, Data, Place, Shape], Variant]  # (name, data, place, shape) -> the variant there
+    size: Callable[[Sizes], str]  # numbers at a place -> its size in words
+    find_shapes: Callable[[Data, Place, Span], list[dict[str, float]]] = no_shape  # grid of its non-linear numbers
+    # Effects of surfaces and materials: a finger tends to have them at all of its places alike. The others belong to
+    # one sensor, link or pulley.
+    shared: bool = False
+    # Corrections of the torque itself: a large one shrinks the torque, and with it everything that is left of it.
+    scaling: bool = False
+    common: bool = False  # in every finger, or in every way of recording: its name does not count
+
+    def places(self, data: Data, kinematics: int = 1) -> list[Place]:
+        """Return the places where it is possible and absent now; `kinematics` is the source, 1 to 3."""
+        taken = row_places(data, self.name)
+        return [place for place in self.possible_places(data, kinematics) if place not in taken]
+
+    def variants(self, data: Data, place: Place, span: Span) -> list[Variant]:
+        """Return its grid at a place, for recordings of this span."""
+        return [self.variant(data, place, shape) for shape in self.find_shapes(data, place, span)]
+
+    def variant(self, data: Data, place: Place, shape: Shape) -> Variant:
+        """Return one point of the grid; `shape` comes from an earlier variant."""
+        return self.make(self.name, data, place, shape)
+
+    def extended(self, data: Data, place: Place, shape: Shape, magnitudes: Sequence[float]) -> dict[str, Any]:
+        """Return a description with the term at these magnitudes, ready for `check`, `build` and `fit`."""
+        return self.variant(data, place, shape).extended(magnitudes)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A candidate at a place, as it is added to a description."""
+
+    candidate: Candidate
+    place: Place
+    shape: Shape = field(default_factory=dict)  # its non-linear numbers
+    magnitudes: Sequence[float] = ()  # one per column, as estimated so far; () for an ordinary size
+
+    def added_to(self, data: Data) -> dict[str, Any]:
+        """Return the description with this term."""
+        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
+
+    def times(self, factors: Sequence[float]) -> Term:
+        """Return the term with each magnitude multiplied by its factor."""
+        return replace(self, magnitudes=tuple(float(a * b) for a, b in zip(self.magnitudes, factors, strict=True)))
+
+    @property
+    def ordinary(self) -> Term:
+        """The term at an ordinary size."""
+        return replace(self, shape=dict(self.shape), magnitudes=())

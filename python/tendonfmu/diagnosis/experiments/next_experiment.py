@@ -21,12 +21,12 @@ from scipy.sparse import identity
 from scipy.sparse.linalg import splu
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns
-from tendonfmu.diagnosis.effects.candidate import Candidate
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
+from tendonfmu.diagnosis.cause import Where
+from tendonfmu.diagnosis.effects import Candidate, Term
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
-from tendonfmu.diagnosis.extension_fit import Accepted
-from tendonfmu.diagnosis.result import Experiment, Where
+from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
@@ -53,8 +53,8 @@ _RANK = 1e-9  # of the largest direction of a Gram matrix of columns of length 1
 class Question:
     """What a recording is to show: the difference between `cause` and `rival`, or whether `cause` is there at all."""
 
-    cause: Accepted
-    rival: Accepted | None = None
+    cause: Term
+    rival: Term | None = None
 
 
 @dataclass(frozen=True)
@@ -236,29 +236,32 @@ class _Laboratory:
         assert self.columns is not None
         return len(self.columns.nominal_names)
 
-    def _place(self, cause: Accepted) -> int:
-        """Return the index of the cause's proposal."""
+    def _proposals(self, cause: Term) -> list[Proposal]:
+        """Return the shapes of the cause at its place, its own first."""
         assert self.columns is not None
-        for k, proposal in enumerate(self.columns.proposals):
-            if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place:
-                return k
-        raise InternalError(f"{_described(cause)}: not possible at this place; expected a place of the candidate")
+        proposals = [
+            proposal
+            for proposal in self.columns.proposals
+            if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place
+        ]
+        if not proposals:
+            raise InternalError(f"{_described(cause)}: not possible at this place; expected a place of the candidate")
+        return proposals
 
-    def _direction(self, cause: Accepted) -> Numbers:
+    def _direction(self, cause: Term) -> Numbers:
         """Return the magnitudes of the cause in all columns [c]."""
         assert self.columns is not None
-        shape = self.columns.proposals[self._place(cause)].shapes[0]
-        given = list(cause.magnitudes) if len(cause.magnitudes) else list(shape.expected)
+        proposal = self._proposals(cause)[0]
+        given = list(cause.magnitudes) if len(cause.magnitudes) else list(proposal.variant.expected)
         direction = np.zeros(self._offset + len(self.columns.names))
-        direction[self._offset + shape.columns.start : self._offset + shape.columns.stop] = given
+        direction[self._offset + proposal.columns.start : self._offset + proposal.columns.stop] = given
         return direction
 
-    def _all_columns(self, cause: Accepted) -> list[int]:
-        assert self.columns is not None
-        own = self.columns.proposals[self._place(cause)].columns
-        return list(range(self._offset + own.start, self._offset + own.stop))
+    def _all_columns(self, cause: Term) -> list[int]:
+        proposals = self._proposals(cause)
+        return list(range(self._offset + proposals[0].columns.start, self._offset + proposals[-1].columns.stop))
 
-    def _rows(self, cause: Accepted, seen: _Seen) -> float:
+    def _rows(self, cause: Term, seen: _Seen) -> float:
         """Return the number of blocks times joints in which the cause makes a noticeable torque."""
         power = np.sum(np.square(self._direction(cause))[:, None] * seen.power, axis=0)
         joints = int(np.sum(power > 0.05 * power.max())) if power.max() > 0 else 1
@@ -295,9 +298,9 @@ def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
     return np.asarray((flat - splines @ known.solve(splines.T @ flat)).reshape(values.shape))
 
 
-def _asked(questions: Sequence[Question]) -> list[Accepted]:
+def _asked(questions: Sequence[Question]) -> list[Term]:
     """Return every candidate at a place once, with the shape of its first mention."""
-    causes: dict[tuple[str, Any], Accepted] = {}
+    causes: dict[tuple[str, Any], Term] = {}
     for question in questions:
         for cause in (question.cause, question.rival):
             if cause is not None:
@@ -305,13 +308,15 @@ def _asked(questions: Sequence[Question]) -> list[Accepted]:
     return list(causes.values())
 
 
-def _restricted(cause: Accepted, data: Data, span: Span) -> Candidate:
+def _restricted(cause: Term, data: Data, span: Span) -> Candidate:
     """Return the candidate at that place only; its own shape comes first, then the others of its grid."""
     grid = cause.candidate.find_shapes(data, cause.place, span)
     own = dict(cause.shape) or (dict(grid[len(grid) // 2]) if grid else {})
     shapes = [own, *(shape for shape in grid if dict(shape) != own)]
     return replace(
-        cause.candidate, find_places=lambda *_: [cause.place], find_shapes=lambda *_: [dict(shape) for shape in shapes]
+        cause.candidate,
+        possible_places=lambda *_: [cause.place],
+        find_shapes=lambda *_: [dict(shape) for shape in shapes],
     )
 
 
@@ -411,12 +416,12 @@ def _times(distance: float) -> str:
     return f"{distance:.2g} times"
 
 
-def _described(cause: Accepted) -> str:
+def _described(cause: Term) -> str:
     joint, tendon = cause.place.joint, cause.place.tendon
     parts = [f"tendon {tendon}"] * (tendon is not None) + [f"joint {joint}"] * (joint is not None)
     name = cause.candidate.name.replace("_", " ")
     return f"{name} of {' at '.join(parts)}" if parts else name
 
 
-def _where(cause: Accepted) -> Where:
+def _where(cause: Term) -> Where:
     return Where(cause.candidate.name, cause.place.joint, cause.place.tendon)

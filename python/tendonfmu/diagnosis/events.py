@@ -1,20 +1,59 @@
-"""How much the error falls when events (contact, a stall) are left out of the recordings."""
+"""Events (contact, a stall) in recordings: where they are, what is left of the recordings, and what that gains."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.diagnosis.cause_search import bias_of, residual_alone, series_of
+from tendonfmu.diagnosis.contact_scan import left_out, scan_events
 from tendonfmu.diagnosis.gain import residual_of
 from tendonfmu.diagnosis.result import Event
+from tendonfmu.diagnosis.series import Grid
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, blocks_of, paired_gain
 
 _TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
+
+
+def events_of(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
+) -> tuple[tuple[Event, ...], Flags]:
+    """Find the stretches that no friction explains in the residual of a model."""
+    # returns blocks that lie in an event [B]
+    series = series_of(data, recordings, grid)
+    names = [str(recording.path) for recording in recordings]
+    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
+    return events, left_out(series, events, names)
+
+
+def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
+    """Return the recording without the samples that lie in its events."""
+    inside = np.zeros(len(recording.time), dtype=bool)
+    for event in events:
+        if event.recording == str(recording.path):
+            inside |= (recording.time >= event.start) & (recording.time <= event.end)
+    return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
+
+
+def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
+    """Return a recording that does not train on the samples of some blocks."""
+    # out: [B]
+    train = recording.train.copy()
+    for segment in grid.segments:
+        if segment.recording == number:
+            begin = segment.part.start
+            rows = np.flatnonzero(np.repeat(out[segment.blocks], segment.samples))
+            train[begin + rows] = False
+    return replace(recording, train=train)
+
+
+# --- what leaving them out gains --------------------------------------------------------------------------------------
 
 
 def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], events: Sequence[Event]) -> Interval | None:

@@ -7,48 +7,32 @@ description has, or a term that it lacks. The error is that on held-out parts of
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.background import background_columns
 from tendonfmu.diagnosis.candidate_columns import candidate_columns
+from tendonfmu.diagnosis.cause import Cause, Key, with_error
 from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
-from tendonfmu.diagnosis.cause_selection import CERTAIN, Judged, Selection, is_alike, names_with
-from tendonfmu.diagnosis.changes.background import background_columns
-from tendonfmu.diagnosis.changes.gain import gain_of
-from tendonfmu.diagnosis.changes.numbers import changed, number_hypotheses, numbers_of
-from tendonfmu.diagnosis.changes.repeated_motion import find_repeats, less_reference, outside
-from tendonfmu.diagnosis.extension_fit import Accepted, extended_description
-from tendonfmu.diagnosis.hypotheses import Hypothesis, Key, hypotheses
+from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.extension_fit import extended_description
+from tendonfmu.diagnosis.hypotheses import hypotheses, number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.named_cause import accepted_of
-from tendonfmu.diagnosis.search import SIGNIFICANCE
+from tendonfmu.diagnosis.repeated_motion import find_repeats, less_reference, outside
+from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
 from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import Folds, Grams, Products, make_folds
-from tendonfmu.tasks import Step
+from tendonfmu.statistics import Folds, Grams, Interval, Products, make_folds
 
 MOST_CHANGES = 4
-MOST_REFUSED = 4
 STEPS = 3  # of Newton's method, with the derivatives of the reference
-
-
-@dataclass(frozen=True)
-class Change:
-    """A change that was found."""
-
-    hypothesis: Hypothesis  # what and where
-    magnitudes: Numbers  # [d] and [d, d]
-    covariance: Numbers
-    gain: float  # 1 − rms with / rms without on held-out parts of the new recordings, and its standard error
-    error: float
-    p_value: float  # family-wise
-    alike: tuple[Hypothesis, ...] = ()  # what the data cannot distinguish from it, best first
 
 
 @dataclass(frozen=True)
@@ -59,8 +43,8 @@ class Sides:
     test: Flags  # those of them that are not learned from [B]
 
 
-class ChangeSearch:
-    """A search that adds one change after the other."""
+class ChangeSearch(CauseSearch):
+    """Adds one change after the other; all of them are free in the new recordings only."""
 
     def __init__(
         self,
@@ -69,17 +53,19 @@ class ChangeSearch:
         grid: Grid,
         least: LeastSizes,
         now: Sequence[int],
-        tests: Sequence[int] = (),
-        left_out: Flags | None = None,
-        seed: int = 0,
+        tests: Sequence[int],
+        left_out: Flags,
+        least_gain: float,
+        seed: int,
     ) -> None:
         """Prepare all columns."""
         # left_out: [B]
+        super().__init__(MOST_CHANGES)
+        self._least_gain = least_gain
         self.data, self._recordings, self._grid, self._least = data, recordings, grid, least
         self.series = series_of(data, recordings, grid, left_out)
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
         self._new = {*now, *tests}
-        self.changes: list[Change] = []
         self._splines = bias_of(data, self.series)
         residual = residual_alone(data, self.series)
         predicted = predicted_of(data, recordings, grid, self.series)
@@ -104,22 +90,21 @@ class ChangeSearch:
         self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
         learned = replace(self._informative, used=self._informative.used & ~self.sides.test)
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
-        self.hypotheses = self._hypotheses()
+        self.candidates = self._candidates()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
-        self.tried = len({hypothesis.key for hypothesis in self.hypotheses})
-        self.refused: list[Change] = []
+        self.tried = len({cause.key for cause in self.candidates})
         self._selection: Selection | None = None
         self._whole = self.error
 
-    def _hypotheses(self) -> list[Hypothesis]:
+    def _candidates(self) -> list[Cause]:
         count, own = self._columns.values.shape[2], len(self.numbers)
         reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
         missing = [
-            replace(hypothesis, mix=np.concatenate([hypothesis.mix, np.zeros((own, hypothesis.mix.shape[1]))]))
-            for hypothesis in hypotheses(self._columns, moment_arms(self.data), reach)
+            replace(cause, direction=replace(cause.direction, mix=np.pad(cause.direction.mix, ((0, own), (0, 0)))))
+            for cause in hypotheses(self._columns, moment_arms(self.data), reach)
         ]
         present = number_hypotheses(self.numbers, count + own, count)
-        return sorted([*missing, *present], key=lambda judged: judged.level)
+        return sorted([*missing, *present], key=lambda cause: cause.direction.level)
 
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
@@ -134,69 +119,65 @@ class ChangeSearch:
 
     # --- rounds ---
 
-    def run(self, least_gain: float, step: Step = lambda done: None) -> None:
-        """Take one change after the other until none is material and certain."""
-        while len(self.changes) < MOST_CHANGES and len(self.refused) < MOST_REFUSED:
-            step(len(self.changes))
-            named = [change.hypothesis.effect for change in self.changes]
-            judged = self._best({change.hypothesis.effect for change in self.refused})
-            if judged is None or self.selection.gain(judged)[0] < least_gain:
-                break
-            change, certain = self._judged(judged)
-            enough = self.matters(change.gain, self.error, judged.hypothesis.effect, named, least_gain)
-            if certain and enough:
-                self._take(change)
-            else:
-                self.refused.append(change)
+    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+        best = self._best(tried)
+        if best is None or self.selection.gain(best)[0] < self._least_gain:
+            return None
+        change, certain = self._named(best)
+        named = [cause.effect for cause in self.causes]
+        if not certain or not self.matters(change.gain.value, self.error, change.effect, named):
+            return change, False
+        self.causes.append(change)
+        self._settle()
+        return change, True
 
-    def _best(self, tried: Collection[str]) -> Judged | None:
-        """Return the hypothesis that lowers the error most, at the coarsest place that is as good."""
-        ranked = [judged for judged in self.selection.ranked() if judged.hypothesis.effect not in tried]
+    def _best(self, tried: set[str]) -> Cause | None:
+        """Return the candidate that lowers the error most, at the coarsest place that is as good."""
+        ranked = [cause for cause in self.selection.ranked() if cause.effect not in tried]
         if not ranked:
             return None
-        judged = self.selection.refined(ranked[0].hypothesis.effect)
-        if judged.hypothesis.members:  # a number that the description has takes precedence over a term that it lacks
-            present = (judged for judged in ranked if not judged.hypothesis.members)
-            same = next((other for other in present if is_alike(other.by_stretch, judged.by_stretch)), None)
-            judged = judged if same is None else self.selection.refined(same.hypothesis.effect)
-        return self._at_best_place(judged) if len(self.new_recordings) > 1 else judged
+        best = self.selection.refined(ranked[0].effect)
+        if best.terms:  # a number that the description has takes precedence over a term that it lacks
+            present = (cause for cause in ranked if not cause.terms)
+            same = next((cause for cause in present if is_alike(cause.unseen, best.unseen)), None)
+            best = best if same is None else self.selection.refined(same.effect)
+        return self._at_best_place(best) if len(self.new_recordings) > 1 else best
 
-    def _at_best_place(self, judged: Judged) -> Judged:
+    def _at_best_place(self, best: Cause) -> Cause:
         """Return, of places that are nearly as good, the one with the smallest error."""
         # The size is free in each new recording here, because a growing change differs from one recording to the next.
-        options = [judged, *self.selection.near(judged)]
+        options = [best, *self.selection.near(best)]
         if len(options) == 1:
-            return judged
+            return best
         products, counted = self._products(None)
-        chosen = products.chosen(self._together(self.changes), None)
+        chosen = products.chosen(self._together(self.causes), None)
         u = chosen.nominal_count
         recording = self.series.recording[chosen.folds.rows]
         masks = [(recording == number)[:, None, None] for number in self.new_recordings]
         parts, places, at = [], [], 0
         for option in options:
-            column = chosen.table[:, :, u:] @ option.hypothesis.mix.astype(np.float32)
+            column = chosen.table[:, :, u:] @ option.direction.mix.astype(np.float32)
             own = np.concatenate([column * mask for mask in masks], axis=2)
             parts.append(own)
             places.append(slice(at, at + own.shape[2]))
             at += own.shape[2]
         every = chosen.with_own(np.concatenate(parts, axis=2))
-        grams = Grams(every, self._target_now(), self._scales(self.changes), counted)
+        grams = Grams(every, self._target_now(), self._scales(self.causes), counted)
         errors = []
         for option, place in zip(options, places, strict=True):
             mix = np.eye(at)[:, place]
-            low, high = (np.tile(end, len(masks)) for end in (option.hypothesis.low, option.hypothesis.high))
+            low, high = (np.tile(end, len(masks)) for end in (option.direction.low, option.direction.high))
             errors.append(grams.error(mix, low, high)[0])
         return options[int(np.argmin(errors))]
 
-    def _judged(self, judged: Judged) -> tuple[Change, bool]:
+    def _named(self, cause: Cause) -> tuple[Cause, bool]:
         """Return the change and whether it is certain: a gain of more than two standard errors and a small p-value."""
-        grams, own = self.selection.grams, judged.hypothesis
+        grams, own = self.selection.grams, cause.direction
         _, by_fold = grams.error(own.mix, own.low, own.high)
         gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
-        p_value, covariance = self.certainty_of(grams, own.mix, judged.magnitudes, by_fold)
-        others = [judged for judged in self.selection.ranked() if judged.hypothesis.effect != own.effect]
-        alike = tuple(other.hypothesis for other in others if is_alike(other.by_stretch, judged.by_stretch))
-        change = Change(own, judged.magnitudes, covariance, gain, error, p_value, alike)
+        p_value, covariance = self.certainty_of(grams, own.mix, cause.magnitudes, by_fold)
+        alike = self.selection.alike(cause, self.selection.ranked())
+        change = replace(cause, covariance=covariance, gain=with_error(gain, error), p_value=p_value, alike=alike)
         return change, gain > CERTAIN * error and p_value < SIGNIFICANCE
 
     @property
@@ -204,54 +185,51 @@ class ChangeSearch:
         """Root of Σ e² on held-out parts of the new recordings, with the changes so far, N·m."""
         return float(np.sqrt(self.selection.base.sum()))
 
-    def matters(self, gain: float, before: float, effect: str, named: Sequence[str], least_gain: float) -> bool:
+    def matters(self, gain: float, before: float, effect: str, named: Sequence[str]) -> bool:
         """Return whether a change gains enough."""
         # It must also remove enough of the whole difference, so that small remnants of a large change are not named.
-        return gain >= least_gain * names_with(effect, named) and gain * before >= least_gain * self._whole
-
-    def _take(self, change: Change) -> None:
-        self.changes.append(change)
-        self._settle()
+        least = self._least_gain
+        return gain >= least * names_with(effect, named) and gain * before >= least * self._whole
 
     def _settle(self) -> None:
         for _ in range(STEPS):
-            self.changes = self.moved_on(self.grams())
+            self.causes = self.moved_on(self.grams())
         self._selection = None
 
     def free(self, keys: Sequence[Key]) -> None:
         """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
-            own = [hypothesis for hypothesis in self.hypotheses if hypothesis.key == key]
+            own = [cause for cause in self.candidates if cause.key == key]
             if own:
-                best = min(own, key=lambda hypothesis: grams.error(hypothesis.mix, hypothesis.low, hypothesis.high)[0])
-                nothing = np.zeros(best.mix.shape[1])
-                self.changes.append(Change(best, nothing, np.diag(nothing), 0.0, np.inf, 1.0))
+                bounds = [(cause.direction.mix, cause.direction.low, cause.direction.high) for cause in own]
+                best = own[int(np.argmin([grams.error(*bound)[0] for bound in bounds]))]
+                self.causes.append(replace(best, magnitudes=np.zeros(best.direction.mix.shape[1])))
                 self._settle()
 
-    def certain(self, number: int) -> Change:
+    def certain(self, number: int) -> Cause:
         """Return a change with the covariance and p-value that it has together with all others."""
-        change, grams = self.changes[number], self.grams(number)
-        own = change.hypothesis
+        change, grams = self.causes[number], self.grams(number)
+        own = change.direction
         mix = own.mix[own.mix.any(axis=1)]  # only its own columns are candidates
         _, by_fold = grams.error(mix, own.low, own.high)
         magnitudes = grams.magnitudes(mix, own.low, own.high)
         p_value, covariance = self.certainty_of(grams, mix, magnitudes, by_fold)
         return replace(change, covariance=covariance, p_value=p_value)
 
-    def moved_on(self, grams: Grams) -> list[Change]:
+    def moved_on(self, grams: Grams) -> list[Cause]:
         """Return the changes with updated magnitudes, from a solution in which their columns are shared."""
-        sizes = [len(change.magnitudes) for change in self.changes]
+        sizes = [len(change.magnitudes) for change in self.causes]
         steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
         return [
-            replace(change, magnitudes=np.clip(change.magnitudes + own, change.hypothesis.low, change.hypothesis.high))
-            for change, own in zip(self.changes, steps, strict=True)
+            replace(change, magnitudes=np.clip(change.magnitudes + own, change.direction.low, change.direction.high))
+            for change, own in zip(self.causes, steps, strict=True)
         ]
 
-    def keep(self, changes: Sequence[Change]) -> None:
+    def keep(self, changes: Sequence[Cause]) -> None:
         """Continue with these changes only."""
-        self.changes = list(changes)
-        self.changes = self.moved_on(self.grams())
+        self.causes = list(changes)
+        self.causes = self.moved_on(self.grams())
         self._selection = None
 
     # --- looking ---
@@ -264,11 +242,11 @@ class ChangeSearch:
         return self._selection
 
     def _look(self) -> Selection:
-        known = {change.hypothesis.effect for change in self.changes}
-        left = [hypothesis for hypothesis in self.hypotheses if hypothesis.effect not in known]
+        known = {change.effect for change in self.causes}
+        left = [cause for cause in self.candidates if cause.effect not in known]
         products, judged = self._products(None)
-        chosen = products.chosen(self._together(self.changes), None)
-        return Selection(Grams(chosen, self._target_now(), self._scales(self.changes), judged), left, self._least)
+        chosen = products.chosen(self._together(self.causes), None)
+        return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._least)
 
     @property
     def new_recordings(self) -> list[int]:
@@ -285,42 +263,55 @@ class ChangeSearch:
 
     def grams(self, without: int | None = None, unseen: Flags | None = None) -> Grams:
         """Return the products with the changes' own columns among the shared ones."""
-        kept = [change for k, change in enumerate(self.changes) if k != without]
+        kept = [change for k, change in enumerate(self.causes) if k != without]
         used = np.zeros(0, dtype=np.intp)
         target = self._target_now()
         if without is not None:
-            alone = self.changes[without]
-            used = np.flatnonzero(alone.hypothesis.mix.any(axis=1))
+            alone = self.causes[without]
+            used = np.flatnonzero(alone.direction.mix.any(axis=1))
             target = target + self._values @ self._mixed(alone)
         products, judged = self._products(unseen)
         return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
     def grams_of_recording(self, number: int, only: int) -> Grams:
         """Return the products with one change in one new recording as the only candidate."""
-        change = self.changes[number]
+        change = self.causes[number]
         column = (self._values @ self._mixed(change))[:, :, None]
         of = {
             new_recording: column * (self.series.recording == new_recording)[:, None, None]
             for new_recording in self.new_recordings
         }
-        kept = [change for k, change in enumerate(self.changes) if k != number]
+        kept = [change for k, change in enumerate(self.causes) if k != number]
         shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
         nominal = np.concatenate([self._shared, *shared], axis=2)
         products = Products(self.folds, nominal, of[only], self._splines)
         scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
         return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
 
-    def _target_now(self) -> Numbers:
-        return self._target - self.moved() if self.changes else self._target
+    def shares_by_recording(self, number: int) -> list[tuple[float, float]]:
+        """Return (value, standard error) for each new recording: which share of a change is in it, 1 for all of it."""
+        shares = []
+        low, high = _share_bounds(self.causes[number])
+        for recording in self.new_recordings:
+            grams = self.grams_of_recording(number, recording)
+            mix = np.eye(1)
+            _, by_fold = grams.error(mix, low, high)
+            share = grams.magnitudes(mix, low, high)
+            _, covariance = self.certainty_of(grams, mix, share, by_fold)
+            shares.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
+        return shares
 
-    def _together(self, changes: Sequence[Change]) -> Numbers:
+    def _target_now(self) -> Numbers:
+        return self._target - self.moved() if self.causes else self._target
+
+    def _together(self, changes: Sequence[Cause]) -> Numbers:
         """Return all columns of the changes [c, k]."""
         empty = np.zeros((self._values.shape[2], 0))
-        return np.concatenate([empty, *(change.hypothesis.mix for change in changes)], axis=1)
+        return np.concatenate([empty, *(change.direction.mix for change in changes)], axis=1)
 
-    def _scales(self, changes: Sequence[Change]) -> Numbers:
+    def _scales(self, changes: Sequence[Cause]) -> Numbers:
         """Return the scales of the shared columns; columns of changes are free."""
-        free = sum(change.hypothesis.mix.shape[1] for change in changes)
+        free = sum(change.direction.mix.shape[1] for change in changes)
         return np.concatenate([self._scale, np.full(free, np.nan)])
 
     def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
@@ -331,24 +322,24 @@ class ChangeSearch:
             self._known[key] = (Products(folds, self._shared, self._values, self._splines), judged)
         return self._known[key]
 
-    def accepted(self, changes: Sequence[Change]) -> list[Accepted]:
+    def terms(self, changes: Sequence[Cause]) -> list[Term]:
         """Return the terms that changes add to the description of now."""
-        return [part for change in changes for part in accepted_of(change.hypothesis, change.magnitudes)]
+        return [term for change in changes for term in change.scaled()]
 
-    def added(self, changes: Sequence[Change]) -> Numbers:
+    def added(self, changes: Sequence[Cause]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
         first = self._columns.values.shape[2]
         parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
 
     @staticmethod
-    def _mixed(change: Change) -> Numbers:
-        return np.asarray(change.hypothesis.mix @ change.magnitudes)
+    def _mixed(change: Cause) -> Numbers:
+        return np.asarray(change.direction.mix @ change.magnitudes)
 
-    def now_data(self, changes: Sequence[Change] | None = None) -> dict[str, Any]:
+    def now_data(self, changes: Sequence[Cause] | None = None) -> dict[str, Any]:
         """Return the description of now, derived from that of the reference."""
-        taken = self.changes if changes is None else changes
-        return dict(extended_description(changed(self.data, self.added(taken)), self.accepted(taken)))
+        taken = self.causes if changes is None else changes
+        return dict(extended_description(with_numbers(self.data, self.added(taken)), self.terms(taken)))
 
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
@@ -374,7 +365,7 @@ class ChangeSearch:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
         whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
         left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
-        if self.changes:
+        if self.causes:
             moved = self.moved()
             mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)
             left -= np.where(self.sides.now[:, None], moved - mean, 0.0)
@@ -390,7 +381,7 @@ class ChangeSearch:
     def column(self, number: int) -> Numbers:
         """Return the columns of a change, also in the reference [B, n, d]."""
         both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
-        return np.asarray(both @ self.changes[number].hypothesis.mix)
+        return np.asarray(both @ self.causes[number].direction.mix)
 
     # --- certainty ---
 
@@ -406,6 +397,14 @@ class ChangeSearch:
         dof = stretches - 1 - size
         p = float(stats.f.sf(squares[least] * dof / (size * (stretches - 1)), size, dof)) if dof > 0 else 1.0
         return min(1.0, p * self.tried), np.asarray(inverse @ spreads[least] @ inverse)
+
+
+def _share_bounds(change: Cause) -> tuple[Numbers, Numbers]:
+    """Return the bounds of the share [1] within which all magnitudes are within theirs."""
+    moved = change.magnitudes != 0.0
+    size, own = change.magnitudes[moved], change.direction
+    ends = np.sort(np.stack([own.low[moved] / size, own.high[moved] / size]), axis=0)
+    return np.array([ends[0].max(initial=-np.inf)]), np.array([ends[1].min(initial=np.inf)])
 
 
 def _in_twos(values: Numbers) -> Numbers:
@@ -436,3 +435,31 @@ def _joined(one: Folds, other: Folds) -> Folds:
         stretches=one.stretches + other.stretches,
         folds=one.folds + other.folds,
     )
+
+
+# --- gains ------------------------------------------------------------------------------------------------------------
+
+
+def gain_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> tuple[float, float]:
+    """Return 1 − rms after / rms before, and its standard error, with the motion taken as given."""
+    # The difference that a change makes varies along a motion, but it is known. What is uncertain is the noise on top
+    # of it. So the error is that of the product of difference and noise, by stretches. With only a few cycles of a
+    # motion, the spread of gains from stretch to stretch would measure how uneven the motion is.
+    whole, left = float(np.sum(before**2)), float(np.sum(after**2))
+    if whole <= 0.0 or left <= 0.0:
+        return 0.0, np.inf
+    cross = np.bincount(stretch - stretch.min(), np.sum(after * (before - after), axis=1))
+    cross = cross[np.unique(stretch - stretch.min())]
+    pairs = cross[: len(cross) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    variance = 4.0 * max(float(cross @ cross), float(pairs @ pairs))
+    ratio = np.sqrt(left / whole)
+    # delta method for left / whole: whole = left + 2 cross + difference², of which only cross is uncertain
+    return float(1.0 - ratio), float(np.sqrt(variance) * ratio / (2.0 * whole))
+
+
+def interval_of(before: Numbers, after: Numbers, stretch: NDArray[np.int64]) -> Interval:
+    """Return the gain with its 95 % interval: Student's t with as many degrees of freedom as stretches less one."""
+    gain, error = gain_of(before, after, stretch)
+    count = len(np.unique(stretch))
+    half = float(stats.t.ppf(0.975, max(count - 1, 1))) * error
+    return Interval(gain, gain - half, gain + half)

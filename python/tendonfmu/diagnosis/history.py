@@ -24,14 +24,18 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.diagnosis.changes.trend import slope
+from tendonfmu.arrays import Numbers
+from tendonfmu.diagnosis.answer import Asked
+from tendonfmu.diagnosis.cause import ChangedSize, Where
+from tendonfmu.diagnosis.change_diagnosis import sizes_now
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
-from tendonfmu.diagnosis.given_case import change_case
-from tendonfmu.diagnosis.result import ChangedSize, Where
+from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.inputs import read_input
+from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
-from tendonfmu.tasks import Job, rows_of, run_jobs
+from tendonfmu.tasks import Job, Phases, rows_of, run_jobs
 
 File = str | os.PathLike[str]
 
@@ -173,10 +177,11 @@ def sizes_in(
     finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
 ) -> dict[str, Any]:
     """Return a row: the sizes of these effects at these places in one recording, all of them free."""
-    from tendonfmu.diagnosis.changes.diagnosis import sizes_now
-
-    case = change_case(finger, [recording], reference, [], kinematics, least_gain, True)
-    sizes = sizes_now(case, [tuple(key) for key in json.loads(keys)], seed=seed, jobs=1)
+    given = read_input(finger, [recording], [], reference, kinematics, least_gain, True)
+    settings = FitSettings(threads=1, path=given.finger.path)
+    asked = Asked(given, 0.0, seed, settings, Phases({}))
+    chosen = choose(given.finger, given.reference, settings)
+    sizes = sizes_now(asked, chosen, [tuple(key) for key in json.loads(keys)])
     return {
         "recording": recording,
         "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in sizes}),
@@ -318,6 +323,23 @@ def _stamp(file: str) -> list[int]:
     except OSError as failed:
         raise InputError(f"{file}: {failed.strerror}") from None
     return [status.st_size, status.st_mtime_ns]
+
+
+def slope(times: Numbers, sizes: Sequence[Interval]) -> Interval:
+    """Return the change per unit of time, by weighted least squares."""
+    value = np.array([size.value for size in sizes])
+    error = np.maximum(np.array([(size.high - size.low) / 3.92 for size in sizes]), 1e-300)
+    weight = 1.0 / error**2
+    centre = float(weight @ times / weight.sum())
+    power = float(weight @ (times - centre) ** 2)
+    if power <= 0.0:
+        return Interval(0.0, -np.inf, np.inf)
+    rise = float(weight @ ((times - centre) * value) / power)
+    level = float(weight @ value / weight.sum())
+    left = value - level - rise * (times - centre)
+    scatter = float(weight @ left**2) / max(len(times) - 2, 1)
+    half = 1.96 * float(np.sqrt(max(scatter, 1.0) / power))
+    return Interval(rise, rise - half, rise + half)
 
 
 def share_of(line: Line) -> Interval | None:

@@ -8,7 +8,8 @@ import numpy as np
 from scipy import stats
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.result import ChangedSize, SteadyLoad
+from tendonfmu.diagnosis.cause import ChangedSize
+from tendonfmu.diagnosis.result import SteadyLoad
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import Interval, gain_interval, make_folds
 

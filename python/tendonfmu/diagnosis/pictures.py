@@ -1,25 +1,134 @@
-"""How the residual looks from all sides: over time, angle, velocity, force, load and travel; spectrum and whiteness."""
+"""How the residual looks: over the coordinate of a cause with and without it, and from all sides.
+
+From all sides is over time, angle, velocity, force, load and travel, and as spectrum and autocorrelation.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.diagnosis.cause import Evidence
+from tendonfmu.diagnosis.effects import BY_NAME, Place
 from tendonfmu.diagnosis.result import ResidualView
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import make_folds
 
-if TYPE_CHECKING:
-    from tendonfmu.diagnosis.series import Series
-
-
 BINS = 24
+SHOWN = 4.0  # ratio of the bins' squared means without and with the cause, for a picture that shows it
+FEWEST = 10  # blocks in a bin
 POINTS = 1200  # of a curve over time
 LONGEST_LAG = 1.0  # s
+
+
+# --- a cause ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What a model leaves without and with a cause, N·m [B, n]."""
+
+    series: Series
+    before: Numbers
+    after: Numbers
+    added: Numbers  # torque of the cause
+    judged: Flags  # blocks that are looked at [B]
+    reference: Flags | None = None  # blocks of the reference [B], for a change
+
+
+def evidence(effect: str, places: Sequence[Place], compared: Compared) -> tuple[Evidence, ...]:
+    """Return a picture of the residual at the joint where the cause changes most."""
+    joint = int(np.argmax(np.sum(compared.added[compared.judged] ** 2, axis=0)))
+    place = next((place for place in places if place.joint == joint + 1), places[0])
+    coordinate = BY_NAME[effect].coordinate if effect in BY_NAME else "velocity"
+    picture = _binned_evidence(compared, _coordinate_of(place, coordinate, compared.series, joint), joint)
+    if picture and _shows(picture[0]):
+        return picture
+    what = "cause" if compared.reference is None else "change"
+    torque = (f"torque of this {what} at joint {joint + 1}", "N·m", compared.added[:, joint])
+    return _binned_evidence(compared, torque, joint) or picture
+
+
+def _shows(evidence: Evidence) -> bool:
+    """Return whether the cause removes most of the bins' mean residual."""
+    return float(np.sum(evidence.before**2)) >= SHOWN * float(np.sum(evidence.after**2))
+
+
+def _binned_evidence(compared: Compared, over: tuple[str, str, Numbers], joint: int) -> tuple[Evidence, ...]:
+    """Average over bins of equal count; return nothing if there are too few blocks."""
+    label, unit, values = over
+    kept = compared.judged & np.isfinite(values)
+    bins = min(BINS, int(kept.sum()) // FEWEST)
+    if bins < 2:
+        return ()
+    before, after = compared.before[:, joint], compared.after[:, joint]
+    reference: tuple[Numbers, Numbers] | tuple[None, None] = (None, None)
+    if compared.reference is None:
+        order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
+        parts = np.array_split(order, bins)
+    else:
+        edges = np.quantile(values[kept], np.linspace(0.0, 1.0, bins + 1))
+        inside = compared.reference & (values >= edges[0]) & (values <= edges[-1])
+        edges[0], edges[-1] = -np.inf, np.inf
+        member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+        filled = [k for k in range(bins) if (kept & (member == k)).any()]
+        parts = [np.flatnonzero(kept & (member == k)) for k in filled]
+        reference = _means(after, [np.flatnonzero(inside & (member == k)) for k in filled], compared.series)
+    least = 1 if compared.reference is None else FEWEST
+    means = [_means(torque, parts, compared.series, least) for torque in (before, after)]
+    coordinate = np.array([values[rows].mean() for rows in parts])
+    (before, before_std), (after, after_std) = means
+    return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std, *reference),)
+
+
+def _means(
+    values: Numbers, parts: Sequence[NDArray[np.int64]], series: Series, least: int = FEWEST
+) -> tuple[Numbers, Numbers]:
+    """Return means and their standard errors [K]; NaN for bins with fewer than `least` blocks."""
+    means, errors = np.full(len(parts), np.nan), np.full(len(parts), np.nan)
+    second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
+    for k, rows in enumerate(parts):
+        if len(rows) >= least:
+            means[k] = values[rows].mean()
+            _, member = np.unique(second[rows], return_inverse=True)
+            sums = np.bincount(member, weights=values[rows] - means[k])
+            errors[k] = np.sqrt(np.sum(sums**2)) / len(rows)
+    return means, errors
+
+
+def _coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
+    """Return label, unit and values [B] of the coordinate."""
+    own = joint if place.joint is None else place.joint - 1
+    tendon = None if place.tendon is None else place.tendon - 1
+    if kind == "velocity" and tendon is not None:
+        return f"velocity of tendon {tendon + 1}", "m/s", series.tendon_velocity[:, tendon, own]
+    if kind in ("force", "load"):
+        if tendon is None:
+            return "mean tendon force", "N", np.abs(series.force).mean(axis=1)
+        return f"force of tendon {tendon + 1}", "N", series.force[:, tendon]
+    of_joint: Mapping[str, tuple[str, str, Numbers]] = {
+        "velocity": ("velocity", "rad/s", series.velocity),
+        "angle": ("angle", "rad", series.angle),
+        "travel": ("travel since the last reversal", "rad", _signed_travel(series)),
+        "acceleration": ("acceleration", "rad/s²", series.acceleration),
+    }
+    if kind in of_joint:
+        label, unit, values = of_joint[kind]
+        return f"{label} of joint {own + 1}", unit, values[:, own]
+    return "time", "s", series.time
+
+
+def _signed_travel(series: Series) -> Numbers:
+    """Return the travel since the last reversal with the sign of the motion [B, n], rad."""
+    return np.asarray(series.travel * np.sign(series.velocity))
+
+
+# --- all sides --------------------------------------------------------------------------------------------------------
 
 
 def residual_views(

@@ -1,0 +1,313 @@
+"""What has changed since the reference: the same finger, recorded when it was well and recorded now.
+
+The model is fitted to the reference. Errors that it makes in both are not reported. A cause is a change of one of its
+numbers, or a term that it lacks, in the new recordings only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy import stats
+
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.answer import Asked, answered, reported, too_small
+from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
+from tendonfmu.diagnosis.cause_search import residual_alone
+from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
+from tendonfmu.diagnosis.events import event_gain, events_of, without_events
+from tendonfmu.diagnosis.extension_fit import fit_numbers
+from tendonfmu.diagnosis.gain import Gain, measure_gain
+from tendonfmu.diagnosis.invisible import absorbed_effects
+from tendonfmu.diagnosis.pictures import Compared
+from tendonfmu.diagnosis.result import Diagnosis, Experiment, SteadyLoad, Unexplained
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed
+from tendonfmu.diagnosis.series import Series, make_grid
+from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings
+from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
+from tendonfmu.diagnosis.steady_load import steady_load
+from tendonfmu.estimate import Choice
+from tendonfmu.statistics import Interval
+
+LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
+LEVEL = 0.001  # significance level of this difference
+SPREAD = 2.0  # standard deviations over the stretches of the reference: other motions have another error
+FEWEST = 4  # least number of stretches on either side
+REPEAT = "Make the motions of the reference again, exactly, at the same load and pretension"
+
+
+def diagnose_change(asked: Asked, chosen: Estimation) -> Diagnosis:
+    """Find what has changed since the reference."""
+    return _Changes(asked, chosen).diagnosis()
+
+
+def sizes_now(asked: Asked, chosen: Estimation, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+    """Return how large these effects are in the new recordings, named or not."""
+    return _Changes(asked, chosen).sizes(keys)
+
+
+class _Changes:
+    """Everything that is reported of a change."""
+
+    def __init__(self, asked: Asked, chosen: Estimation) -> None:
+        self._asked, self._given, self._chosen = asked, asked.given, chosen
+        finger = replace(self._given.finger, data=chosen.signals.description(self._given.finger.data))
+        self._reference = list(chosen.recordings)
+        self._now, self._held, self._tests = (
+            estimation_recordings(finger, recordings, chosen.signals)
+            for recordings in (self._given.whole, self._given.training, self._given.tests)
+        )
+        self._all = [*self._reference, *self._now, *self._tests]
+        self._grid = make_grid(self._all)
+
+    def diagnosis(self) -> Diagnosis:
+        """Return the diagnosis; its duration is still 0."""
+        phases = self._asked.phases
+        with phases.start("contact"):
+            out = self._without_events()
+        with phases.start("changes") as step:
+            self._search = self._searching(out)
+            self._search.run(step)
+        with phases.start("gain on unseen data"):
+            dropped = self._verified()
+            return self._result(dropped)
+
+    def sizes(self, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+        """Return the sizes of effects at places in the new recordings, all of them free."""
+        search = self._search = self._searching(self._without_events())
+        search.free(keys)
+        changes = [search.certain(k) for k in range(len(search.causes))]
+        listed = [sized(search, changes, k) for k in range(len(changes))]
+        return [(change.key, change.changed) for change in listed if change.changed is not None]
+
+    def _without_events(self) -> Flags:
+        """Return the blocks that lie in contact or a stall [B]."""
+        names = {str(recording.path) for recording in self._all[len(self._reference) :]}
+        events, out = events_of(self._chosen.model.data, self._all, self._grid, self._asked.seed)
+        self._events = tuple(event for event in events if event.recording in names)
+        return out
+
+    def _searching(self, out: Flags) -> ChangeSearch:
+        first, last = len(self._reference), len(self._reference) + len(self._now)
+        now, tests = range(first, last), range(last, len(self._all))
+        return ChangeSearch(
+            self._chosen.model.data,
+            self._all,
+            self._grid,
+            self._chosen.least,
+            now,
+            tests,
+            out,
+            self._asked.least_gain,
+            self._asked.seed,
+        )
+
+    # --- verified on unseen data ---
+
+    def _verified(self) -> list[Cause]:
+        """Drop the changes that unseen data do not confirm, and return them."""
+        search = self._search
+        # blocks of tests [B]; without tests, the held-out parts of the new recordings are judged in turn
+        unseen = search.sides.test if self._given.tests else None
+
+        def judge(changes: list[Cause]) -> tuple[list[Cause], list[int]]:
+            if len(changes) < len(search.causes):
+                search.keep(changes)
+            grams = search.grams(unseen=unseen)
+            after, stretch = grams.unseen_residual(), grams.counted_stretch
+            without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.causes))]
+            gains = [interval_of(left, after, stretch) for left in without]
+            beside = [search.certain(k) for k in range(len(search.causes))]
+            order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
+            named = [search.causes[k].effect for k in order]
+            weak = [
+                k
+                for place, k in enumerate(order)
+                if not gains[k].low > 0.0
+                or beside[k].p_value >= SIGNIFICANCE
+                or not search.matters(
+                    gains[k].value,
+                    search.error * float(np.linalg.norm(without[k]) / np.linalg.norm(after)),
+                    named[place],
+                    named[:place],
+                )
+            ]
+            return [replace(change, gain=gain) for change, gain in zip(search.causes, gains, strict=True)], weak
+
+        changes, dropped = confirmed(search.causes, judge)
+        certain = [replace(search.certain(k), gain=change.gain) for k, change in enumerate(changes)]
+        search.keep(by_gain(certain))
+        return dropped
+
+    # --- the models ---
+
+    def _learned(self) -> list[Cause]:
+        """Return the changes as learned without the samples that they are judged on."""
+        search = self._search
+        held = np.zeros(len(search.series.time), dtype=bool)
+        for segment in self._grid.segments:
+            number = segment.recording - len(self._reference)
+            if 0 <= number < len(self._held):
+                held[segment.blocks] = segment.mean(self._held[number].held_out[segment.part]) > 0.0
+        if not held.any() or not search.causes:
+            return search.causes
+        return search.moved_on(search.grams(unseen=held))
+
+    def _online(self, changes: Sequence[Cause]) -> Data:
+        """Return the reference model with changes, with the bias at the start of the new recordings."""
+        data: Data = self._search.now_data(changes)
+        if (data.get("bias") or {}).get("initial_torque") is not None:
+            own = [
+                replace(recording, train=recording.train & other.train)
+                for recording, other in zip(self._now, self._held, strict=True)
+            ]
+            settings = replace(self._asked.settings, choice=Choice(only=("bias.initial_torque*",)))
+            data = fit_numbers(data, own, settings).data
+        return self._chosen.online(data)
+
+    # --- what is reported ---
+
+    def _result(self, dropped: Sequence[Cause]) -> Diagnosis:
+        given, search = self._given, self._search
+        learned = self._learned()
+        models = [self._online(learned[:k]) for k in range(len(learned) + 1)]
+        gain = self._measured(models)
+        harmful = [k for k, (one, other) in enumerate(pairwise(gain.steps)) if other > one]
+        if harmful:  # it helps together with what is wrong in both, but not alone
+            k = harmful[-1]
+            dropped = [*dropped, search.causes[k]]
+            search.keep([*search.causes[:k], *search.causes[k + 1 :]])
+            return self._result(dropped)
+        compared = self._compared()
+        causes = [
+            reported(with_sizes_by_recording(search, k, sized(search, search.causes, k)), own)
+            for k, own in enumerate(compared)
+        ]
+        views, load = self._views(), self._load()
+        return answered(
+            self._asked,
+            self._chosen,
+            gain,
+            (self._now_series(), *views),
+            causes=causes,
+            unexplained=self._unexplained(),
+            warnings=self._warnings(),
+            noise_floor=tuple(float(value) for value in np.minimum(self._floor(), gain.extended.test_rms)),
+            floor_source="what remains on unseen stretches without the errors that both recordings share",
+            too_small=tuple(
+                too_small(replace(change, terms=(), alike=(), size="")) for change in [*dropped, *search.refused]
+            ),
+            invisible=tuple(absorbed_effects(search.selection, REPEAT)),
+            events=self._events,
+            experiment=Experiment(self._next(causes)),
+            detection=None,
+            nominal_data=models[0],
+            extended_data=self._online(search.causes) if causes else models[0],
+            tested=search.tried,
+            event_gain=event_gain(models[-1], given.whole, self._events),
+            kind="change",
+            load=load,
+            repeated=search.repeated,
+        )
+
+    def _measured(self, models: Sequence[Data]) -> Gain:
+        """Return the gains of a sequence of models as they run online."""
+        now, tests = (
+            [without_events(recording, self._events) for recording in recordings]
+            for recordings in (self._given.training, self._given.tests)
+        )
+        return measure_gain(models[0], models[-1], now, tests, between=models[1:-1], seed=self._asked.seed)
+
+    def _compared(self) -> list[Compared]:
+        """Return, for each change, what is left without it and with it."""
+        search = self._search
+        left = search.left()  # with all changes, without the background
+        now, reference = search.informative & search.sides.now, search.informative & ~search.sides.now
+        compared = []
+        for k, change in enumerate(search.causes):
+            added = search.column(k) @ change.magnitudes
+            added = added - added[search.series.used].mean(axis=0)
+            compared.append(Compared(search.series, left + added, left, added, now, reference))
+        return compared
+
+    def _now_series(self) -> Series:
+        series = self._search.series
+        return replace(series, used=series.used & self._search.sides.now)
+
+    def _views(self) -> tuple[Numbers, Numbers]:
+        """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
+        search, series = self._search, self._now_series()
+        before = residual_alone(search.data, series)
+        if not search.causes:
+            return before, before
+        return before, residual_alone(search.data, replace(series, target=series.target - search.moved()))
+
+    def _warnings(self) -> list[str]:
+        folds, judged = self._search.folds, self._search.judged
+        now = int(judged.sum())
+        warnings = []
+        if now < 4 or folds.folds - now < 4:
+            warnings.append(
+                "less than 16 s of motion then or now: a change has to be large to be certain; record a minute of each"
+            )
+        return warnings
+
+    def _unexplained(self) -> Unexplained:
+        """Return whether the new recordings, with all changes, are explained worse than the reference is by itself."""
+        search = self._search
+        squares, rows = search.grams().left()
+        is_now = search.stretches_now
+        if is_now.sum() < FEWEST or (~is_now).sum() < FEWEST:
+            return Unexplained(0.0, "", tuple(0.0 for _ in range(squares.shape[1])))
+        level = np.log(np.maximum(squares / rows[:, None], 1e-300)) / 2.0  # of the rms
+        p_values = stats.ttest_ind(level[is_now], level[~is_now], equal_var=False, alternative="greater").pvalue
+        now, then = (np.sqrt(squares[side].sum(axis=0) / rows[side].sum()) for side in (is_now, ~is_now))
+        worse = np.clip(1.0 - then / np.maximum(now, 1e-300), 0.0, 1.0)
+        p_value = min(1.0, float(np.nanmin(p_values)) * len(worse))
+        worst = int(np.argmax(worse * now))
+        apart = float(level[is_now, worst].mean() - level[~is_now, worst].mean())
+        beyond = apart > SPREAD * float(level[~is_now, worst].std())
+        unknown = bool(worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL and beyond)
+        share = tuple(float(1.0 - (1.0 - share) ** 2) if unknown else 0.0 for share in worse)
+        gain = Interval(0.0, 0.0, 0.0)
+        if unknown:
+            spread = float(np.sqrt(sum(np.var(level[s, worst], ddof=1) / s.sum() for s in (is_now, ~is_now))))
+            ends = [1.0 - (1.0 - float(worse[worst])) * np.exp(sign * 1.96 * spread) for sign in (1.0, -1.0)]
+            gain = Interval(float(worse[worst]), float(ends[0]), float(ends[1]))
+        words = (
+            f"at joint {worst + 1} the new recordings are explained worse than the reference, and the cause is unknown"
+        )
+        whole = float(np.array(share) @ now**2 / max(float((now**2).sum()), 1e-300))
+        return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
+
+    def _load(self) -> SteadyLoad | None:
+        """Return what remains of a load both with and without the means of the changes."""
+        search = self._search
+        loads: list[SteadyLoad] = []
+        for means in (False, True) if search.causes else (False,):
+            load = steady_load(search.series, search.torque_left(means), search.sides.now, self._asked.seed)
+            if load is None or load.gain.low <= 0.0:
+                return None
+            loads.append(load)
+        return min(loads, key=lambda load: abs(load.size.change.value))
+
+    def _floor(self) -> Numbers:
+        """Return the rms of the new recordings, N·m [n]."""
+        squares, rows = self._search.selection.grams.left()
+        is_now = self._search.stretches_now
+        return np.asarray(np.sqrt(squares[is_now].sum(axis=0) / max(float(rows[is_now].sum()), 1.0)))
+
+    def _next(self, causes: Sequence[Cause]) -> str:
+        search = self._search
+        pulls = any(not tendon.get("bidirectional") for tendon in self._given.finger.data["tendons"])
+        if any(cause.confusable_with for cause in causes) and pulls:
+            return (
+                f"{REPEAT}, once as it was and once at half and at twice the pretension: what grows with the force is "
+                "then distinguished from what does not"
+            )
+        if not search.repeated and (causes or absorbed_effects(search.selection, REPEAT)):
+            return f"{REPEAT}: then only the change is left of their difference"
+        return ""

@@ -1,0 +1,180 @@
+"""Where the effects of a description are, and where there could be one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.arrays import Data
+from tendonfmu.diagnosis.effects.candidate import Place, Shape, row_places
+from tendonfmu.diagnosis.effects.description_edit import magnitudes_of, sides_at
+from tendonfmu.model import Effect, effects, moment_arms, number_of
+
+# --- parts of a finger ------------------------------------------------------------------------------------------------
+
+
+def joints(data: Data, kinematics: int = 1) -> list[Place]:
+    return [Place(joint=j) for j in range(1, len(data["joints"]) + 1)]
+
+
+def tendons(data: Data, kinematics: int = 1) -> list[Place]:
+    return [Place(tendon=i) for i in range(1, len(data["tendons"]) + 1)]
+
+
+def whole_finger(data: Data, kinematics: int = 1) -> list[Place]:
+    return [Place()]
+
+
+def passes(data: Data, kinematics: int = 1) -> list[Place]:
+    """Return the joints that each tendon reaches: it turns this joint or one beyond, so ẋ_ij is not always 0."""
+    places = []
+    for i, arms in enumerate(moment_arms(data), start=1):
+        reached = np.flatnonzero(arms)
+        places += [Place(j, i) for j in range(1, (int(reached[-1]) + 2) if len(reached) else 1)]
+    return places
+
+
+def joints_before_others(data: Data, kinematics: int = 1) -> list[Place]:
+    return joints(data)[:-1]
+
+
+def moving_parts(data: Data, kinematics: int) -> list[Place]:
+    """Return joints, and tendons if their positions are used."""
+    return (joints(data) if kinematics != 3 else []) + (tendons(data) if kinematics == 1 else [])
+
+
+def stretching_tendons(data: Data, kinematics: int) -> list[Place]:
+    """Return the tendons if the joint angles come from the tendon positions; otherwise stretch does not matter."""
+    return tendons(data) if kinematics == 1 else []
+
+
+# --- friction laws ----------------------------------------------------------------------------------------------------
+
+
+def place_of(effect: Effect) -> Place:
+    """Return joint and tendon of a law; friction in a joint has no tendon."""
+    return Place(effect.joint, effect.tendon or None)
+
+
+def kind_shape(effect: Effect) -> dict[str, float]:
+    """Return what distinguishes the two laws of one place: {"pulley": 1} or {"load": 1}."""
+    return {"pulley_friction": {"pulley": 1.0}, "load_friction": {"load": 1.0}}.get(effect.kind, {})
+
+
+def law_of(shape: Shape) -> str:
+    """Return which of the two laws of a place a shape belongs to: "pulley", "load", or "" for the other one."""
+    return next((kind for kind in ("pulley", "load") if shape.get(kind)), "")
+
+
+def law_path(place: Place, shape: Shape) -> str:
+    """Return the path of the effect at a place; `shape` holds what `kind_shape` returned."""
+    if place.tendon is None:
+        return f"joints[{place.joint}].{'load_friction' if shape.get('load') else 'friction'}"
+    kind = "pulley_friction" if shape.get("pulley") else "edge_friction"
+    return f"tendons[{place.tendon}].{kind}[{place.joint}]"
+
+
+def laws_at(data: Data, place: Place) -> list[Effect]:
+    """Return the present laws of a place."""
+    return [effect for effect in effects(data) if place_of(effect) == place]
+
+
+def all_sides(data: Data, effect: Effect) -> list[tuple[float, float, float]]:
+    """Return Coulomb, static − coulomb and viscous friction of each side of each law of an effect."""
+    return [magnitudes_of(side) for side in sides_at(data, effect.path)]
+
+
+def largest_coulomb(data: Data, effect: Effect) -> float:
+    """Return the largest Coulomb friction of an effect; a tiny one in place of 0."""
+    return max(coulomb for coulomb, _, _ in all_sides(data, effect)) or 1e-6
+
+
+def lacks_viscous(data: Data, effect: Effect) -> bool:
+    return all(viscous == 0 for _, _, viscous in all_sides(data, effect))
+
+
+def lacks_drop(data: Data, effect: Effect) -> bool:
+    """Return whether static equals coulomb in all laws of an effect."""
+    return all(drop == 0 for _, drop, _ in all_sides(data, effect))
+
+
+def lacks_sides(data: Data, effect: Effect) -> bool:
+    return all(law.get("positive") is None for law in effect.laws)
+
+
+def laws_where(lacks: Callable[[Data, Effect], bool]) -> Callable[[Data, int], list[Place]]:
+    """Return a function that lists the places with a law that lacks something, each once."""
+
+    def places(data: Data, kinematics: int) -> list[Place]:
+        return list(dict.fromkeys(place_of(effect) for effect in effects(data) if lacks(data, effect)))
+
+    return places
+
+
+def edges(data: Data) -> dict[Place, bool]:
+    """Return the present edges and whether they have working points."""
+    present = (effect for effect in effects(data) if effect.kind == "edge_friction")
+    return {Place(effect.joint, effect.tendon): bool(effect.angles) for effect in present}
+
+
+def absent_edges(data: Data, kinematics: int) -> list[Place]:
+    """Return the places without an edge, and those whose edge does not depend on the angle of the joint before."""
+    known = edges(data)
+    return [place for place in passes(data) if place not in known or (not known[place] and (place.joint or 1) > 1)]
+
+
+def absent_pulleys(data: Data, kinematics: int) -> list[Place]:
+    present = {(effect.joint, effect.tendon) for effect in effects(data) if effect.kind == "pulley_friction"}
+    return [
+        place
+        for place, after in pairwise(passes(data))
+        if place.tendon == after.tendon and (place.joint, place.tendon) not in present
+    ]
+
+
+def joints_without(key: str) -> Callable[[Data, int], list[Place]]:
+    """Return a function that lists the joints without a law of this name."""
+
+    def places(data: Data, kinematics: int) -> list[Place]:
+        return [place for place in joints(data) if _joint(data, place).get(key) is None]
+
+    return places
+
+
+def joints_without_spring(data: Data, kinematics: int) -> list[Place]:
+    return [place for place in joints(data) if not (_joint(data, place).get("cover") or {}).get("stiffness")]
+
+
+def _joint(data: Data, place: Place) -> Any:
+    return data["joints"][(place.joint or 1) - 1]
+
+
+def passes_without_sheath(data: Data, kinematics: int) -> list[Place]:
+    """Return each joint that a tendon reaches, unless a row says that the tendon rubs before all of them."""
+    everywhere = row_places(data, "preload_friction")
+    return [place for place in passes(data) if Place(tendon=place.tendon) not in everywhere]
+
+
+# --- parts with friction ----------------------------------------------------------------------------------------------
+
+
+def rubbing_parts(data: Data) -> list[Place]:
+    """Return the joints with friction of their own, then the tendons with friction along them."""
+    present = list(effects(data))
+    at_joints = sorted({effect.joint for effect in present if not effect.tendon})
+    at_tendons = sorted({effect.tendon for effect in present if effect.tendon})
+    return [*(Place(joint=j) for j in at_joints), *(Place(tendon=i) for i in at_tendons)]
+
+
+def rubbing_parts_and_all(data: Data, kinematics: int) -> list[Place]:
+    """Return each joint and tendon with friction, and everywhere if there are several."""
+    places = rubbing_parts(data)
+    return ([Place()] if len(places) > 1 else []) + places
+
+
+def thresholds(data: Data) -> tuple[float, float]:
+    """Return the velocity thresholds of motion, of tendons and of joints."""
+    return number_of(data, "velocity_threshold.tendon"), number_of(data, "velocity_threshold.joint")

@@ -1,0 +1,380 @@
+"""Which effects a diagnosis knows, in the order of docs/reference/commands/diagnose.md: one row of a table each.
+
+`contact` and `unknown` are no terms of a model. They stand for an event in the recording and for what is left.
+"""
+
+from __future__ import annotations
+
+from tendonfmu.diagnosis.effects import places, shapes, terms, words
+from tendonfmu.diagnosis.effects.candidate import Candidate
+from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where
+from tendonfmu.errors import InputError
+
+CANDIDATES: tuple[Candidate, ...] = (
+    Candidate(
+        name="viscous_friction",
+        title="friction grows with speed",
+        explanation=(
+            "The friction law here is the same at every speed, but the measured friction rises with it, as in "
+            "grease or a seal. Look at the lubricant, at sealed bearings, and at whether it is worse when cold."
+        ),
+        excited_by="strokes at several constant speeds, from slow to as fast as the hand goes",
+        coordinate="velocity",
+        possible_places=laws_where(lacks_viscous),
+        make=terms.viscous,
+        size=words.of("viscous {}", "viscous"),
+        find_shapes=shapes.laws_that_lack(lacks_viscous),
+        shared=True,
+    ),
+    Candidate(
+        name="stribeck",
+        title="friction is different when slow",
+        explanation=(
+            "Friction falls as motion gets faster, before it stays level: the lubricant film builds up, and slow "
+            "motion is jerky. Or it rises from standstill, as in rolling screws. Look at slow motion for stick "
+            "and slip."
+        ),
+        excited_by="slow motion: strokes at speeds from the threshold of motion up to a tenth of the usual speed",
+        coordinate="velocity",
+        possible_places=laws_where(lacks_drop),
+        make=terms.stribeck,
+        size=words.standstill,
+        find_shapes=shapes.stribeck,
+        shared=True,
+    ),
+    Candidate(
+        name="asymmetric_friction",
+        title="friction differs between the directions",
+        explanation=(
+            "Moving one way costs more than moving the other way. Look for a worn or fouled flank, a preload in a "
+            "screw or gear, a tendon that rubs at one edge in one direction only."
+        ),
+        excited_by="the same strokes there and back, with pauses, at several speeds",
+        coordinate="velocity",
+        possible_places=laws_where(lacks_sides),
+        make=terms.sides,
+        size=words.sides,
+        find_shapes=shapes.laws_that_lack(lacks_sides),
+    ),
+    Candidate(
+        name="edge_friction",
+        title="a tendon rubs at an edge before a joint",
+        explanation=(
+            "The tendon bends over an edge or guide where the model has no friction, or where it has friction "
+            "that does not depend on how far the joint before bends the tendon. Look at the guide between the "
+            "joints."
+        ),
+        excited_by="strokes of this joint with the joint before at several angles, at two pretensions",
+        coordinate="angle",
+        possible_places=places.absent_edges,
+        make=terms.edge,
+        size=words.of("up to {} of the tendon force", "coulomb"),
+        find_shapes=shapes.edge,
+        shared=True,
+    ),
+    Candidate(
+        name="pulley_friction",
+        title="a pulley turns with friction",
+        explanation=(
+            "The tendon loses force at the pulley of this joint when it moves on to the joints beyond, and the "
+            "model has no friction there. Look at the pulley's bearing and at whether the tendon slides on it."
+        ),
+        excited_by="strokes of the joints beyond this one, with this joint at rest, at two pretensions",
+        coordinate="velocity",
+        possible_places=places.absent_pulleys,
+        make=terms.absent_law(pulley=1.0),
+        size=words.of("up to {} of the tendon force", "coulomb"),
+        shared=True,
+    ),
+    Candidate(
+        name="joint_friction",
+        title="the joint itself rubs",
+        explanation=(
+            "Friction in the joint that does not depend on the tendon forces, where the model has none. Look at "
+            "the bearing, at seals and at parts that rub against each other when the joint moves without load."
+        ),
+        excited_by="strokes of this joint at low pretension",
+        coordinate="velocity",
+        possible_places=places.joints_without("friction"),
+        make=terms.absent_law(),
+        size=words.of("{} of friction", "coulomb"),
+        shared=True,
+    ),
+    Candidate(
+        name="joint_load_friction",
+        title="the joint's friction grows with the force of all tendons",
+        explanation=(
+            "The tendons press the joint's bearing together, and its friction grows with the sum of their forces; "
+            "the model has no such part. Look at the bearing and at the pretension."
+        ),
+        excited_by="strokes of this joint at two or more pretensions",
+        coordinate="load",
+        possible_places=places.joints_without("load_friction"),
+        make=terms.absent_law(load=1.0),
+        size=words.per_force("all tendon forces"),
+        shared=True,
+    ),
+    Candidate(
+        name="preload_friction",
+        title="a tendon rubs however little it pulls",
+        explanation=(
+            "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. "
+            "Look at whether friction remains without pretension."
+        ),
+        excited_by="the same strokes at pretensions as different as the hand allows, the lowest first of all",
+        coordinate="force",
+        possible_places=places.passes_without_sheath,
+        make=terms.row(coulomb=1),
+        size=words.with_number(
+            words.of("{} of friction", "coulomb"), "beyond", ", {} times as much at the joints beyond"
+        ),
+        find_shapes=shapes.sheath,
+        shared=True,
+    ),
+    Candidate(
+        name="load_friction",
+        title="friction grows with the force of a tendon",
+        explanation=(
+            "Friction in the joint that the model has constant, or shares out among all tendons alike, grows with "
+            "the force of this tendon. Look at the bearing on the side of this tendon and at the pretension."
+        ),
+        excited_by="strokes of this joint at two or more loads of this tendon",
+        coordinate="force",
+        possible_places=places.passes,
+        make=terms.row(coulomb=1),
+        size=words.per_force("tendon force"),
+        shared=True,
+    ),
+    Candidate(
+        name="cover_stiffness",
+        title="a spring pulls at the joint",
+        explanation=(
+            "A torque that grows with the joint's angle, as of a skin, a cover or a bundle of cables that bends "
+            "with the joint. Let the joint go without tendon forces and see where it comes to rest."
+        ),
+        excited_by="slow strokes of this joint over its whole range",
+        coordinate="angle",
+        possible_places=places.joints_without_spring,
+        make=terms.spring,
+        size=words.of("a spring of {}", "stiffness"),
+        shared=True,
+    ),
+    Candidate(
+        name="cover_hardening",
+        title="the cover stiffens as it bends",
+        explanation=(
+            "The spring at this joint is not linear: far from its rest angle it pulls more than in proportion, as "
+            "folded plastic or a cable near its end does. Look at the cover at both ends of the joint's range."
+        ),
+        excited_by="slow strokes of this joint up to both ends of its range",
+        coordinate="angle",
+        possible_places=places.joints,
+        make=terms.row(stiffness=1),
+        size=words.of("a cubic spring of {}", "stiffness"),
+        shared=True,
+    ),
+    Candidate(
+        name="gravity",
+        title="the link's weight",
+        explanation=(
+            "A torque that varies with the sine and cosine of the link's angle, at this joint and at those before "
+            "it: the weight of what this joint turns. Turn the hand and see whether it changes."
+        ),
+        excited_by="slow strokes over the whole range, then the same with the hand turned by 90 degrees",
+        coordinate="angle",
+        possible_places=places.joints,
+        make=terms.row(sine=0, cosine=0),
+        size=words.wave("{} at most"),
+    ),
+    Candidate(
+        name="inertia",
+        title="the link's inertia",
+        explanation=(
+            "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to "
+            "it. It is negative if too much inertia was subtracted with a known load."
+        ),
+        excited_by="fast starts and stops of this joint, with the same travel at different accelerations",
+        coordinate="acceleration",
+        possible_places=places.joints,
+        make=terms.row(inertia=0),
+        size=words.of("{}", "inertia"),
+    ),
+    Candidate(
+        name="presliding",
+        title="friction builds up over a short way after each reversal",
+        explanation=(
+            "After a reversal friction does not jump but grows over a short travel, because the surfaces and the "
+            "tendon deform before they slide. Look at the torque against the travel since the reversal."
+        ),
+        excited_by="many small reversals at low speed, with travels around the distance over which friction builds up",
+        coordinate="travel",
+        possible_places=shapes.presliding_places,
+        make=terms.presliding,
+        size=words.of("over {}", "displacement"),
+        find_shapes=shapes.presliding,
+        common=True,
+    ),
+    Candidate(
+        name="friction_drift",
+        title="friction changes as time goes by",
+        explanation=(
+            "All friction here grows or fades by a share in the course of the recording: warming up, running in, "
+            "or lubricant that is squeezed out. Compare the same motion at the start and at the end."
+        ),
+        excited_by="the same strokes at the start and at the end of a long recording, after a rest",
+        coordinate="time",
+        possible_places=places.rubbing_parts_and_all,
+        # friction does not change its sign
+        make=terms.row(-0.85, amplitude=0),
+        size=words.drift,
+        find_shapes=shapes.drift,
+    ),
+    Candidate(
+        name="force_gain",
+        title="a force sensor's gain is off",
+        explanation=(
+            "The true force of this tendon is larger or smaller than the measured one by a constant factor. Hang "
+            "a known weight on the tendon and compare."
+        ),
+        excited_by="slow changes of the pretension with the joints at rest, and motion at several tensions",
+        coordinate="force",
+        possible_places=places.tendons,
+        # at -1 there would be no force
+        make=terms.row(-0.9, correction=0),
+        size=words.correction("the true force is"),
+        scaling=True,
+    ),
+    Candidate(
+        name="force_offset",
+        title="a force sensor's zero is off",
+        explanation=(
+            "The true force of this tendon is the measured one plus a constant. A constant torque looks like the "
+            "bias, which takes it up: take all load off the tendon and read the sensor."
+        ),
+        excited_by="nothing that moves: unload the tendon and read its sensor",
+        coordinate="force",
+        possible_places=places.tendons,
+        make=terms.row(correction=0),
+        size=words.correction("the true force is"),
+    ),
+    Candidate(
+        name="time_delay",
+        title="forces and positions are not of the same time",
+        explanation=(
+            "The measured forces come later than the positions, or earlier where the delay is negative: filters, "
+            "bus cycles, or clocks that differ. Look at how the two signals are sampled and filtered."
+        ),
+        excited_by="many quick reversals at different speeds",
+        coordinate="acceleration",
+        possible_places=places.whole_finger,
+        make=terms.delay,
+        size=words.delay,
+        find_shapes=shapes.delay,
+        common=True,
+    ),
+    Candidate(
+        name="moment_arm",
+        title="a moment arm is off",
+        explanation=(
+            "The tendon pulls at this joint with a longer or shorter lever than described. Measure the pulley's "
+            "radius and add half the tendon's thickness."
+        ),
+        excited_by="slow changes of this tendon's force with the joint at rest, at several pretensions",
+        coordinate="force",
+        possible_places=places.passes,
+        make=terms.row(correction=0),
+        size=words.arm,
+        scaling=True,
+    ),
+    Candidate(
+        name="moment_arm_variation",
+        title="a moment arm changes with the angle",
+        explanation=(
+            "The tendon's lever at this joint grows or shrinks as the joint bends, as where it lifts off its "
+            "pulley. Watch the tendon's line at both ends of the joint's range."
+        ),
+        excited_by="slow strokes of this joint over its whole range, at two pretensions",
+        coordinate="angle",
+        possible_places=places.passes,
+        make=terms.row(slope=0),
+        size=words.of("the arm changes by {}", "slope"),
+        scaling=True,
+    ),
+    Candidate(
+        name="pulley_eccentricity",
+        title="a pulley is out of round",
+        explanation=(
+            "The tendon's lever varies as a sine of the pulley's angle: its centre is beside its axis. Measure "
+            "the run-out of the pulley."
+        ),
+        excited_by="slow strokes of this joint over its whole range, the wider the better, at two pretensions",
+        coordinate="angle",
+        possible_places=places.passes,
+        make=terms.row(sine=0, cosine=0),
+        size=words.with_number(
+            words.wave("the arm goes up and down by {}"), "turns", ", {} times while the joint would turn once"
+        ),
+        find_shapes=shapes.pulley,
+        scaling=True,
+    ),
+    Candidate(
+        name="tendon_nonlinearity",
+        title="a tendon's spring is not linear",
+        explanation=(
+            "The tendon gets stiffer as it is pulled, so the joint angles that are computed from its stretch are "
+            "off, and with them the velocity at each change of force. Pull the tendon against a stop and plot "
+            "force over position."
+        ),
+        excited_by="changes of the pretension over a wide range while the joints move, with joint encoders beside them",
+        coordinate="force",
+        possible_places=places.stretching_tendons,
+        make=terms.secant("hardening"),
+        size=words.of("the spring stiffens by {}", "hardening"),
+        find_shapes=shapes.hardening,
+    ),
+    Candidate(
+        name="joint_coupling",
+        title="this joint and the next pull at each other",
+        explanation=(
+            "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, "
+            "a cable or a linkage. Below 0 it pulls at the sum of the angles, as a strap across both joints does. "
+            "Move one joint by hand and see whether the other one follows."
+        ),
+        excited_by="strokes of this joint and the next one by turns, so that their angles differ",
+        coordinate="angle",
+        possible_places=places.joints_before_others,
+        make=terms.row(stiffness=0),
+        size=words.with_number(
+            words.of("a spring of {} between the joints", "stiffness"),
+            "reaction",
+            ", of which the next joint feels {} times as much",
+        ),
+        find_shapes=shapes.either({}, {"reaction": 0.0}),
+    ),
+    Candidate(
+        name="backlash",
+        title="play before motion passes on",
+        explanation=(
+            "After a reversal the measured position moves on for a short way before the joint follows: a loose "
+            "gear, coupling or tendon fixing. Rock the drive to and fro by a little and see whether the joint "
+            "follows."
+        ),
+        excited_by="many small reversals, with travels around the play's width",
+        coordinate="travel",
+        possible_places=places.moving_parts,
+        make=terms.secant("width"),
+        size=words.of("a play of {}", "width"),
+        find_shapes=shapes.play,
+    ),
+)
+SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
+SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
+COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)
+BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
+
+
+def by_name(name: str) -> Candidate:
+    """Return the candidate of an effect of docs/reference/commands/diagnose.md."""
+    if name not in BY_NAME:
+        raise InputError(f"effect {name!r}: no candidate of this name; expected one of {', '.join(BY_NAME)}")
+    return BY_NAME[name]

@@ -1,0 +1,116 @@
+"""How large an effect is, in plain words with physical units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from tendonfmu.diagnosis.effects.candidate import Sizes
+from tendonfmu.model import LEFT_OUT
+
+Words = Callable[[Sizes], str]
+
+NBSP = "\u00a0"
+_PREFIXED = ("m", "N.m", "N", "s", "rad", "m/s", "rad/s", "m/rad", "N.m/rad", "N.m.s/rad")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude, factor, prefix
+
+
+def quantity(value: float, unit: str, *, sign: bool = False) -> str:
+    """Format a value with three digits and a suitable unit prefix."""
+    if unit in ("", "1"):
+        text, sized = f"{100 * value:.3g}", "%"
+    else:
+        least = next(step for step in _STEPS if abs(value) >= step[0])
+        _, factor, prefix = least if unit in _PREFIXED and value != 0 else _STEPS[0]
+        text, sized = f"{factor * value:.3g}", prefix + unit.replace(".", "·").replace("2", "²").replace("3", "³")
+    mantissa, _, exponent = text.partition("e")
+    if exponent:
+        text = f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+    plus = "+" if sign and value > 0 else ""
+    return f"{plus}{text.replace('-', '−')}{NBSP}{sized}"
+
+
+def _one(numbers: Sizes, name: str) -> tuple[float, str]:
+    return numbers[name][0]
+
+
+def of(text: str, name: str) -> Words:
+    """Return a function that fills the largest number of that name into the text."""
+    return lambda numbers: text.format(quantity(*max(numbers[name], key=lambda number: abs(number[0]))))
+
+
+def wave(text: str) -> Words:
+    """Return a function that fills the amplitude of a sine and a cosine into the text."""
+
+    def words(numbers: Sizes) -> str:
+        (sine, unit), (cosine, _) = (numbers.get(name, [(0.0, "1")])[0] for name in ("sine", "cosine"))
+        unit = unit if "sine" in numbers else _one(numbers, "cosine")[1]
+        return text.format(quantity(math.hypot(sine, cosine), unit))
+
+    return words
+
+
+def with_number(words: Words, name: str, more: str) -> Words:
+    """Return a function that adds `more` to the words if the mechanism's number is given and not the default."""
+
+    def with_more(numbers: Sizes) -> str:
+        value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
+        return words(numbers) + ("" if value == LEFT_OUT[name] else more.format(f"{value:.3g}".replace("-", "−")))
+
+    return with_more
+
+
+def correction(what: str) -> Words:
+    """Return a function that says whether a value is larger or smaller than described."""
+
+    def words(numbers: Sizes) -> str:
+        value, unit = _one(numbers, "correction")
+        return f"{what} {quantity(abs(value), unit)} {'larger' if value > 0 else 'smaller'} than measured"
+
+    return words
+
+
+def per_force(whose: str) -> Words:
+    """Return words for a friction torque that grows with a force; its number is a length, N·m per N."""
+
+    def words(numbers: Sizes) -> str:
+        value = max(number for number, _ in numbers["coulomb"])
+        return f"{quantity(value, 'N.m')} of friction for each newton of {whose}"
+
+    return words
+
+
+def drift(numbers: Sizes) -> str:
+    (amplitude, _), constant = _one(numbers, "amplitude"), _one(numbers, "time_constant")
+    change = "more" if amplitude > 0 else "less"
+    return (
+        f"{quantity(abs(amplitude), '1')} {change} friction in the end, with a time constant of {quantity(*constant)}"
+    )
+
+
+def standstill(numbers: Sizes) -> str:
+    velocity = quantity(*_one(numbers, "stribeck_velocity"))
+    if "amplitude" not in numbers:
+        (static, unit), (coulomb, _) = _one(numbers, "static"), _one(numbers, "coulomb")
+        return f"{quantity(static, unit)} near standstill, {quantity(coulomb, unit)} beyond about {velocity}"
+    amplitude, unit = _one(numbers, "amplitude")
+    change = "more" if amplitude > 0 else "less"
+    return f"{quantity(abs(amplitude), unit)} {change} friction near standstill, up to about {velocity}"
+
+
+def delay(numbers: Sizes) -> str:
+    value, unit = _one(numbers, "delay")
+    return f"the forces come {quantity(abs(value), unit)} {'later' if value > 0 else 'earlier'} than the positions"
+
+
+def sides(numbers: Sizes) -> str:
+    """Return the two sides, positive before negative as in a description."""
+    coulomb = numbers["coulomb"]
+    pairs = list(zip(coulomb[::2], coulomb[1::2], strict=True))
+    (one, unit), (other, _) = max(pairs, key=lambda pair: abs(pair[0][0] - pair[1][0]))
+    return f"{quantity(one, unit)} in the positive direction, {quantity(other, unit)} in the negative one"
+
+
+def arm(numbers: Sizes) -> str:
+    return f"{quantity(*_one(numbers, 'correction'), sign=True)} on the described arm"

@@ -1,0 +1,190 @@
+"""What recordings of a reference and of now share, so that no change is credited with it.
+
+The background is what a model gets wrong in both: a ridge regression on simple functions of angle, velocity, force,
+acceleration and travel, separate for each joint, and on the columns of all candidates. Where a motion of the reference
+was repeated exactly, aligned samples are subtracted instead, and almost nothing of these columns is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate
+
+from tendonfmu.arrays import Array, Flags, Numbers
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns
+from tendonfmu.diagnosis.remainder_features import Features, features
+from tendonfmu.diagnosis.series import Series
+from tendonfmu.model import moment_arms
+
+GROUPS = (
+    "angle",
+    "friction over angle",
+    "velocity",
+    "force",
+    "friction over force",
+    "acceleration",
+    "travel",
+    "memory of direction",
+    "interaction",
+)
+SHARE = 0.3  # of the residual's standard deviation: expected size of one function
+MISSING = 3.0  # times the residual's standard deviation: expected size of an effect that is missing in both
+
+
+def background_columns(
+    data: Mapping[str, Any], series: Series, force: Numbers, columns: CandidateColumns, residual: Numbers, seed: int
+) -> tuple[Array, Numbers]:
+    """Return the columns [B, n, d], and the expected size of each weight [d]."""
+    seen = features(series, force=force, seed=seed)
+    arms = moment_arms(data)
+    spread = residual[series.used].std(axis=0)
+    parts, scales = [], []
+    for joint in range(series.target.shape[1]):
+        own = _of_joint(seen, joint, arms)
+        block = np.zeros((*series.target.shape, len(own)), dtype=np.float32)
+        block[:, joint] = seen.values[:, own]
+        parts.append(block)
+        scales.append(np.full(len(own), SHARE * max(float(spread[joint]), 1e-300)))
+    parts.append(columns.values)
+    scales.append(MISSING * float(spread.max()) / _sizes(columns, series))
+    return np.concatenate(parts, axis=2), np.concatenate(scales)
+
+
+def _of_joint(seen: Features, joint: int, arms: Numbers) -> NDArray[np.int64]:
+    """Return the functions of this joint, or of a tendon that turns it."""
+    tendons = [f"tendon {i + 1}" for i in np.flatnonzero(arms[:, joint])]
+    names = {f"joint {joint + 1}", *tendons, *(f"{tendon} at joint {joint + 1}" for tendon in tendons)}
+    names.add("")  # several states together
+    chosen = np.isin(seen.group, GROUPS) & np.isin(seen.subject, sorted(names))
+    return np.asarray(np.flatnonzero(chosen), dtype=np.int64)
+
+
+def _sizes(columns: CandidateColumns, series: Series) -> Numbers:
+    """Return the standard deviation of each column at the joint where it is largest [c]."""
+    values = columns.values[series.used].astype(np.float64)
+    return np.asarray(np.maximum(values.std(axis=0).max(axis=0, initial=0.0), 1e-300))
+
+
+# --- repeated motions ------------------------------------------------------------------------------------------------
+
+
+Rows = NDArray[np.int64]
+
+SAME = 0.02  # of the angles' spread: a controller follows the same reference this closely
+ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little
+LEAST = 5.0  # s; least length that both motions share
+NEAR = (
+    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
+)
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A motion that was repeated."""
+
+    then: int  # recordings, by number
+    now: int
+    shift: float  # from a time in `then` to the same place of the motion in `now`, s
+    begin: float  # times in `then` of what both share, s
+    end: float
+
+
+def find_repeats(series: Series, force: Numbers, then: Sequence[int], now: Sequence[int]) -> list[Repeat]:
+    """Return the new recordings that follow the motion of a reference recording under the same load."""
+    repeats = []
+    for number in now:
+        fits = [repeat for other in then if (repeat := _repeat(series, force, other, number)) is not None]
+        if fits:
+            repeats.append(max(fits, key=lambda fit: fit.end - fit.begin))
+    return repeats
+
+
+def less_reference(values: Array, series: Series, repeats: Sequence[Repeat]) -> Array:
+    """Return values [B, ...] of the new recordings less those of the reference at the same place of the motion."""
+    less = values.copy()
+    for repeat in repeats:
+        rows, first, share = _places(series, repeat)
+        share = share.reshape(-1, *(1,) * (values.ndim - 1)).astype(values.dtype)
+        less[rows] -= values[first] * (1 - share) + values[first + 1] * share
+    return np.asarray(less)
+
+
+def outside(series: Series, repeats: Sequence[Repeat]) -> Flags:
+    """Return the blocks that add nothing to the differences [B]."""
+    flags = np.isin(series.recording, [repeat.then for repeat in repeats])
+    for repeat in repeats:
+        rows, first, _ = _places(series, repeat)
+        own = series.recording == repeat.now
+        own[rows[series.used[first] & series.used[first + 1]]] = False
+        flags |= own
+    return flags
+
+
+def _places(series: Series, repeat: Repeat) -> tuple[Rows, Rows, Numbers]:
+    """Return blocks of the new recording, the reference block before each, and how far each is beyond that block."""
+    then, now = (np.flatnonzero(series.recording == number) for number in (repeat.then, repeat.now))
+    when = series.time[now] - repeat.shift
+    inside = (when >= repeat.begin) & (when < repeat.end)
+    first = np.searchsorted(series.time[then], when[inside], side="right") - 1
+    first = np.clip(first, 0, len(then) - 2)
+    begin = series.time[then][first]
+    share = np.clip((when[inside] - begin) / (series.time[then][first + 1] - begin), 0.0, 1.0)
+    return now[inside], then[first], share
+
+
+# --- finding ----------------------------------------------------------------------------------------------------------
+
+
+def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | None:
+    rows = [series.recording == number for number in (then, now)]
+    time, angle = ([values[row] for row in rows] for values in (series.time, series.angle))
+    step = series.step
+    if min(len(each) for each in time) * step < LEAST or any(np.diff(each).max() > 1.5 * step for each in time):
+        return None
+    for lag in _lags(angle[0], angle[1], round(NEAR / step)):
+        begin, end = _shared(len(angle[0]), len(angle[1]), lag)
+        if (end - begin) * step < LEAST:
+            continue
+        one, other = angle[0][begin:end], angle[1][begin + lag : end + lag]
+        spread = np.ptp(one, axis=0)
+        apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
+        moves = spread > 1e-6
+        if moves.any() and (apart[moves] <= SAME * spread[moves]).all() and _same_load(force, rows, begin, end, lag):
+            shift = float(time[1][begin + lag] - time[0][begin])
+            return Repeat(then, now, shift, float(time[0][begin]), float(time[0][end - 1]))
+    return None
+
+
+def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag: int) -> bool:
+    one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
+    apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
+    return bool((apart <= ALIKE * np.sqrt(np.mean(one**2, axis=0))).all())
+
+
+def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
+    """Return the first block of the first motion that the second one has, too, and the one after the last."""
+    return max(0, -lag), min(one, other - lag)
+
+
+def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
+    """Yield possible delays of the second motion, in blocks."""
+    yield 0
+    whole = np.zeros(len(one) + len(other) - 1)
+    for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):
+        scale = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+        whole += correlate(b, a, method="fft") / scale
+    best = int(np.argmax(whole)) - (len(one) - 1)
+    yield min(range(best - near, best + near + 1), key=lambda lag: _apart(one, other, lag))
+
+
+def _apart(one: Numbers, other: Numbers, lag: int) -> float:
+    """Return the mean square difference of the angles over what both share."""
+    begin, end = _shared(len(one), len(other), lag)
+    if end <= begin:
+        return np.inf
+    return float(np.mean((one[begin:end] - other[begin + lag : end + lag]) ** 2))

@@ -1,0 +1,209 @@
+"""Which cause comes next: the one that lowers the error on unseen data most, if it is material and certain.
+
+- Material: the rms on held-out folds falls by at least a given share.
+- Certain: the gain is more than two standard errors over the stretches.
+- A size below what the sensors resolve is no cause.
+- Selection goes from coarse to fine: a single place is taken only if it is better than all places together.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tendonfmu.arrays import Numbers
+from tendonfmu.diagnosis.cause import Cause, Direction, Key, with_error
+from tendonfmu.diagnosis.effects import COMMON
+from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.diagnosis.result import ABSORBED
+from tendonfmu.statistics import Grams, standard_error
+from tendonfmu.tasks import Step
+
+MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
+SIGNIFICANCE = 0.01  # family-wise
+CERTAIN = 2.0  # standard errors above 0
+ALIKE = 1.64  # standard errors of the paired difference, within which two causes cannot be distinguished
+SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference does not count, however certain
+FINER = 0.5  # standard errors by which a finer place must be better: both have as many numbers
+NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish places that are this close
+
+
+class CauseSearch(ABC):
+    """A search that adds one cause after the other until none is material and certain."""
+
+    def __init__(self, most: int) -> None:
+        """Begin without a cause; stop after `most` of them."""
+        self.causes: list[Cause] = []
+        self.refused: list[Cause] = []  # causes that were selected but not confirmed
+        self._most = most
+
+    def run(self, step: Step) -> None:
+        """Take one cause after the other."""
+        while len(self.causes) < self._most and len(self.refused) < MOST_REFUSED:
+            step(len(self.causes))
+            tried = self._try_next({refused.effect for refused in self.refused})
+            if tried is None:
+                break
+            cause, is_taken = tried
+            if not is_taken:
+                self.refused.append(cause)
+
+    @abstractmethod
+    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+        """Try the best effect that is not in `tried`; return it and whether it was taken, None if none is material."""
+
+
+Judge = Callable[[list[Cause]], tuple[list[Cause], list[int]]]  # causes -> with gains on unseen data, the weak ones
+
+
+def confirmed(causes: Sequence[Cause], judge: Judge) -> tuple[list[Cause], list[Cause]]:
+    """Drop the weakest cause until none is weak; return the others and the dropped ones, with their gains."""
+    kept, dropped = list(causes), list[Cause]()
+    while True:
+        kept, weak = judge(kept)
+        if not weak:
+            return kept, dropped
+        dropped.append(kept.pop(min(weak, key=lambda k: kept[k].gain.value)))
+
+
+def by_gain(causes: Sequence[Cause]) -> list[Cause]:
+    """Return the causes, the largest gain first."""
+    return sorted(causes, key=lambda cause: -cause.gain.value)
+
+
+class Selection:
+    """All candidate causes, judged with the same matrices."""
+
+    def __init__(self, grams: Grams, causes: Sequence[Cause], least: LeastSizes, beside: Sequence[Cause] = ()) -> None:
+        """Judge all candidates."""
+        # `beside` holds causes that are taken as present, so that no other effect is credited with what they explain.
+        self.grams = grams
+        self._beside = _Beside(beside)
+        self.shares = [grams.surviving(cause.direction.mix) for cause in causes]
+        self.causes = list(causes)
+        self.base = grams.by_stretch(*self._beside.judged(grams)) if beside else grams.by_stretch(None, None)
+        effects = {cause.effect for cause in beside}
+        judged = []
+        for cause, share in zip(causes, self.shares, strict=True):
+            if share < ABSORBED or cause.effect in effects:
+                continue
+            columns = self._beside.with_(cause.direction)
+            magnitudes = grams.magnitudes(*columns)[len(self._beside.low) :]
+            if least.resolved(cause, magnitudes):
+                error, by_fold = grams.error(*columns)
+                if error <= (1.0 - cause.direction.least_gain) ** 2 * self.base.sum():
+                    judged.append((error, cause, magnitudes, by_fold))
+        self._results = sorted(judged, key=lambda result: result[0])
+        self._known: dict[int, Cause] = {}
+
+    def ranked(self) -> list[Cause]:
+        """Return the best place and shape of each effect that lowers the error, the best first."""
+        best: dict[str, int] = {}
+        for k, (error, cause, _, _) in enumerate(self._results):
+            if error < self.base.sum():
+                best.setdefault(cause.effect, k)
+        return [self._judged(k) for k in best.values()]
+
+    def _judged(self, number: int) -> Cause:
+        if number not in self._known:
+            _, cause, magnitudes, by_fold = self._results[number]
+            mix, _, _ = self._beside.with_(cause.direction)
+            unseen = self.grams.by_stretch(mix, by_fold)
+            self._known[number] = replace(cause, magnitudes=magnitudes, unseen=unseen)
+        return self._known[number]
+
+    def gain(self, cause: Cause, before: Numbers | None = None) -> tuple[float, float]:
+        """Return 1 − rms with / rms without, and its standard error."""
+        # `before` is Σ e² without the cause by stretch [stretches]; None for that of the model.
+        return rms_gain(self.base if before is None else before, cause.unseen)
+
+    def best(self, least_gain: float, tried: Collection[str] = ()) -> Cause | None:
+        """Return the effect that lowers the error most, at the coarsest place that is as good."""
+        # None if no effect is material and certain.
+        ranked = [cause for cause in self.ranked() if cause.effect not in tried]
+        if not ranked:
+            return None
+        best = self.refined(ranked[0].effect)
+        gain, error = self.gain(best)
+        if gain < least_gain or gain <= CERTAIN * error:
+            return None
+        return replace(best, gain=with_error(gain, error), alike=self.alike(best, ranked))
+
+    def alike(self, best: Cause, ranked: Sequence[Cause]) -> tuple[Cause, ...]:
+        """Return the other effects that the data cannot distinguish from the best."""
+        others = (cause for cause in ranked if cause.effect != best.effect)
+        return tuple(cause for cause in others if is_alike(cause.unseen, best.unseen))
+
+    def refined(self, effect: str) -> Cause:
+        """Return the best place at the coarsest level, or a finer one if it is certainly better."""
+        levels: dict[int, int] = {}
+        for k, (_, cause, _, _) in enumerate(self._results):
+            if cause.effect == effect:
+                levels.setdefault(cause.direction.level, k)
+        places = [self._judged(levels[level]) for level in sorted(levels)]
+        chosen = places[0]
+        for finer in places[1:]:
+            gain, error = self.gain(finer, chosen.unseen)
+            if gain > FINER * error:
+                chosen = finer
+        return chosen
+
+    def near(self, best: Cause) -> list[Cause]:
+        """Return the same effect at other places of the same level that are nearly as good, the best first."""
+        least = float(best.unseen.sum())
+        most = least + NEAR * (float(self.base.sum()) - least)
+        near: dict[Key, int] = {}
+        for k, (error, cause, _, _) in enumerate(self._results):
+            same = (cause.effect, cause.direction.level) == (best.effect, best.direction.level)
+            if same and cause.key != best.key and error <= most:
+                near.setdefault(cause.key, k)
+        return [self._judged(k) for k in near.values()]
+
+
+def names_with(effect: str, named: Collection[str]) -> int:
+    """Return how many names count if this one is added."""
+    others = set(named) - set(COMMON)
+    return 1 if effect in COMMON or effect in others else 1 + len(others)
+
+
+def is_alike(other: Numbers, best: Numbers) -> bool:
+    """Return whether errors by stretch [K] cannot be distinguished from those of the best."""
+    behind = other - best
+    return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
+
+
+class _Beside:
+    """Columns of causes that are always present."""
+
+    def __init__(self, causes: Sequence[Cause]) -> None:
+        self._mixes = [cause.direction.mix for cause in causes]
+        self.low = np.concatenate([np.zeros(0), *(cause.direction.low for cause in causes)])
+        self._high = np.concatenate([np.zeros(0), *(cause.direction.high for cause in causes)])
+
+    def judged(self, grams: Grams) -> tuple[Numbers, Numbers]:
+        """Return the mix of all columns [c, d], and their magnitudes without each fold [f, d]."""
+        mix = np.concatenate(self._mixes, axis=1)
+        return mix, grams.error(mix, self.low, self._high)[1]
+
+    def with_(self, direction: Direction) -> tuple[Numbers, Numbers, Numbers]:
+        """Return mix and bounds of all, this direction last."""
+        return (
+            np.concatenate([*self._mixes, direction.mix], axis=1),
+            np.concatenate([self.low, direction.low]),
+            np.concatenate([self._high, direction.high]),
+        )
+
+
+def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
+    """Return 1 − rms after / rms before from Σ e² by stretch [K], and its standard error."""
+    whole, left = float(before.sum()), float(after.sum())
+    if whole <= 0.0:
+        return 0.0, np.inf
+    ratio = np.sqrt(left / whole)
+    if ratio <= 0.0:
+        return 1.0, 0.0
+    spread = standard_error(after - left / whole * before)
+    return 1.0 - ratio, float(spread / (2.0 * ratio * whole))
