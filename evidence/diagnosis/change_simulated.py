@@ -39,9 +39,9 @@ from evidence.fingers import (
 )
 from evidence.fingers.mujoco_model import Physics
 from evidence.judge import Truth
-from tendonfmu.diagnosis.cause_search import look
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.signal_choice import choose
+from tendonfmu.diagnosis.view import look
 from tendonfmu.files.tables import write_table
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import Held, prepare, read_recording

@@ -19,8 +19,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from tendonfmu.diagnosis.cause import Where
-from tendonfmu.diagnosis.cause_search import View, residual_alone, series_of
 from tendonfmu.diagnosis.series import make_grid
+from tendonfmu.diagnosis.view import View, residual_alone, series_of
 from tendonfmu.estimate.evaluation import model_over, residuals
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.residuals import Model

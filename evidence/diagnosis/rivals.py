@@ -27,9 +27,9 @@ from evidence.judge import SYNONYMS, Cause, Truth, effects_of, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, count, table
 from tendonfmu.diagnosis.cause import Where
-from tendonfmu.diagnosis.cause_search import View, look
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.signal_choice import choose
+from tendonfmu.diagnosis.view import View, look
 from tendonfmu.model import read_finger
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.recordings import Held, prepare, read_recording

@@ -19,19 +19,18 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
 from tendonfmu.diagnosis.cause import Cause, Direction, Where, with_error
 from tendonfmu.diagnosis.cause_gains import merged
-from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, predicted_of, series_of
 from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.effects.shapes import is_spring, usual_time
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numbers
-from tendonfmu.diagnosis.extension_search import ExtensionSearch, Trial
+from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.gain import residual_of as online_residual
-from tendonfmu.diagnosis.online_error import OnlineError
-from tendonfmu.diagnosis.search import search
-from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid
+from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
+from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
 from tendonfmu.diagnosis.signal_choice import choose, least_sizes
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import delay_of_positions, scan
+from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance, image_from_json
@@ -115,11 +114,11 @@ def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecordi
 
 def test_blocks_are_those_of_the_candidates(hidden: FitRecording) -> None:
     grid = make_grid([hidden])
-    blocks = blocks_of(grid, [hidden])
+    blocks = sample_blocks(grid, [hidden])
     assert blocks.count == grid.blocks == len(series_of(finger(), [hidden], grid).time)
     exact = exact_model(finger(), hidden)
     means = np.array([exact[blocks.of[0] == k].mean(axis=0) for k in (0, 7, grid.blocks - 1)])
-    assert np.allclose(block_prediction(finger(), [hidden], grid)[[0, 7, -1]], means, atol=1e-15)
+    assert np.allclose(block_prediction(finger(), [hidden], blocks)[[0, 7, -1]], means, atol=1e-15)
 
 
 @pytest.mark.parametrize("delay", [0.02, -0.015])
@@ -282,7 +281,7 @@ class Fitted(ExtensionSearch):
         self.tried.append(cause.effect)
         error = self.errors[cause.effect]
         noise = np.random.default_rng(3).uniform(0.9, 1.1, 20)
-        model = None if error is None else FittedModel({}, {}, {}, {}, 0.0)
+        model = None if error is None else FittedModel({}, {}, {}, 0.0)
         return Trial(cause, model, np.array([np.inf]) if error is None else error * noise)
 
 
@@ -302,7 +301,7 @@ def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
 )
 def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, taken: bool) -> None:
     """The rms falls by 5 %, in each stretch, or much in some while it grows in others."""
-    rounds, model = Fitted({}), FittedModel({}, {}, {}, {}, 0.0)
+    rounds, model = Fitted({}), FittedModel({}, {}, {}, 0.0)
     rounds.models, rounds._least_gain = [], 0.03
     rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)))  # type: ignore[assignment]
     rounds._runs_better = lambda model: True  # type: ignore[method-assign]

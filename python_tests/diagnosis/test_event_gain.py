@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.diagnosis import events as module
-from tendonfmu.diagnosis.events import event_gain
+from tendonfmu.diagnosis import contact_scan as module
+from tendonfmu.diagnosis.contact_scan import event_gain
 from tendonfmu.diagnosis.result import Event
 
 TIME = np.arange(0.0, 60.0, 0.01)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from synthetic_series import ARMS, STEP, make_series
-from tendonfmu.diagnosis.repeated_motion import Repeat, find_repeats, less_reference, outside
+from tendonfmu.diagnosis.reference import Repeat, find_repeats, less_reference, outside
 from tendonfmu.diagnosis.series import Series
 
 SECONDS = 12.0

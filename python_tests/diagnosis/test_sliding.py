@@ -15,10 +15,9 @@ from evidence.fingers import sticking_finger
 from tendonfmu.calibrate.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
-from tendonfmu.diagnosis.remainder import Remainder
+from tendonfmu.diagnosis.remainder import Remainder, unexplained_of
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
-from tendonfmu.diagnosis.unexplained import unexplained_of
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import read_recording

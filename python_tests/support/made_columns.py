@@ -96,6 +96,5 @@ def candidate_columns(values: Array, made: Sequence[Made]) -> CandidateColumns:
             proposals.append(Proposal(by_name(each.effect), place, variant, slice(first, first + each.size)))
             first += each.size
     assert first == values.shape[2]
-    names = [str(k) for k in range(first)]
     nothing = np.zeros((*values.shape[:2], 0), dtype=np.float32)
-    return CandidateColumns(np.zeros(values.shape[:2]), nothing, [], values.astype(np.float32), names, tuple(proposals))
+    return CandidateColumns(np.zeros(values.shape[:2]), nothing, values.astype(np.float32), tuple(proposals))

@@ -15,12 +15,11 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .cause import Cause, CausePlace, ChangedSize, Evidence, Where
-    from .cause_search import predicted_of, series_of
+    from .contact_scan import events_of, without_blocks
     from .diagnosis import diagnose
     from .effects import CANDIDATES
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
-    from .events import events_of, without_blocks
     from .experiments.discrimination import discriminating_motion
     from .extension_fit import FitSettings, learn_numbers
     from .gain import residual_of, squared_residual
@@ -31,5 +30,6 @@ if TYPE_CHECKING:
     from .signal_choice import estimation_recordings
     from .sizes import size_at
     from .sliding import settled, without_stuck
+    from .view import predicted_of, series_of
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -9,14 +9,13 @@ from typing import Any
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.cause_search import look, predicted_of, series_of
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
-from tendonfmu.diagnosis.gain import Gain, measure_gain, squared_residual
-from tendonfmu.diagnosis.online_error import OnlineError
+from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
 from tendonfmu.diagnosis.search import Search
 from tendonfmu.diagnosis.selection import by_gain, confirmed, names_with
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
+from tendonfmu.diagnosis.view import look, predicted_of, series_of
 from tendonfmu.estimate import get_number
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording

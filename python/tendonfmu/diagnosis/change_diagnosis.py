@@ -16,19 +16,18 @@ from scipy import stats
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.answer import Asked, answered, reported, too_small
 from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
-from tendonfmu.diagnosis.cause_search import residual_alone
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
-from tendonfmu.diagnosis.events import event_gain, events_of, without_events
+from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
 from tendonfmu.diagnosis.extension_fit import fit_numbers
 from tendonfmu.diagnosis.gain import Gain, measure_gain
-from tendonfmu.diagnosis.invisible import absorbed_effects
 from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.result import Diagnosis, Experiment, SteadyLoad, Unexplained
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
 from tendonfmu.diagnosis.series import Series, make_grid
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings
 from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
 from tendonfmu.diagnosis.steady_load import steady_load
+from tendonfmu.diagnosis.view import residual_alone
 from tendonfmu.estimate import Choice
 from tendonfmu.statistics import Interval
 

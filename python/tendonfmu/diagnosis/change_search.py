@@ -15,18 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.background import background_columns
-from tendonfmu.diagnosis.candidate_columns import candidate_columns
+from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.diagnosis.cause import Cause, Key, with_error
-from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, predicted_of, residual_alone, series_of
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.hypotheses import hypotheses, number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.hypotheses import number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.repeated_motion import find_repeats, less_reference, outside
+from tendonfmu.diagnosis.reference import background_columns, find_repeats, less_reference, outside
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model
+from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model, sample_blocks
+from tendonfmu.diagnosis.view import look, nominal_scale, residual_alone
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Folds, Grams, Interval, Products, make_folds
@@ -62,31 +60,23 @@ class ChangeSearch(CauseSearch):
         # left_out: [B]
         super().__init__(MOST_CHANGES)
         self._least_gain = least_gain
-        self.data, self._recordings, self._grid, self._least = data, recordings, grid, least
-        self.series = series_of(data, recordings, grid, left_out)
+        self.data, self._recordings, self._grid = data, recordings, grid
+        view = self._view = look(data, recordings, grid, least, left_out)
+        self.series = view.series
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
         self._new = {*now, *tests}
-        self._splines = bias_of(data, self.series)
-        residual = residual_alone(data, self.series)
-        predicted = predicted_of(data, recordings, grid, self.series)
-        self._columns = candidate_columns(data, predicted, blocks_of(grid, recordings), worth=least.worth)
-        force = np.concatenate(
-            [
-                segment.mean(predicted[segment.recording].recording.groups["tendon_force"][segment.part])
-                for segment in grid.segments
-            ]
-        )
-        then = sorted(set(np.unique(self.series.recording).tolist()) - self._new)
-        self._repeats = find_repeats(self.series, force, then, sorted(self._new))
+        force, then = grid.forces(view.predicted), set(np.unique(self.series.recording).tolist()) - self._new
+        self._repeats = find_repeats(self.series, force, sorted(then), sorted(self._new))
         shift = self._level_shift() @ np.linalg.pinv(moment_arms(data))
-        background, scale = background_columns(data, self.series, force - shift, self._columns, residual, seed)
-        shared = np.concatenate([self._columns.nominal, background], axis=2)
+        background, scale = background_columns(
+            data, self.series, force - shift, view.columns, residual_alone(data, self.series), seed
+        )
+        shared = np.concatenate([view.columns.nominal, background], axis=2)
         self._shared = less_reference(shared, self.series, self._repeats)
         self._target = less_reference(self.series.target, self.series, self._repeats)
         self._scale = np.concatenate([nominal_scale(data), scale])
         self.numbers = numbers_of(data)
-        both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
-        self._values = both * self.sides.now[:, None, None]
+        self._values = self._both() * self.sides.now[:, None, None]
         self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
         learned = replace(self._informative, used=self._informative.used & ~self.sides.test)
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
@@ -97,14 +87,17 @@ class ChangeSearch(CauseSearch):
         self._whole = self.error
 
     def _candidates(self) -> list[Cause]:
-        count, own = self._columns.values.shape[2], len(self.numbers)
-        reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
+        count, own = self._view.columns.values.shape[2], len(self.numbers)
         missing = [
             replace(cause, direction=replace(cause.direction, mix=np.pad(cause.direction.mix, ((0, own), (0, 0)))))
-            for cause in hypotheses(self._columns, moment_arms(self.data), reach)
+            for cause in self._view.candidates
         ]
         present = number_hypotheses(self.numbers, count + own, count)
         return sorted([*missing, *present], key=lambda cause: cause.direction.level)
+
+    def _both(self) -> Array:
+        """Return the columns of what the description lacks, then those of its own numbers [B, n, c + u]."""
+        return np.concatenate([self._view.columns.values, self._view.columns.nominal], axis=2)
 
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
@@ -246,7 +239,7 @@ class ChangeSearch(CauseSearch):
         left = [cause for cause in self.candidates if cause.effect not in known]
         products, judged = self._products(None)
         chosen = products.chosen(self._together(self.causes), None)
-        return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._least)
+        return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._view.least)
 
     @property
     def new_recordings(self) -> list[int]:
@@ -284,7 +277,7 @@ class ChangeSearch(CauseSearch):
         kept = [change for k, change in enumerate(self.causes) if k != number]
         shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
         nominal = np.concatenate([self._shared, *shared], axis=2)
-        products = Products(self.folds, nominal, of[only], self._splines)
+        products = Products(self.folds, nominal, of[only], self._view.splines)
         scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
         return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
 
@@ -319,7 +312,7 @@ class ChangeSearch(CauseSearch):
         key = b"" if unseen is None else unseen.tobytes()
         if key not in self._known:
             folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._informative, unseen)
-            self._known[key] = (Products(folds, self._shared, self._values, self._splines), judged)
+            self._known[key] = (Products(folds, self._shared, self._values, self._view.splines), judged)
         return self._known[key]
 
     def terms(self, changes: Sequence[Cause]) -> list[Term]:
@@ -328,7 +321,7 @@ class ChangeSearch(CauseSearch):
 
     def added(self, changes: Sequence[Cause]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
-        first = self._columns.values.shape[2]
+        first = self._view.columns.values.shape[2]
         parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
 
@@ -343,13 +336,9 @@ class ChangeSearch(CauseSearch):
 
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
-        moved = np.zeros_like(self.series.target)
-        segments = tuple(segment for segment in self._grid.segments if segment.recording in self._new)
-        rows = np.concatenate([np.arange(segment.blocks.start, segment.blocks.stop) for segment in segments])
-        part = replace(self._grid, segments=segments)
-        after, before = (block_prediction(data, self._recordings, part) for data in (self.now_data(), self.data))
-        moved[rows] = after - before
-        return moved
+        blocks = sample_blocks(self._grid, self._recordings, self._new)
+        after, before = (block_prediction(data, self._recordings, blocks) for data in (self.now_data(), self.data))
+        return np.asarray(after - before)
 
     @property
     def informative(self) -> Flags:
@@ -364,7 +353,7 @@ class ChangeSearch(CauseSearch):
     def torque_left(self, means: bool = False) -> Numbers:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
         whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
-        left = np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in self._grid.segments])
+        left = self._grid.means(whole)
         if self.causes:
             moved = self.moved()
             mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)
@@ -380,8 +369,7 @@ class ChangeSearch(CauseSearch):
 
     def column(self, number: int) -> Numbers:
         """Return the columns of a change, also in the reference [B, n, d]."""
-        both = np.concatenate([self._columns.values, self._columns.nominal], axis=2)
-        return np.asarray(both @ self.causes[number].direction.mix)
+        return np.asarray(self._both() @ self.causes[number].direction.mix)
 
     # --- certainty ---
 

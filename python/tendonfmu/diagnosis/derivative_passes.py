@@ -7,7 +7,7 @@ recordings. Each column is put together from the core's derivatives by the fines
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,7 +26,6 @@ from tendonfmu.statistics import BlockSums, SampleBlocks
 Single = NDArray[np.float32]
 Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of the jumps there, [K, n, u]
 Direction = Mapping[str, float]  # path -> share; the description may be coarser than the merged one
-Watch = Callable[[int], None]  # samples processed since the last call
 
 MOST_ROWS = LIMITS["extensions"]
 _MOST_NUMBERS = 1500  # in a pass: keeps the derivatives of a stretch within tens of megabytes
@@ -111,7 +110,6 @@ def run_pass(
     recordings: Sequence[FitRecording],
     blocks: SampleBlocks,
     sums: Single,
-    watch: Watch,
 ) -> None:
     """Add to `sums` [B, n, c] the block sums of the derivatives of G, the torque with all jumps so far, N·m."""
     finer = [(place, _finer(data, direction)) for place, direction in columns]
@@ -131,7 +129,7 @@ def run_pass(
             part_sums = np.zeros((last - first, joints, len(finer)), dtype=np.float32)
             shifted = np.where(own >= 0, own - first, own)
             target = BlockSums(part_sums, mix)
-            for begin, values, jumps in _stretches(estimator, recording, part, watch):
+            for begin, values, jumps in _stretches(estimator, recording, part):
                 target.add(shifted[begin : begin + len(values)], values, jumps)
             for run in np.split(np.arange(len(places)), np.flatnonzero(np.diff(places) != 1) + 1):
                 sums[first:last, :, places[run[0]] : places[run[-1]] + 1] += part_sums[:, :, run[0] : run[-1] + 1]
@@ -141,7 +139,7 @@ def _finer(data: Mapping[str, Any], direction: Direction) -> dict[str, float]:
     return {fine: share for path, share in direction.items() for fine in finer_paths(data, path)}
 
 
-def _stretches(estimator: Estimator, recording: FitRecording, part: slice, watch: Watch) -> Iterator[Stretch]:
+def _stretches(estimator: Estimator, recording: FitRecording, part: slice) -> Iterator[Stretch]:
     """Yield derivatives of the part in order; samples count from its start."""
     number = estimator.add_recording(recording.arrays(part), recording.kinematics)
     samples = part.stop - part.start
@@ -151,7 +149,6 @@ def _stretches(estimator: Estimator, recording: FitRecording, part: slice, watch
         end = min(begin + length, samples)
         _, _, values, jumps = estimator.jacobian(number, estimator.start, begin, end)
         yield begin, values, jumps
-        watch(end - begin)
 
 
 def _estimator_of(data: Mapping[str, Any], wanted: set[str]) -> tuple[Estimator, dict[str, int]]:

@@ -13,22 +13,21 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked, answered, reported, too_small
 from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.cause_gains import Verified, verify
-from tendonfmu.diagnosis.cause_search import residual_alone, series_of
 from tendonfmu.diagnosis.contact_gain import detection_gain
+from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
-from tendonfmu.diagnosis.events import event_gain, events_of, without_events
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.diagnosis.invisible import invisible_effects
 from tendonfmu.diagnosis.pictures import Compared
-from tendonfmu.diagnosis.remainder import Remainder, measure_remainder
+from tendonfmu.diagnosis.remainder import measure_remainder, unexplained_of
 from tendonfmu.diagnosis.result import Diagnosis, Event, Invisible, Unexplained
 from tendonfmu.diagnosis.search import Search, search
+from tendonfmu.diagnosis.selection import invisible_effects
 from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.diagnosis.span import Span, span_of
-from tendonfmu.diagnosis.unexplained import unexplained_of
+from tendonfmu.diagnosis.view import residual_alone, series_of
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 
@@ -59,11 +58,12 @@ class _Result:
         with self._asked.phases.start("what is left"):
             left = self._left(verified.extended)
             before = searched.first.residual
-            unexplained = self._unexplained(self._remainder(left), left, verified.extended)
+            unexplained = self._unexplained(left, verified.extended)
         experiments, invisible = self._experiments(verified)
         gain, everything = verified.gain, [*given.training, *given.tests]
         floor = np.array(gain.extended.test_rms) * np.sqrt(np.clip(1.0 - np.array(unexplained.by_joint), 0.0, 1.0))
         named = {cause.effect for cause in verified.causes}
+        targets = [recording.target for recording in searched.estimation.recordings]
         return answered(
             self._asked,
             searched.estimation,
@@ -72,7 +72,7 @@ class _Result:
             causes=[self._cause(k, verified, left) for k in range(len(verified.causes))],
             unexplained=unexplained,
             warnings=self._warnings(verified, left),
-            load_at_joints=self._torque(),
+            load_at_joints=searched.estimation.grid.means(targets),
             noise_floor=tuple(float(value) for value in floor),
             floor_source="the part of the error on unseen stretches that nothing recorded predicts",
             too_small=tuple(
@@ -153,34 +153,16 @@ class _Result:
 
     # --- what is left, and what to do next ---
 
-    def _remainder(self, residual: Numbers) -> Remainder:
-        view = self._searched.last
-        force = [
-            segment.mean(view.predicted[segment.recording].recording.groups["tendon_force"][segment.part])
-            for segment in self._searched.estimation.grid.segments
-        ]
-        return measure_remainder(
-            view.series, residual, view.splines, force=np.concatenate(force), seed=self._asked.seed
-        )
-
-    def _unexplained(self, remainder: Remainder, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
-        searched = self._searched
+    def _unexplained(self, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
+        searched, view = self._searched, self._searched.last
+        force = searched.estimation.grid.forces(view.predicted)
+        remainder = measure_remainder(view.series, left, view.splines, force=force, seed=self._asked.seed)
         looked_at = np.sum(left[self._series.used] ** 2, axis=0)
         if not searched.only_sliding:
             return unexplained_of(remainder, looked_at, looked_at, self._asked.least_gain)
         series = series_of(extended, searched.everything, searched.estimation.grid)
         everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
         return unexplained_of(remainder, looked_at, everything, self._asked.least_gain)
-
-    def _torque(self) -> Numbers:
-        """Return the torque to be explained, N·m [B, n]."""
-        estimation = self._searched.estimation
-        return np.concatenate(
-            [
-                segment.mean(estimation.recordings[segment.recording].target[segment.part])
-                for segment in estimation.grid.segments
-            ]
-        )
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""

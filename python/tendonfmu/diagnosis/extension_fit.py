@@ -28,14 +28,12 @@ from tendonfmu.estimate import (
     get_number,
     learn_batch,
     unknowns,
-    verdicts,
     with_values,
 )
-from tendonfmu.model import Finger, description_text, law_path, moment_arms, native
+from tendonfmu.model import Finger, law_path, moment_arms, native
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-BOUND = 1e-6  # of the range: a number that is this near to a bound has reached it
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -59,14 +57,8 @@ class FittedModel:
     # the description that says how large each number may be: its values are the standard deviations of the prior
     given: Mapping[str, Any]
     values: Mapping[str, float]  # by path of an estimated number, SI units
-    errors: Mapping[str, float]
     cost: float  # ½ Σ e²/S including the prior
-    at_bound: tuple[str, ...] = ()  # paths of numbers at a bound
     warnings: tuple[str, ...] = ()  # sentences
-
-    def text(self) -> str:
-        """Return the description as JSON, as `tendonfmu fit -o` writes it."""
-        return description_text(self.data)
 
 
 def fit_numbers(
@@ -80,20 +72,16 @@ def fit_numbers(
     # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
     # otherwise fit by shrinking the force.
     if not unknowns(data):
-        return FittedModel(data=data, given=data, values={}, errors={}, cost=float("nan"))
+        return FittedModel(data=data, given=data, values={}, cost=float("nan"))
     origin = data if given is None else given
     structure, learned = learn_numbers(data, recordings, settings, given=origin)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
-    at_bound = _at_bound(learned)
-    errors = _standard_errors(structure, learned)
     return FittedModel(
         data=finger.data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
-        errors={path: np.nan if path in at_bound else error for path, error in errors.items()},
         cost=float(learned.cost),
-        at_bound=at_bound,
         warnings=tuple(learned.warnings),
     )
 
@@ -244,16 +232,6 @@ def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _at_bound(learned: Learned) -> tuple[str, ...]:
-    """Return the paths of the numbers whose unknown has reached a bound."""
-    paths = []
-    for unknown, z in zip(learned.estimator.unknowns, learned.z, strict=True):
-        reach = BOUND * max(unknown.scale, abs(z))
-        if z - unknown.lower <= reach or unknown.upper - z <= reach:
-            paths.append(unknown.path)
-    return tuple(paths)
-
-
 def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
     """Yield (path, value) of all numbers of a parsed description; indices start at 1."""
     if isinstance(data, Mapping):
@@ -264,14 +242,3 @@ def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
             yield from _leaves(value, f"{path}[{k}]")
     elif isinstance(data, int | float) and not isinstance(data, bool):
         yield path, float(data)
-
-
-def _standard_errors(structure: Structure, learned: Learned) -> dict[str, float]:
-    """Return the standard errors by path, from the covariance of the unknowns (delta method)."""
-    matrix = verdicts.slopes(learned.estimator, learned.z)[
-        [structure.index[number.path] for number in structure.numbers]
-    ]
-    variance = np.einsum("pu,uv,pv->p", matrix, learned.covariance, matrix)
-    return {
-        number.path: float(np.sqrt(max(part, 0.0))) for number, part in zip(structure.numbers, variance, strict=True)
-    }

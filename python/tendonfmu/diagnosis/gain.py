@@ -6,6 +6,10 @@ core's r is that of the FMU, and it shows how the bias jumped.
 
 With a known external torque, labelled contact or gaps, the bias filter runs once more over y − T (`track`), with the T
 of the FMU. In a recording without these, this gives r of the core again, and both are compared.
+
+r hides causes: the bias filter follows everything slow, such as a spring or a weight, and single samples of r are
+mostly sensor noise. So the search uses `OnlineError`: means over 10 ms of raw samples, less a bias that moves within
+2 s (splines). r only shows that a cause does no harm.
 """
 
 from __future__ import annotations
@@ -20,12 +24,14 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.result import ModelErrors
+from tendonfmu.diagnosis.series import block_prediction, make_grid, sample_blocks
+from tendonfmu.diagnosis.view import bias_of, series_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import residuals
 from tendonfmu.fmu import build_fmu, run_fmu
 from tendonfmu.model import NUMBERS, description_text, native
 from tendonfmu.recordings import BiasSettings, FitRecording, Model, bias_settings, delayed_torque, rms
-from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval
+from tendonfmu.statistics import BlockIndex, Interval, Span, blocks_of, gain_interval, make_folds
 
 AGREEMENT = 1e-9  # of the largest value of an output's series: allowed difference of two implementations
 _NEVER = 1e9  # N·m; a contact threshold that is never passed
@@ -244,3 +250,31 @@ def _judged(recording: FitRecording, chosen: Flags) -> Flags:
 
 def _pooled(left: Sequence[Numbers], masks: Sequence[Flags]) -> tuple[float, ...]:
     return tuple(rms(np.concatenate(left), np.concatenate(masks)))
+
+
+# --- means of 10 ms --------------------------------------------------------------------------------------------------
+
+
+class OnlineError:
+    """Errors of several models over the same samples of the same recordings."""
+
+    def __init__(self, data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> None:
+        """Prepare the recordings."""
+        grid = make_grid(recordings)
+        self._recordings, self._blocks = recordings, sample_blocks(grid, recordings)
+        series = series_of(data, recordings, grid)
+        folds = make_folds(series)
+        self._rows, self._stretch, self._stretches = folds.rows, folds.stretch, folds.stretches
+        self._span = Span(bias_of(data, series)[self._rows])
+        self._measured = series.target[self._rows] + block_prediction(data, recordings, self._blocks)[self._rows]
+
+    def square(self, data: Mapping[str, Any]) -> float:
+        """Return Σ r² over all joints, (N·m)², of every sample; r is taken before the bias update."""
+        return squared_residual(data, self._recordings)
+
+    def by_stretch(self, data: Mapping[str, Any]) -> Numbers:
+        """Return Σ e² over all joints, (N·m)² [K], by stretches of about 2 s."""
+        predicted = block_prediction(data, self._recordings, self._blocks)[self._rows]
+        left = self._span.without(self._measured - predicted)
+        sums = np.bincount(self._stretch, np.sum(left**2, axis=1), minlength=self._stretches)
+        return np.asarray(sums, dtype=np.float64)

@@ -1,29 +1,37 @@
-"""How much of a residual is predictable, and what the predictable part depends on.
+"""How much of a residual is predictable, what the predictable part depends on, and whether it is unknown.
 
 Two methods look at it:
 
-- a flexible learner on everything that is known of the motion and its past (remainder_learner.py);
+- a flexible learner without physics on everything that is known of the motion and its past: ridge regression, judged
+  on unseen stretches;
 - a search for steady oscillations in time (statistics/spectral_line.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import solve
+from scipy.signal import welch
 from scipy.stats import ttest_1samp
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.remainder_features import Finding, features
-from tendonfmu.diagnosis.remainder_learner import Choice, Learner, choices
-from tendonfmu.diagnosis.remainder_text import described
-from tendonfmu.statistics import Splines, Whitener, find_lines, make_folds, standard_error, whitener
-
-if TYPE_CHECKING:
-    from tendonfmu.diagnosis.series import Series
-
+from tendonfmu.arrays import Indices, Numbers
+from tendonfmu.diagnosis.remainder_features import GROUPS, Features, Finding, features
+from tendonfmu.diagnosis.result import Unexplained
+from tendonfmu.diagnosis.series import Series
+from tendonfmu.statistics import (
+    Folds,
+    Interval,
+    Span,
+    Splines,
+    Whitener,
+    find_lines,
+    make_folds,
+    standard_error,
+    whitener,
+)
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
@@ -108,3 +116,173 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
         findings += [Finding(joint + 1, "line", "", line) for line in lines]
         p_values += [min(1.0, joints * line.p_value) for line in lines]
     return p_values
+
+
+# --- the learner -----------------------------------------------------------------------------------------------------
+
+
+PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A set of columns."""
+
+    group: str  # key of GROUPS; "" for all groups
+    subject: str  # subject within the group; "" for the whole group
+    columns: Indices  # indices of the columns
+
+
+def choices(seen: Features) -> list[Choice]:
+    """Return all columns, those of each group, and those of each subject of each group."""
+    pairs = list(dict.fromkeys(zip(seen.group.tolist(), seen.subject.tolist(), strict=True)))
+    names = list(dict.fromkeys(group for group, _ in pairs))
+    listed = [Choice("", "", np.arange(len(seen.group)))]
+    listed += [Choice(name, "", np.flatnonzero(seen.group == name)) for name in names]
+    listed += [
+        Choice(group, subject, np.flatnonzero((seen.group == group) & (seen.subject == subject)))
+        for group, subject in pairs
+        if subject
+    ]
+    return listed
+
+
+class Learner:
+    """Residuals of all joints and the columns that may predict them, both without the slow bias."""
+
+    def __init__(self, seen: Features, residual: Numbers, splines: Splines, folds: Folds) -> None:
+        """Prepare the residual [B, n], N·m, with the splines [B, s] of the bias."""
+        span = Span(splines[folds.rows])
+        table = span.without(seen.values[folds.rows]).astype(np.float32)
+        spread = table.std(axis=0)
+        self._table = table / np.where(spread > 1e-4, spread, np.inf)
+        self.target = span.without(residual[folds.rows])
+        self.folds = folds
+        self.columns = np.arange(table.shape[1])
+        own = [folds.fold == number for number in range(folds.folds)]
+        self._rows = own
+        self._gram = [(self._table[rows].T @ self._table[rows]).astype(np.float64) for rows in own]
+        self._score = [self._table[rows].T.astype(np.float64) @ self.target[rows] for rows in own]
+
+    def predicted(self, columns: Indices) -> Numbers:
+        """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""
+        gram, score = np.sum(self._gram, axis=0)[np.ix_(columns, columns)], np.sum(self._score, axis=0)[columns]
+        predictions = np.zeros((len(PENALTIES), *self.target.shape))
+        for rows, own, part in zip(self._rows, self._gram, self._score, strict=True):
+            inner, right = gram - own[np.ix_(columns, columns)], score - part[columns]
+            seen = self._table[rows][:, columns]
+            for k, penalty in enumerate(PENALTIES):
+                ridge = penalty * float((~rows).sum()) * np.eye(len(columns))
+                weights = solve(inner + ridge, right, assume_a="pos", check_finite=False)
+                predictions[k, rows] = seen @ weights.astype(np.float32)
+        best = np.argmin(np.sum((predictions - self.target) ** 2, axis=1), axis=0)
+        return np.stack([predictions[best[j], :, j] for j in range(self.target.shape[1])], axis=1)
+
+    def gains(self, prediction: Numbers) -> Numbers:
+        """Return by how much a prediction [R, n] lowers the squares, (N·m)² [stretches, n]."""
+        change = self.target**2 - (self.target - prediction) ** 2
+        return np.stack(
+            [np.bincount(self.folds.stretch, values, minlength=self.folds.stretches) for values in change.T], axis=1
+        )
+
+
+# --- in words --------------------------------------------------------------------------------------------------------
+
+
+CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
+
+
+def described(
+    series: Series, residual: Numbers, prediction: Numbers, findings: Sequence[Finding], share: Sequence[float]
+) -> str:
+    """Return one sentence for each joint that has findings, the joint with the greatest share first."""
+    joints = sorted({finding.joint for finding in findings}, key=lambda joint: -share[joint - 1])
+    sentences = []
+    for joint in joints:
+        own = [finding for finding in findings if finding.joint == joint]
+        what = " and ".join(dict.fromkeys(_what(own[:3])))
+        where = _where(series, prediction[:, joint - 1], joint, own)
+        sentences.append(f"Joint {joint}: {_part(share[joint - 1])} follows {what}{where}.")
+    return " ".join(sentences)
+
+
+def _part(share: float) -> str:
+    if share < 0.01:
+        return "a small but certain, fast-changing part of what is left"
+    return f"{100.0 * share:.0f} % of the variance of what is left"
+
+
+def _what(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield what each finding follows; all oscillations are listed together, at the first one."""
+    lines = [finding.line for finding in findings if finding.line is not None]
+    mentioned = False
+    for finding in findings:
+        if finding.line is None:
+            subject = f", {finding.subject}" if finding.subject else ""
+            yield f"{GROUPS[finding.group]}{subject}"
+        elif not mentioned:
+            mentioned = True
+            frequencies, sizes = (
+                _listed([f"{value:.{digits}g}" for value in values])
+                for values, digits in (
+                    ([line.frequency for line in lines], 3),
+                    ([1000.0 * line.amplitude for line in lines], 2),
+                )
+            )
+            steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
+            yield f"{steady} at {frequencies} Hz of {sizes} mN·m, independent of the motion"
+
+
+def _listed(values: Sequence[str]) -> str:
+    """Join values as in "1, 2 and 3"."""
+    return " and ".join(filter(None, [", ".join(values[:-1]), values[-1]]))
+
+
+def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding]) -> str:
+    """Return where and when most of the prediction is, unless it is everywhere."""
+    used = series.used
+    power = part[used] ** 2
+    if all(finding.line is not None for finding in findings) or not power.sum():
+        return ""
+    notes = []
+    angles = _stretch(series.angle[used, joint - 1], power)
+    if angles:
+        notes.append(f"mostly at angles of joint {joint} from {angles[0]:.2f} to {angles[1]:.2f} rad")
+    times = _stretch(series.time[used], power) if len(np.unique(series.recording)) == 1 else None
+    if times:
+        notes.append(f"mostly from {times[0]:.0f} to {times[1]:.0f} s")
+    frequency, density = welch(np.where(used, part, 0.0), 1.0 / series.step, nperseg=min(len(part), 1024))
+    total = np.cumsum(density)
+    notes.append(f"half of it below {frequency[np.searchsorted(total, 0.5 * total[-1])]:.2g} Hz")
+    return " (" + ", ".join(notes) + ")"
+
+
+def _stretch(coordinate: Numbers, power: Numbers) -> tuple[float, float] | None:
+    """Return the third of the time, sorted by the coordinate, with most of the power; None if it is spread evenly."""
+    order = np.argsort(coordinate)
+    summed = np.concatenate([[0.0], np.cumsum(power[order])]) / power.sum()
+    width = len(order) // 3
+    inside = summed[width:] - summed[:-width]
+    start = int(np.argmax(inside))
+    if inside[start] < CONCENTRATED / 3.0:
+        return None
+    chosen = coordinate[order[start : start + width]]
+    return float(chosen[0]), float(chosen[-1])
+
+
+# --- what is unknown -------------------------------------------------------------------------------------------------
+
+
+def unexplained_of(left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float) -> Unexplained:
+    """Return the share of the remaining variance that unseen stretches show to be no noise."""
+    # looked_at, everything: [n] (N·m)
+    part = np.divide(looked_at, everything, out=np.zeros_like(looked_at), where=everything > 0.0)
+    shares = np.clip(np.array(left.share), 0.0, 1.0) * part
+    whole = float(everything.sum())
+    share = float(shares @ everything) / whole if whole > 0.0 else 0.0
+    square = float(left.square.sum()) * (whole / float(looked_at.sum()) if looked_at.any() else 1.0)
+    half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0.0 else 0.0
+    gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(end, 1.0))) for end in (share, share - half, share + half)))
+    unknown = left.unknown and gain.value >= least_gain and gain.low > 0.0
+    description = left.description if unknown else ""
+    return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)

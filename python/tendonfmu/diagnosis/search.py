@@ -1,7 +1,8 @@
-"""From recordings to the causes that a description lacks: signals, events, cause after cause.
+"""What a description lacks: signals, events, and one cause after the other, with all numbers fitted again after each.
 
-The search ends when no candidate is material and certain. Where stuck samples mislead it, it is made once more without
-them.
+After each cause, everything is computed anew around the fitted description. The derivatives of a wrong model would
+otherwise ask for small pieces that only correct the linearisation. The search ends when no candidate is material and
+certain. Where stuck samples mislead it, it is made once more without them.
 """
 
 from __future__ import annotations
@@ -10,19 +11,191 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tendonfmu.arrays import Flags
-from tendonfmu.diagnosis.cause import Cause
-from tendonfmu.diagnosis.cause_search import View, predicted_of, series_of
-from tendonfmu.diagnosis.events import events_of, without_blocks, without_events
-from tendonfmu.diagnosis.extension_fit import FittedModel, fit_numbers
-from tendonfmu.diagnosis.extension_search import MOST_CAUSES, ExtensionSearch
-from tendonfmu.diagnosis.online_error import OnlineError
+import numpy as np
+from scipy.stats import ttest_1samp
+
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.diagnosis.cause import Cause, Where, with_error
+from tendonfmu.diagnosis.contact_scan import events_of, without_blocks, without_events
+from tendonfmu.diagnosis.effects import CANDIDATES, SCALING, Candidate, Place, Term
+from tendonfmu.diagnosis.effects.shapes import is_spring
+from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, fit_numbers, possible
+from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.result import Event
+from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, rms_gain
 from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
+from tendonfmu.diagnosis.span import span_of
+from tendonfmu.diagnosis.starting_point import presliding_everywhere
+from tendonfmu.diagnosis.view import View, look, predicted_of, series_of
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.tasks import Phases, Step
+
+MOST_CAUSES = 8
+MOST_FITTED = 3  # effects that columns cannot distinguish
+WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A cause and the model fitted with it; the model is None if there is none."""
+
+    cause: Cause
+    model: FittedModel | None
+    error: Numbers  # Σ e² on unseen stretches, (N·m)² [K]
+
+
+class ExtensionSearch(CauseSearch):
+    """Adds cause after cause; keeps models and views after each."""
+
+    def __init__(self, chosen: Estimation, out: Flags, online: OnlineError, least_gain: float) -> None:
+        super().__init__(MOST_CAUSES)
+        self.models = [chosen.nominal]
+        self._chosen, self._out, self._online = chosen, out, online
+        self._least_gain, self._settings = least_gain, chosen.settings
+        # before the start is fitted, only the residual of the nominal model is needed
+        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+
+    def run(self, step: Step) -> None:
+        for terms in self._chosen.start.causes:
+            self._take(self._tried(_of_start(terms)), ())
+        if not self.view.columns.proposals:
+            self.view = self._look(self.models[-1])
+        super().run(step)
+        if self._tries_presliding():
+            super().run(step)
+
+    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+        # Refused effects explain something, so no other effect is credited with that. A correction of the torque
+        # itself is excluded: it lowers any error by shrinking the torque.
+        selection = self.view.beside({refused.key for refused in self.refused if refused.effect not in SCALING})
+        best = selection.best(self._least_gain, tried)
+        if best is None:
+            return None
+        trial = self._best_fitted(selection, best)
+        return trial.cause, trial.cause.p_value < SIGNIFICANCE and self._take(trial)
+
+    def _best_fitted(self, selection: Selection, best: Cause) -> Trial:
+        """Fit the effects that the columns cannot distinguish and take the best: columns of a wrong model mislead."""
+        rivals = [self._named(selection.refined(rival.effect), selection) for rival in _to_fit(best)]
+        named = [self._named(best, selection), *(rival for rival in rivals if rival.p_value < SIGNIFICANCE)]
+        trials = [self._tried(cause) for cause in named]
+        chosen = min(trials, key=lambda trial: float(trial.error.sum()))
+        same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, chosen.error)]
+        # an effect that is already present explains the data without a new name
+        widespread = WIDESPREAD & {cause.effect for cause in self.causes}
+        chosen = next((trial for trial in same if trial.cause.effect in widespread), chosen)
+        fitted = {trial.cause.effect for trial in trials}
+        alike = [trial.cause for trial in same if trial is not chosen]
+        alike += [rival for rival in best.alike if rival.effect not in fitted]
+        chosen = self._at_best_place(chosen, selection)
+        return replace(chosen, cause=replace(chosen.cause, alike=tuple(alike)))
+
+    def _at_best_place(self, trial: Trial, selection: Selection) -> Trial:
+        """Fit the effect at the nearly best places, too, and take the best."""
+        best = selection.refined(trial.cause.effect)
+        if trial.cause.direction is not best.direction:
+            return trial
+        others = [self._named(near, selection) for near in selection.near(best)[: MOST_FITTED - 1]]
+        trials = [trial, *(self._tried(other) for other in others if other.p_value < SIGNIFICANCE)]
+        return min(trials, key=lambda trial: float(trial.error.sum()))
+
+    def _tries_presliding(self) -> bool:
+        """Try presliding with a short distance if none was taken; return whether it was taken."""
+        chosen = self._chosen
+        if any(cause.effect == "presliding" for cause in [*self.causes, *self.refused]):
+            return False
+        span = span_of(self.models[-1].data, chosen.recordings)
+        tried = presliding_everywhere(self.models[-1].data, chosen.recordings[0].kinematics, span)
+        return bool(tried) and self._take(self._tried(_of_start(tried[0])))
+
+    def _named(self, cause: Cause, selection: Selection) -> Cause:
+        """Return a judged candidate with its terms at its magnitudes, gain and p-value."""
+        gain = with_error(*selection.gain(cause))
+        return replace(cause, terms=cause.scaled(), gain=gain, p_value=self.view.p_value(cause))
+
+    def _tried(self, cause: Cause) -> Trial:
+        """Fit the description with a further cause."""
+        everything = [term for known in [*self.causes, cause] for term in known.terms]
+        terms = possible(self.models[0].data, everything)
+        if len(terms) < len(everything):
+            return Trial(cause, None, np.array([np.inf]))
+        own = self._chosen.recordings
+        # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
+        begin = extended_description(self.models[-1].data, cause.terms)
+        clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
+        model = fit_extended(self.models[0], terms, clean, self._settings)
+        # fit again with the forces predicted with the cause
+        clean = predicted_of(
+            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
+        )
+        model = fit_numbers(model.data, clean, self._settings, given=self.models[0].given)
+        if not self._resolved(cause, model):
+            return Trial(cause, None, np.array([np.inf]))
+        return Trial(cause, model, self._look(model, ()).selection.base)
+
+    def _take(self, trial: Trial, candidates: Sequence[Candidate] = CANDIDATES) -> bool:
+        """Keep a further cause if it lowers the error on unseen stretches materially and certainly."""
+        before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
+        gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
+        if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
+            return False
+        # a cause of the start has no column in the view before
+        p_value = cause.p_value if cause.p_value < SIGNIFICANCE else _step_p_value(before, after)
+        self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
+        self.models.append(model)
+        self.view = self._look(model, candidates)
+        return True
+
+    def _runs_better(self, model: FittedModel) -> bool:
+        """Return whether the model runs better online than the last one."""
+        before, after = (self._chosen.online(fitted.data) for fitted in (self.models[-1], model))
+        left, after_error = (self._online.by_stretch(online).sum() for online in (before, after))
+        return bool(after_error < left and self._online.square(after) < self._online.square(before))
+
+    def _resolved(self, cause: Cause, model: FittedModel) -> bool:
+        """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
+        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
+            return False
+        return self._chosen.least.shows_all(cause.effect, cause.terms, model.data)
+
+    def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        chosen = self._chosen
+        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
+
+    def small(self) -> list[Cause]:
+        """Return the best place of every effect that is certain but not material."""
+        small, selection = [], self.view.selection
+        known = {refused.effect for refused in self.refused}
+        for cause in selection.ranked():
+            gain, error = selection.gain(cause)
+            if cause.effect not in known and gain > CERTAIN * error:
+                named = self._named(cause, selection)
+                small += [named] if named.p_value < SIGNIFICANCE else []
+        return small
+
+
+def _to_fit(best: Cause) -> list[Cause]:
+    """Return the effects that cannot be distinguished from the best one and may replace it."""
+    # A correction of the torque itself may replace only another such correction, because it lowers any error.
+    scaling = best.effect in SCALING
+    return [rival for rival in best.alike if scaling or rival.effect not in SCALING][: MOST_FITTED - 1]
+
+
+def _of_start(terms: tuple[Term, ...]) -> Cause:
+    """Return a cause of the start, at one place or everywhere."""
+    candidate, place = terms[0].candidate, terms[0].place if len(terms) == 1 else Place()
+    where = Where(candidate.name, place.joint, place.tendon)
+    return Cause(where, candidate.title, candidate.explanation, terms=terms)
+
+
+def _step_p_value(before: Numbers, after: Numbers) -> float:
+    """Return the p-value of a gain by stretch [K]: a one-sided t test."""
+    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0
+
+
+# --- from recordings to causes ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

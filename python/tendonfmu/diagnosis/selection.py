@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.cause import Cause, Direction, Key, with_error
+from tendonfmu.diagnosis.cause import HERE, Cause, Direction, Key, with_error
 from tendonfmu.diagnosis.effects import COMMON
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.result import ABSORBED
+from tendonfmu.diagnosis.result import ABSORBED, Invisible
 from tendonfmu.statistics import Grams, standard_error
 from tendonfmu.tasks import Step
 
@@ -207,3 +207,39 @@ def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
         return 1.0, 0.0
     spread = standard_error(after - left / whole * before)
     return 1.0 - ratio, float(spread / (2.0 * ratio * whole))
+
+
+# --- what recordings cannot show -------------------------------------------------------------------------------------
+
+
+SMALLEST_GAIN = 1e-6  # where every gain counts as material
+
+
+def invisible_effects(
+    selection: Selection, causes: Sequence[Cause], known: Sequence[Cause], least_gain: float
+) -> list[tuple[Cause, Invisible]]:
+    """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
+    places = {(cause.effect, term.place.joint, term.place.tendon) for cause in known for term in cause.terms}
+    names = [cause.effect for cause in causes]
+    best: dict[Key, tuple[float, Cause, Invisible]] = {}
+    for cause, share in zip(selection.causes, selection.shares, strict=True):
+        if cause.direction.level != HERE or cause.key in places:
+            continue
+        gain = selection.grams.ordinary_gain(cause.direction.mix, cause.direction.ordinary)
+        needed = least_gain * names_with(cause.effect, names)
+        nearness = min(share / ABSORBED, gain / max(needed, SMALLEST_GAIN))  # from 1 on it is visible
+        if cause.key not in best or nearness > best[cause.key][0]:
+            hidden = Invisible(cause.where, cause.title, share, "", ordinary_gain=gain, needed_gain=needed)
+            best[cause.key] = (nearness, cause, hidden)
+    ranked = sorted(best.values(), key=lambda entry: -entry[0])
+    return [(cause, hidden) for nearness, cause, hidden in ranked if nearness < 1.0]
+
+
+def absorbed_effects(selection: Selection, experiment: str) -> list[Invisible]:
+    """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
+    best: dict[Key, Invisible] = {}
+    for cause, share in zip(selection.causes, selection.shares, strict=True):
+        if cause.direction.level == HERE and (cause.key not in best or share > best[cause.key].surviving_share):
+            best[cause.key] = Invisible(cause.where, cause.title, share, experiment)
+    ranked = sorted(best.values(), key=lambda hidden: -hidden.surviving_share)
+    return [hidden for hidden in ranked if hidden.absorbed]

@@ -8,20 +8,22 @@ at its derivatives by the numbers of the description.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Numbers
 from tendonfmu.model import moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, delayed_torque
-from tendonfmu.statistics import BlockSeries
+from tendonfmu.statistics import BlockSeries, SampleBlocks
 
 SHORTEST_STEP = 0.01  # s; shortest block
 MOST_BLOCKS = 20_000
 _NEVER = 1e9  # N·m; a contact threshold that is never passed
+_STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,14 @@ class Grid:
     def blocks(self) -> int:
         return sum(segment.count for segment in self.segments)
 
+    def means(self, values: Sequence[Array]) -> Array:
+        """Return block means [B, ...] of values [N, ...] of each recording."""
+        return np.concatenate([segment.mean(values[segment.recording][segment.part]) for segment in self.segments])
+
+    def forces(self, recordings: Sequence[FitRecording]) -> Numbers:
+        """Return block means of the tendon forces, N [B, m]."""
+        return self.means([recording.recording.groups["tendon_force"] for recording in recordings])
+
 
 @dataclass(frozen=True)
 class Series(BlockSeries):
@@ -83,18 +93,30 @@ def make_grid(recordings: Sequence[FitRecording]) -> Grid:
     return Grid(tuple(segments), step)
 
 
-def exact_model(
-    data: Mapping[str, Any], recording: FitRecording, *, entry_load: bool | None = None, jumps: bool = True
-) -> Numbers:
-    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
-    given = data.get("bias") or {}
+def sample_blocks(
+    grid: Grid, recordings: Sequence[FitRecording], chosen: Collection[int] | None = None
+) -> SampleBlocks:
+    """Return the grid's block of each sample, −1 for none; only in some of the recordings if `chosen` is given."""
+    numbers_of = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
+    for segment in grid.segments:
+        if chosen is None or segment.recording in chosen:
+            numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
+            numbers_of[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
+    return SampleBlocks(tuple(numbers_of), grid.blocks)
+
+
+def _image(data: Mapping[str, Any]) -> Any:
+    """Return the image of a description with a bias that only jumps and with contact detection out of reach."""
+    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
     joints = len(data["joints"])
-    kept = {key: given[key] for key in ("forget_rate", "entry_load") if given.get(key) is not None}
     still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
-    if entry_load is not None:
-        still["entry_load"] = entry_load
     alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
-    image, residual = native.image_from_json(json.dumps(alone)), np.full(recording.target.shape, np.nan)
+    return native.image_from_json(json.dumps(alone))
+
+
+def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
+    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
+    image, residual = _image(data), np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
         outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
@@ -104,10 +126,65 @@ def exact_model(
     return residual
 
 
-def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid) -> Numbers:
-    """Return block means of `exact_model`, N·m [B, n]."""
-    whole = {segment.recording: exact_model(data, recordings[segment.recording]) for segment in grid.segments}
-    return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in grid.segments])
+def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
+    """Return block means of G of a description, less the torque of forces used beyond the measured ones, N·m [B, n]."""
+    sums = np.zeros((blocks.count, len(data["joints"])))
+    finger, arms = native.Instance(_image(data)), moment_arms(data)
+    for recording, block in zip(recordings, blocks.of, strict=True):
+        for part in recording.parts:
+            if (block[part] < 0).all():
+                continue
+            finger.reset()
+            finger.set_kinematics_source(recording.kinematics)
+            for begin in range(part.start, part.stop, _STRETCH):
+                rows = slice(begin, min(begin + _STRETCH, part.stop))
+                arrays = recording.arrays(rows)
+                # τ − T_eff; T_eff is T with all jumps so far if the bias learns nothing
+                whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
+                _add_up(sums, block[rows], whole)
+    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
+
+
+def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
+    inside = block >= 0
+    if inside.any():
+        first, own = int(block[inside][0]), block[inside]
+        for j in range(sums.shape[1]):
+            totals = np.bincount(own - first, weights=values[inside, j])
+            sums[first : first + len(totals), j] += totals
+
+
+def block_late_forces(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    blocks: SampleBlocks,
+    delay: float,
+    prediction: Numbers,
+) -> Numbers:
+    """Return the change of y − G [B, n] (N·m) if forces are measured `delay` s later than they act."""
+    late = [_with_late_forces(recording, delay) for recording in recordings]
+    moved = _block_torque(data, late, blocks) - _block_torque(data, recordings, blocks)
+    return np.asarray(moved - (block_prediction(data, late, blocks) - prediction))
+
+
+def _with_late_forces(recording: FitRecording, delay: float) -> FitRecording:
+    groups = dict(recording.recording.groups)
+    force = groups["tendon_force"].copy()
+    for part in recording.parts:
+        time = recording.time[part]
+        for i in range(force.shape[1]):
+            force[part, i] = np.interp(time - delay, time, groups["tendon_force"][part, i])
+    groups["tendon_force"] = force
+    return replace(recording, recording=replace(recording.recording, groups=groups))
+
+
+def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
+    """Return block means of τ = Rᵀ f [B, n], N·m."""
+    arms = moment_arms(data)
+    sums = np.zeros((blocks.count, arms.shape[1]))
+    for recording, block in zip(recordings, blocks.of, strict=True):
+        _add_up(sums, block, recording.recording.groups["tendon_force"] @ arms)
+    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
 
 
 # --- the series -------------------------------------------------------------------------------------------------------
@@ -117,26 +194,19 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
     """Average the signals over the blocks of a grid."""
     whole = [recordings[segment.recording] for segment in grid.segments]
     pieces = list(zip(grid.segments, whole, strict=True))
-    threshold = _joint_threshold(data)
-
-    def gathered(values: Sequence[Array]) -> Array:
-        means = [segment.mean(value[segment.part]) for segment, value in zip(grid.segments, values, strict=True)]
-        return np.concatenate(means)
-
-    angle = gathered([recording.model.joint_angle for recording in whole])
-    velocity = gathered([recording.model.joint_speed for recording in whole])
-    arms = moment_arms(data)
+    threshold, arms = number_of(data, "velocity_threshold.joint"), moment_arms(data)
+    velocity = grid.means([recording.model.joint_speed for recording in recordings])
     return Series(
-        time=gathered([recording.time for recording in whole]),
+        time=grid.means([recording.time for recording in recordings]),
         recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
         segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
-        target=gathered([recording.target for recording in whole]) - torque,
+        target=grid.means([recording.target for recording in recordings]) - torque,
         used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
         step=grid.step,
-        angle=angle,
+        angle=grid.means([recording.model.joint_angle for recording in recordings]),
         velocity=velocity,
         acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
-        force=gathered([recording.recording.groups["tendon_force"] for recording in whole]),
+        force=grid.forces(recordings),
         tendon_velocity=_tendon_velocity(arms, velocity),
         travel=np.concatenate(
             [
@@ -145,10 +215,6 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
             ]
         ),
     )
-
-
-def _joint_threshold(data: Mapping[str, Any]) -> float:
-    return number_of(data, "velocity_threshold.joint")
 
 
 def _slope(values: Numbers, step: float) -> Numbers:

@@ -13,15 +13,15 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
-from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.diagnosis.effects.shapes import is_spring
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_extended, fit_numbers
+from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes, noise_of
-from tendonfmu.diagnosis.online_error import OnlineError
 from tendonfmu.diagnosis.selection import CERTAIN, rms_gain
-from tendonfmu.diagnosis.series import Grid, make_grid
+from tendonfmu.diagnosis.series import Grid, make_grid, sample_blocks
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import Start, scan
+from tendonfmu.diagnosis.view import bias_of, nominal_scale, series_of
 from tendonfmu.model import Finger, moment_arms
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
 from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
@@ -195,7 +195,7 @@ def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Gr
     """Return the rms on held-out folds, N·m, with the description's numbers refitted."""
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
-    columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
+    columns = candidate_columns(plain, recordings, sample_blocks(grid, recordings), candidates=())
     target, nominal = series.target.copy(), np.asarray(columns.nominal, dtype=np.float64)
     if cutoff is not None and cutoff < 0.4 / grid.step:
         for segment in grid.segments:

@@ -30,7 +30,6 @@ class Span:
     travel: Numbers  # median distance of a joint between reversals, rad [n]
     tendon_travel: Numbers  # median distance of a tendon between reversals, m [m]
     force: Numbers  # 1 % and 99 % quantiles, N [m, 2]
-    acceleration: Numbers  # 95 % quantile, rad/s² [n]
     torque: Numbers  # standard deviation of the torque to be explained, N·m [n]
     duration: float  # length of the longest part without a gap, s
     step: float  # median time between samples, s
@@ -41,7 +40,7 @@ def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span
     arms = moment_arms(data)
     every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
     rows = [np.flatnonzero(recording.train)[::every] for recording in recordings]
-    angle, speed, force, torque, acceleration = (
+    angle, speed, force, torque = (
         np.concatenate(signals)
         for signals in zip(
             *(_signals(recording, row) for recording, row in zip(recordings, rows, strict=True)), strict=True
@@ -58,7 +57,6 @@ def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span
         travel=_travels(angles),
         tendon_travel=_travels([angle @ arms.T for angle in angles]),
         force=_range(force),
-        acceleration=np.quantile(np.abs(acceleration), _FAST, axis=0),
         torque=np.std(torque, axis=0),
         duration=max(
             float(recording.time[part][-1] - recording.time[part][0])
@@ -70,14 +68,8 @@ def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span
 
 
 def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, ...]:
-    model = recording.model
-    force = recording.recording.groups["tendon_force"]
-    acceleration = np.zeros_like(model.joint_speed)
-    for part in recording.parts:
-        acceleration[part] = np.gradient(model.joint_speed[part], recording.time[part], axis=0)
-    return tuple(
-        values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target, acceleration)
-    )
+    model, force = recording.model, recording.recording.groups["tendon_force"]
+    return tuple(values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target))
 
 
 def _range(values: Numbers) -> Numbers:

@@ -17,11 +17,11 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
-from tendonfmu.diagnosis.cause_search import bias_of, blocks_of, nominal_scale, series_of
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.series import Grid
+from tendonfmu.diagnosis.series import Grid, sample_blocks
 from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.view import bias_of, nominal_scale, series_of
 from tendonfmu.model import EFFECT_NUMBERS, moment_arms
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Grams, Products, make_folds
@@ -130,7 +130,7 @@ def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: G
     """Return Σ e² on held-out folds, (N·m)² [K], with the target changed by `moved` [B, n, K]."""
     plain = without_uncertainty(data)
     series = series_of(plain, recordings, grid)
-    columns = candidate_columns(plain, recordings, blocks_of(grid, recordings), candidates=())
+    columns = candidate_columns(plain, recordings, sample_blocks(grid, recordings), candidates=())
     products = Products(make_folds(series), columns.nominal, columns.values, bias_of(plain, series))
     grams = Grams(products, series.target, nominal_scale(plain))
     return grams.errors_of(series.target[:, :, None] + moved)
@@ -138,12 +138,10 @@ def _errors(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: G
 
 def _torque(recordings: Sequence[FitRecording], grid: Grid, delay: float) -> Numbers:
     """Return block means of the target `delay` s later, N·m [B, n]."""
-    whole: dict[int, Numbers] = {}
-    for segment in grid.segments:
-        recording = recordings[segment.recording]
-        shifted = whole.setdefault(segment.recording, recording.target.copy())
-        time = recording.time[segment.part]
-        if delay:
-            for j in range(shifted.shape[1]):
-                shifted[segment.part, j] = np.interp(time + delay, time, recording.target[segment.part, j])
-    return np.concatenate([segment.mean(whole[segment.recording][segment.part]) for segment in grid.segments])
+    shifted = [recording.target.copy() for recording in recordings]
+    for segment in grid.segments if delay else ():
+        target, part = recordings[segment.recording].target, segment.part
+        time = recordings[segment.recording].time[part]
+        for j in range(target.shape[1]):
+            shifted[segment.recording][part, j] = np.interp(time + delay, time, target[part, j])
+    return grid.means(shifted)

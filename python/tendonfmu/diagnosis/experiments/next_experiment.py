@@ -106,7 +106,6 @@ def plan_experiments(
     questions: Sequence[Question],
     *,
     noise: Sequence[float] | None = None,
-    span: Span | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Experiments:
@@ -116,9 +115,9 @@ def plan_experiments(
         return Experiments((), Experiment(""))
     if not recordings:
         raise InternalError("next experiment: no recording; expected those of the diagnosis")
-    found_span = span_of(data, recordings) if span is None else span
-    lab = _Laboratory(data, recordings, questions, noise, found_span, seed)
-    recorded = recorded_of(found_span, None if own_tension(data).any() else _mean_load(data, recordings))
+    span = span_of(data, recordings)
+    lab = _Laboratory(data, recordings, questions, noise, span, seed)
+    recorded = recorded_of(span, None if own_tension(data).any() else _mean_load(data, recordings))
     *plain, long = motions(recorded)
     varied = [*tensions(data, plain[0]), *loads(data, plain[0], recorded)]
     scores = []
@@ -234,7 +233,7 @@ class _Laboratory:
     @property
     def _offset(self) -> int:
         assert self.columns is not None
-        return len(self.columns.nominal_names)
+        return int(self.columns.nominal.shape[2])
 
     def _proposals(self, cause: Term) -> list[Proposal]:
         """Return the shapes of the cause at its place, its own first."""
@@ -253,7 +252,7 @@ class _Laboratory:
         assert self.columns is not None
         proposal = self._proposals(cause)[0]
         given = list(cause.magnitudes) if len(cause.magnitudes) else list(proposal.variant.expected)
-        direction = np.zeros(self._offset + len(self.columns.names))
+        direction = np.zeros(self._offset + self.columns.values.shape[2])
         direction[self._offset + proposal.columns.start : self._offset + proposal.columns.stop] = given
         return direction
 

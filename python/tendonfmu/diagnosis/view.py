@@ -1,9 +1,16 @@
-"""How a description and recordings look as columns: what the description leaves, and what every effect would add."""
+"""How a description and recordings look as columns: what the description leaves, and what every effect would add.
+
+Columns are computed at the forces that the model itself predicts. The joint torque to be explained is computed from
+the measured forces, and so is every column that contains a force. So the part of the torque that no model explains is
+in both, and a column that carries it would fit the noise and appear as a cause of every recording. Predicted are the
+measured forces less the unexplained torque, which is spread over the tendons as the smallest forces that produce it
+(errors in variables; instrument).
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,9 +24,8 @@ from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
 from tendonfmu.diagnosis.hypotheses import hypotheses
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.regressors import predicted_forces
 from tendonfmu.diagnosis.selection import Selection
-from tendonfmu.diagnosis.series import Grid, Series, block_prediction, make_series
+from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model, make_series, sample_blocks
 from tendonfmu.estimate import Estimator
 from tendonfmu.model import moment_arms, native
 from tendonfmu.recordings import FitRecording, bias_settings
@@ -29,7 +35,6 @@ from tendonfmu.statistics import (
     Folds,
     Grams,
     Products,
-    SampleBlocks,
     Splines,
     bias_splines,
     constant_bias,
@@ -48,14 +53,27 @@ class View:
     series: Series
     splines: Splines  # splines of the slow bias [B, s]
     columns: CandidateColumns
-    folds: Folds
-    grams: Grams  # products of all columns
     least: LeastSizes  # sizes that the sensors can show
 
     @cached_property
+    def folds(self) -> Folds:
+        return make_folds(self.series)
+
+    @cached_property
+    def grams(self) -> Grams:
+        """Products of all columns."""
+        products = Products(self.folds, self.columns.nominal, self.columns.values, self.splines)
+        return Grams(products, self.series.target, nominal_scale(self.data))
+
+    @cached_property
     def selection(self) -> Selection:
+        return Selection(self.grams, self.candidates, self.least)
+
+    @property
+    def candidates(self) -> list[Cause]:
+        """All effects that the description may lack."""
         reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
-        return Selection(self.grams, hypotheses(self.columns, moment_arms(self.data), reach), self.least)
+        return hypotheses(self.columns, moment_arms(self.data), reach)
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
@@ -86,7 +104,6 @@ def look(
     grid: Grid,
     least: LeastSizes,
     left_out: Flags | None = None,
-    progress: Callable[[int, int], None] | None = None,
     candidates: Sequence[Candidate] = CANDIDATES,
 ) -> View:
     """Compute the view of a fitted description; blocks in `left_out` [B] are ignored."""
@@ -96,15 +113,11 @@ def look(
     columns = candidate_columns(
         data,
         predicted,
-        blocks_of(grid, recordings),
+        sample_blocks(grid, recordings),
         candidates=candidates,
         worth=least.worth,
-        progress=progress,
     )
-    folds = make_folds(series)
-    products = Products(folds, columns.nominal, columns.values, splines)
-    grams = Grams(products, series.target, nominal_scale(data))
-    return View(data, recordings, predicted, series, splines, columns, folds, grams, least)
+    return View(data, recordings, predicted, series, splines, columns, least)
 
 
 def nominal_scale(data: Mapping[str, Any]) -> Numbers:
@@ -118,7 +131,7 @@ def series_of(
 ) -> Series:
     """Return the block means of a description's signals and residual."""
     # left_out: [B]; returns block means [B, ...] with `target` = y − G, N·m
-    series = make_series(data, recordings, grid, block_prediction(data, recordings, grid))
+    series = make_series(data, recordings, grid, block_prediction(data, recordings, sample_blocks(grid, recordings)))
     return series if left_out is None else replace(series, used=series.used & ~left_out)
 
 
@@ -139,10 +152,67 @@ def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Sp
     return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
 
 
-def blocks_of(grid: Grid, recordings: Sequence[FitRecording]) -> SampleBlocks:
-    """Return the grid's blocks in the form that `candidate_columns` takes."""
-    numbers_of = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
+# --- forces that a model predicts ------------------------------------------------------------------------------------
+
+
+MOST_SHIFT = 10.0  # times the largest measured force
+
+
+def predicted_forces(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, series: Series, residual: Numbers
+) -> list[FitRecording]:
+    """Return the recordings with predicted forces, and with tendon positions that keep the joint angles as measured."""
+    arms = moment_arms(data)
+    spread = np.linalg.pinv(arms)
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    moved = []
+    for number, recording in enumerate(recordings):
+        groups = dict(recording.recording.groups)
+        force = groups["tendon_force"]
+        most = MOST_SHIFT * np.abs(force).max(initial=0.0)  # a model that explains nothing predicts no forces either
+        shift = np.clip(_unexplained(data, recording, number, grid, series, residual) @ spread, -most, most)
+        predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
+        groups["tendon_force"] = predicted
+        if "tendon_position" in groups:
+            # a description with a delay pairs the present position with the force `delay` s later
+            change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
+            groups["tendon_position"] = groups["tendon_position"] + change
+        moved.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+    return moved
+
+
+def _delay(data: Mapping[str, Any]) -> float:
+    """Return by how many seconds forces come later than positions, according to the description."""
+    rows = data.get("extensions") or []
+    return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
+
+
+def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
+    """Return the values [N, m] of `delay` s later, within each part."""
+    if not delay:
+        return values
+    shifted: Numbers = values.copy()
+    for part in recording.parts:
+        time = recording.time[part]
+        for i in range(values.shape[1]):
+            shifted[part, i] = np.interp(time + delay, time, values[part, i])
+    return shifted
+
+
+def _unexplained(
+    data: Mapping[str, Any], recording: FitRecording, number: int, grid: Grid, series: Series, residual: Numbers
+) -> Numbers:
+    """Return the unexplained torque at every sample [N, n], N·m; 0 at samples that are not trained on."""
+    model = exact_model(data, recording)
+    unexplained = np.zeros_like(recording.target)
     for segment in grid.segments:
-        numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
-        numbers_of[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
-    return SampleBlocks(tuple(numbers_of), grid.blocks)
+        if segment.recording != number:
+            continue
+        part, blocks = segment.part, segment.blocks
+        left = recording.target[part] - model[part]
+        slow = series.target[blocks] - residual[blocks]
+        time = recording.time[part]
+        for j in range(left.shape[1]):
+            unexplained[part, j] = left[:, j] - np.interp(time, series.time[blocks], slow[:, j])
+    return np.where(recording.train[:, None], unexplained, 0.0)
