@@ -15,8 +15,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.derivative_passes import nominal_directions, plan_passes
+from tendonfmu.diagnosis.candidate_columns import (
+    CandidateColumns,
+    Proposal,
+    candidate_columns,
+    nominal_directions,
+    plan_passes,
+)
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant, by_name
 from tendonfmu.diagnosis.effects.description_edit import add_to_number
 from tendonfmu.diagnosis.series import block_prediction

@@ -27,9 +27,8 @@ from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.gain import residual_of as online_residual
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
 from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
-from tendonfmu.diagnosis.signal_choice import choose, least_sizes
+from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 from tendonfmu.diagnosis.span import span_of
-from tendonfmu.diagnosis.starting_point import delay_of_positions, scan
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Finger

@@ -15,7 +15,6 @@ from tendonfmu.diagnosis.search import Search
 from tendonfmu.diagnosis.selection import by_gain, confirmed, names_with
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
-from tendonfmu.diagnosis.view import look, predicted_of, series_of
 from tendonfmu.estimate import get_number
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
@@ -215,9 +214,7 @@ class _Bench:
     @cached_property
     def _predicted(self) -> list[FitRecording]:
         """Return the recordings with the forces that the model of all causes predicts."""
-        extended, estimation = self._result.extended.data, self._result.estimation
-        series = series_of(extended, estimation.recordings, estimation.grid, self._result.out)
-        return predicted_of(extended, estimation.recordings, estimation.grid, series)
+        return self._result.estimation.predicted(self._result.extended.data, self._result.out)
 
     def each_without(self, causes: Sequence[Cause]) -> list[FittedModel]:
         """Return, for each cause, the fit that lacks it."""
@@ -248,9 +245,7 @@ class _Bench:
             if self._tests:
                 error = self._unseen.by_stretch(self.online(model))
             else:
-                own = self._result.estimation
-                view = look(model.data, own.recordings, own.grid, own.least, self._result.out, candidates=())
-                error = view.selection.base
+                error = self._result.estimation.look(model.data, self._result.out, ()).selection.base
             self._errors[id(model)] = (model, error)
         return self._errors[id(model)][1]
 

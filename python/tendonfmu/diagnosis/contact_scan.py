@@ -49,6 +49,7 @@ EXPLAINED = 0.5  # of the residual's variance: a learner that predicts more is s
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: something that is there more often is not an event
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+_TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
 
 def scan_events(
@@ -222,9 +223,6 @@ def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
 
 
 # --- recordings without events ---------------------------------------------------------------------------------------
-
-
-_TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
 
 def events_of(

@@ -141,9 +141,7 @@ class _Result:
 
     def _left(self, data: Mapping[str, Any]) -> Numbers:
         """Return the residual of a model over all recordings that were estimated from, bias removed, N·m [B, n]."""
-        estimation = self._searched.estimation
-        series = series_of(data, estimation.recordings, estimation.grid)
-        return residual_alone(data, replace(series, used=self._series.used))
+        return residual_alone(data, replace(self._searched.estimation.series(data), used=self._series.used))
 
     def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
         cause, before = verified.causes[k], self._left(verified.without[k].data)

@@ -28,6 +28,7 @@ LARGEST_SECANT = 3.0  # times the step that its column was computed with; the co
 
 _OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
 _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
+Shares = tuple[Numbers, Numbers, Numbers]  # of numbers in magnitudes [numbers, d]; bounds of the magnitudes [d]
 
 
 def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Cause]:
@@ -145,7 +146,7 @@ class Number:
 
 
 def numbers_of(data: Data) -> list[Number]:
-    """Return the numbers in the order of `derivative_passes.nominal_directions`."""
+    """Return the numbers in the order of `candidate_columns.nominal_directions`."""
     unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
     return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
 
@@ -179,6 +180,7 @@ def _owner(data: Data, path: str) -> tuple[str, Place, int]:
 
 def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Cause]:
     """Return changes of each effect at each place, of one joint or tendon, and everywhere; the coarse ones first."""
+    # of `count` columns, those of the numbers begin at `first`
     by_place: dict[tuple[str, Place], list[Number]] = {}
     for number in numbers:
         by_place.setdefault((number.effect, number.place), []).append(number)
@@ -186,58 +188,60 @@ def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list
     for (effect, place), members in by_place.items():
         where, level = Where(effect, place.joint, place.tendon), EVERYWHERE if place == Place() else HERE
         if any(member.side for member in members):
-            listed += list(_two_sided(where, members, count, first, level))
+            listed.append(_changed(where, level, *_scaled(members), members, count, first))
+            if effect != "stribeck":
+                apart = Where("asymmetric_friction", place.joint, place.tendon)
+                listed.append(_changed(apart, level, *_apart(members), members, count, first))
         else:
-            listed.append(_free(where, members, count, first, level))
+            listed.append(_changed(where, level, *_free(members), members, count, first))
     for effect in SHARED:
         of_effect = {place: members for (name, place), members in by_place.items() if name == effect}
         for where, level, places in _groups(effect, list(of_effect)):
-            listed.append(
-                _scaled(where, [number for place in places for number in of_effect[place]], count, first, level)
-            )
+            members = [number for place in places for number in of_effect[place]]
+            listed.append(_changed(where, level, *_scaled(members), members, count, first))
     return sorted(listed, key=lambda cause: cause.direction.level)
 
 
-def _changed(where: Where, mix: Numbers, low: Numbers, high: Numbers, level: int) -> Cause:
-    """Return a change of numbers of the description."""
-    candidate = BY_NAME.get(where.effect)
-    if candidate is None:
-        return Cause(where, where.effect.replace("_", " "), direction=Direction(mix, low, high, level))
-    _, look, at = candidate.explanation.partition("Look ")
-    explanation = f"The description has this effect; its number is different now. {look}{at}".strip()
-    return Cause(where, candidate.title, explanation, direction=Direction(mix, low, high, level))
-
-
-def _free(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Cause:
-    """Return a change in which each number is free: of working points, or of a term with several numbers."""
-    mix = np.zeros((count, len(numbers)))
-    for k, number in enumerate(numbers):
-        mix[first + number.index, k] = 1.0
+def _free(numbers: Sequence[Number]) -> Shares:
+    """Let each number change by itself: those of working points, or of a term with several numbers."""
     value, low, high = (np.array([getattr(number, name) for number in numbers]) for name in ("value", "low", "high"))
-    return _changed(where, mix, low - value, high - value, level)
+    return np.eye(len(numbers)), low - value, high - value
 
 
-def _two_sided(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Iterator[Cause]:
-    yield _scaled(where, numbers, count, first, level)
-    if where.effect != "stribeck":
-        mix = np.zeros((count, 1))
-        for number in numbers:
-            mix[first + number.index, 0] = number.side
-        most = min(number.value - number.low for number in numbers)
-        apart = Where("asymmetric_friction", where.joint, where.tendon)
-        yield _changed(apart, mix, np.array([-most]), np.array([most]), level)
-
-
-def _scaled(where: Where, numbers: Sequence[Number], count: int, first: int, level: int) -> Cause:
-    """Return a change of all numbers by the same share."""
-    mix = np.zeros((count, 1))
+def _scaled(numbers: Sequence[Number]) -> Shares:
+    """Let all numbers change by the same share."""
+    _, low, high = _free(numbers)
     size = np.array([abs(number.value) for number in numbers])
     size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
-    for number, share in zip(numbers, size, strict=True):
-        mix[first + number.index, 0] = share
-    low = max(float((number.low - number.value) / share) for number, share in zip(numbers, size, strict=True))
-    high = min(float((number.high - number.value) / share) for number, share in zip(numbers, size, strict=True))
-    return _changed(where, mix, np.array([low]), np.array([high]), level)
+    return size[:, None], np.array([(low / size).max()]), np.array([(high / size).min()])
+
+
+def _apart(numbers: Sequence[Number]) -> Shares:
+    """Let the two sides of a law change against each other."""
+    most = np.array([min(number.value - number.low for number in numbers)])
+    return np.array([[float(number.side)] for number in numbers]), -most, most
+
+
+def _changed(
+    where: Where,
+    level: int,
+    shares: Numbers,
+    low: Numbers,
+    high: Numbers,
+    numbers: Sequence[Number],
+    count: int,
+    first: int,
+) -> Cause:
+    """Return a change of numbers of the description."""
+    mix = np.zeros((count, shares.shape[1]))
+    mix[[first + number.index for number in numbers]] = shares
+    direction = Direction(mix, low, high, level)
+    candidate = BY_NAME.get(where.effect)
+    if candidate is None:
+        return Cause(where, where.effect.replace("_", " "), direction=direction)
+    _, look, at = candidate.explanation.partition("Look ")
+    explanation = f"The description has this effect; its number is different now. {look}{at}".strip()
+    return Cause(where, candidate.title, explanation, direction=direction)
 
 
 def with_numbers(data: Data, added: Numbers) -> dict[str, Any]:

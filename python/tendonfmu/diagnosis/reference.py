@@ -32,8 +32,15 @@ GROUPS = (
     "memory of direction",
     "interaction",
 )
-SHARE = 0.3  # of the residual's standard deviation: expected size of one function
+USUAL = 0.3  # of the residual's standard deviation: expected size of one function
 MISSING = 3.0  # times the residual's standard deviation: expected size of an effect that is missing in both
+Rows = NDArray[np.int64]
+SAME_ANGLES = 0.02  # of the angles' spread: a controller follows the same reference this closely
+SAME_FORCES = 0.1  # of the forces: friction that grows with them then differs by as little
+SHORTEST = 5.0  # s; least length that both motions share
+LATEST = (
+    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
+)
 
 
 def background_columns(
@@ -49,7 +56,7 @@ def background_columns(
         block = np.zeros((*series.target.shape, len(own)), dtype=np.float32)
         block[:, joint] = seen.values[:, own]
         parts.append(block)
-        scales.append(np.full(len(own), SHARE * max(float(spread[joint]), 1e-300)))
+        scales.append(np.full(len(own), USUAL * max(float(spread[joint]), 1e-300)))
     parts.append(columns.values)
     scales.append(MISSING * float(spread.max()) / _sizes(columns, series))
     return np.concatenate(parts, axis=2), np.concatenate(scales)
@@ -71,16 +78,6 @@ def _sizes(columns: CandidateColumns, series: Series) -> Numbers:
 
 
 # --- repeated motions ------------------------------------------------------------------------------------------------
-
-
-Rows = NDArray[np.int64]
-
-SAME = 0.02  # of the angles' spread: a controller follows the same reference this closely
-ALIKE = 0.1  # of the forces: friction that grows with them then differs by as little
-LEAST = 5.0  # s; least length that both motions share
-NEAR = (
-    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
-)
 
 
 @dataclass(frozen=True)
@@ -144,17 +141,21 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
     rows = [series.recording == number for number in (then, now)]
     time, angle = ([values[row] for row in rows] for values in (series.time, series.angle))
     step = series.step
-    if min(len(each) for each in time) * step < LEAST or any(np.diff(each).max() > 1.5 * step for each in time):
+    if min(map(len, time)) * step < SHORTEST or any(np.diff(times).max() > 1.5 * step for times in time):
         return None
-    for lag in _lags(angle[0], angle[1], round(NEAR / step)):
+    for lag in _lags(angle[0], angle[1], round(LATEST / step)):
         begin, end = _shared(len(angle[0]), len(angle[1]), lag)
-        if (end - begin) * step < LEAST:
+        if (end - begin) * step < SHORTEST:
             continue
         one, other = angle[0][begin:end], angle[1][begin + lag : end + lag]
         spread = np.ptp(one, axis=0)
         apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
         moves = spread > 1e-6
-        if moves.any() and (apart[moves] <= SAME * spread[moves]).all() and _same_load(force, rows, begin, end, lag):
+        if (
+            moves.any()
+            and (apart[moves] <= SAME_ANGLES * spread[moves]).all()
+            and _same_load(force, rows, begin, end, lag)
+        ):
             shift = float(time[1][begin + lag] - time[0][begin])
             return Repeat(then, now, shift, float(time[0][begin]), float(time[0][end - 1]))
     return None
@@ -163,7 +164,7 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
 def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag: int) -> bool:
     one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
-    return bool((apart <= ALIKE * np.sqrt(np.mean(one**2, axis=0))).all())
+    return bool((apart <= SAME_FORCES * np.sqrt(np.mean(one**2, axis=0))).all())
 
 
 def _shared(one: int, other: int, lag: int) -> tuple[int, int]:

@@ -36,6 +36,8 @@ from tendonfmu.statistics import (
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
 CERTAIN = 2.0  # standard errors over the stretches
+PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
+CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,6 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
 # --- the learner -----------------------------------------------------------------------------------------------------
 
 
-PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
-
-
 @dataclass(frozen=True)
 class Choice:
     """A set of columns."""
@@ -187,9 +186,6 @@ class Learner:
 
 
 # --- in words --------------------------------------------------------------------------------------------------------
-
-
-CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 
 
 def described(

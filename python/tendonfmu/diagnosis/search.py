@@ -7,14 +7,13 @@ certain. Where stuck samples mislead it, it is made once more without them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import ttest_1samp
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of, without_blocks, without_events
 from tendonfmu.diagnosis.effects import CANDIDATES, SCALING, Candidate, Place, Term
@@ -23,11 +22,10 @@ from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description,
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, rms_gain
-from tendonfmu.diagnosis.signal_choice import Estimation
+from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
-from tendonfmu.diagnosis.starting_point import presliding_everywhere
-from tendonfmu.diagnosis.view import View, look, predicted_of, series_of
+from tendonfmu.diagnosis.view import View
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.tasks import Phases, Step
@@ -49,16 +47,18 @@ class Trial:
 class ExtensionSearch(CauseSearch):
     """Adds cause after cause; keeps models and views after each."""
 
-    def __init__(self, chosen: Estimation, out: Flags, online: OnlineError, least_gain: float) -> None:
+    def __init__(self, given: Estimation, measured: Sequence[FitRecording], out: Flags, least_gain: float) -> None:
+        """Leave the blocks in `out` [B] out of an estimation; `measured` are its recordings as they were measured."""
         super().__init__(MOST_CAUSES)
+        chosen, self.fitted_to = _without_blocks(given, out)
+        self.chosen, self._out, self._least_gain, self._settings = chosen, out, least_gain, chosen.settings
+        self.online = OnlineError(chosen.online(chosen.nominal.data), measured)
         self.models = [chosen.nominal]
-        self._chosen, self._out, self._online = chosen, out, online
-        self._least_gain, self._settings = least_gain, chosen.settings
         # before the start is fitted, only the residual of the nominal model is needed
         self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
 
     def run(self, step: Step) -> None:
-        for terms in self._chosen.start.causes:
+        for terms in self.chosen.start.causes:
             self._take(self._tried(_of_start(terms)), ())
         if not self.view.columns.proposals:
             self.view = self._look(self.models[-1])
@@ -103,7 +103,7 @@ class ExtensionSearch(CauseSearch):
 
     def _tries_presliding(self) -> bool:
         """Try presliding with a short distance if none was taken; return whether it was taken."""
-        chosen = self._chosen
+        chosen = self.chosen
         if any(cause.effect == "presliding" for cause in [*self.causes, *self.refused]):
             return False
         span = span_of(self.models[-1].data, chosen.recordings)
@@ -121,15 +121,11 @@ class ExtensionSearch(CauseSearch):
         terms = possible(self.models[0].data, everything)
         if len(terms) < len(everything):
             return Trial(cause, None, np.array([np.inf]))
-        own = self._chosen.recordings
         # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
         begin = extended_description(self.models[-1].data, cause.terms)
-        clean = predicted_of(begin, own, self._chosen.grid, series_of(begin, own, self._chosen.grid, self._out))
-        model = fit_extended(self.models[0], terms, clean, self._settings)
+        model = fit_extended(self.models[0], terms, self.chosen.predicted(begin, self._out), self._settings)
         # fit again with the forces predicted with the cause
-        clean = predicted_of(
-            model.data, own, self._chosen.grid, series_of(model.data, own, self._chosen.grid, self._out)
-        )
+        clean = self.chosen.predicted(model.data, self._out)
         model = fit_numbers(model.data, clean, self._settings, given=self.models[0].given)
         if not self._resolved(cause, model):
             return Trial(cause, None, np.array([np.inf]))
@@ -150,19 +146,18 @@ class ExtensionSearch(CauseSearch):
 
     def _runs_better(self, model: FittedModel) -> bool:
         """Return whether the model runs better online than the last one."""
-        before, after = (self._chosen.online(fitted.data) for fitted in (self.models[-1], model))
-        left, after_error = (self._online.by_stretch(online).sum() for online in (before, after))
-        return bool(after_error < left and self._online.square(after) < self._online.square(before))
+        before, after = (self.chosen.online(fitted.data) for fitted in (self.models[-1], model))
+        left, after_error = (self.online.by_stretch(online).sum() for online in (before, after))
+        return bool(after_error < left and self.online.square(after) < self.online.square(before))
 
     def _resolved(self, cause: Cause, model: FittedModel) -> bool:
         """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""
-        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self._chosen.recordings)):
+        if cause.effect == "presliding" and is_spring(model.data, span_of(model.data, self.chosen.recordings)):
             return False
-        return self._chosen.least.shows_all(cause.effect, cause.terms, model.data)
+        return self.chosen.least.shows_all(cause.effect, cause.terms, model.data)
 
     def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
-        chosen = self._chosen
-        return look(model.data, chosen.recordings, chosen.grid, chosen.least, self._out, candidates=candidates)
+        return self.chosen.look(model.data, self._out, candidates)
 
     def small(self) -> list[Cause]:
         """Return the best place of every effect that is certain but not material."""
@@ -230,82 +225,63 @@ def search(
     with phases.start("contact"):
         events, out = events_of(chosen.model.data, chosen.recordings, chosen.grid, seed)
     measured = [without_events(recording, events) for recording in recordings]
-    own, clean = _without_blocks(chosen, out)
     with phases.start("causes", MOST_CAUSES) as step:
-        searched = _searched(given, own, clean, measured, out, least_gain, step)
-    rounds, only_sliding = searched.rounds, searched.clean is not clean
-    models = [own.nominal, *rounds.models[1:]]
+        whole = ExtensionSearch(chosen, measured, out, least_gain)
+        whole.run(step)
+        sliding = _without_stuck(given, measured, whole, out, least_gain, step)
+    best = sliding or whole
+    models = [whole.models[0], *best.models[1:]]
     if events:
         # drop events that the causes explain
         left, _ = events_of(models[-1].data, chosen.recordings, chosen.grid, seed)
         events = tuple(event for event in events if any(_overlap(event, other) for other in left))
     return Search(
-        estimation=searched.chosen,
+        estimation=best.chosen,
         nominal=models[0],
         extended=models[-1],
-        first=rounds.first,
-        last=rounds.view,
-        causes=tuple(rounds.causes),
+        first=best.first,
+        last=best.view,
+        causes=tuple(best.causes),
         models=tuple(models),
-        small=(*rounds.refused, *rounds.small()),
+        small=(*best.refused, *best.small()),
         events=events,
         out=out,
-        fitted_to=searched.clean,
-        everything=clean,
-        only_sliding=only_sliding,
+        fitted_to=best.fitted_to,
+        everything=whole.fitted_to,
+        only_sliding=sliding is not None,
     )
 
 
-@dataclass(frozen=True)
-class _Searched:
-    """A search that has ended, and the recordings that it was in."""
-
-    rounds: ExtensionSearch
-    chosen: Estimation
-    clean: Sequence[FitRecording]
-
-    @property
-    def model(self) -> FittedModel:
-        return self.rounds.models[-1]
-
-
-def _searched(
+def _without_stuck(
     given: Finger,
-    chosen: Estimation,
-    clean: Sequence[FitRecording],
     measured: Sequence[FitRecording],
+    whole: ExtensionSearch,
     out: Flags,
     least_gain: float,
     step: Step,
-) -> _Searched:
-    """Search in all samples, and without those in which something is stuck if these may mislead; return the better."""
-    online = OnlineError(chosen.online(chosen.nominal.data), measured)
-    rounds = ExtensionSearch(chosen, out, online, least_gain)
-    rounds.run(step)
-    whole = _Searched(rounds, chosen, clean)
-    alone = sliding_alone(given, measured, chosen, whole.model)
+) -> ExtensionSearch | None:
+    """Search without the samples in which something is stuck; return nothing if these do not mislead."""
+    alone = sliding_alone(given, measured, whole.chosen, whole.models[-1])
     if alone is None:
-        return whole
-    own, predicted = _without_blocks(alone.estimation, out)
-    rounds = ExtensionSearch(own, out, OnlineError(own.online(own.nominal.data), alone.measured), least_gain)
-    rounds.run(step)
-    sliding = _Searched(rounds, own, predicted)
+        return None
+    sliding = ExtensionSearch(alone.estimation, alone.measured, out, least_gain)
+    sliding.run(step)
+    model = sliding.models[-1].data
 
-    def error(data: Mapping[str, Any]) -> float:
-        return online.square(chosen.online(data))
+    def error(data: Data) -> float:
+        return whole.online.square(whole.chosen.online(data))
 
-    is_better = alone.is_better(sliding.model, whole.model)
-    runs = is_better and error(settled(sliding.model.data, error)) < RUNS**2 * error(whole.model.data)
-    return sliding if runs else whole
+    is_better = alone.is_better(sliding.models[-1], whole.models[-1])
+    return sliding if is_better and error(settled(model, error)) < RUNS**2 * error(whole.models[-1].data) else None
 
 
-def _without_blocks(chosen: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:
+def _without_blocks(given: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:
     """Return an estimation without some blocks [B], and its recordings with the nominal model's forces."""
-    nominal = chosen.nominal
-    own = [without_blocks(recording, k, chosen.grid, out) for k, recording in enumerate(chosen.recordings)]
-    clean = predicted_of(nominal.data, own, chosen.grid, series_of(nominal.data, own, chosen.grid, out))
-    nominal = fit_numbers(nominal.data, clean, chosen.settings, given=nominal.given)
-    return replace(chosen, nominal=nominal, recordings=own), clean
+    nominal = given.nominal
+    recordings = [without_blocks(recording, k, given.grid, out) for k, recording in enumerate(given.recordings)]
+    chosen = replace(given, recordings=recordings)
+    clean = chosen.predicted(nominal.data, out)
+    return replace(chosen, nominal=fit_numbers(nominal.data, clean, given.settings, given=nominal.given)), clean
 
 
 def _overlap(one: Event, other: Event) -> bool:

@@ -29,6 +29,8 @@ ALIKE = 1.64  # standard errors of the paired difference, within which two cause
 SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference does not count, however certain
 FINER = 0.5  # standard errors by which a finer place must be better: both have as many numbers
 NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish places that are this close
+Judge = Callable[[list[Cause]], tuple[list[Cause], list[int]]]  # causes -> with gains on unseen data, the weak ones
+SMALLEST_GAIN = 1e-6  # where every gain counts as material
 
 
 class CauseSearch(ABC):
@@ -56,9 +58,6 @@ class CauseSearch(ABC):
         """Try the best effect that is not in `tried`; return it and whether it was taken, None if none is material."""
 
 
-Judge = Callable[[list[Cause]], tuple[list[Cause], list[int]]]  # causes -> with gains on unseen data, the weak ones
-
-
 def confirmed(causes: Sequence[Cause], judge: Judge) -> tuple[list[Cause], list[Cause]]:
     """Drop the weakest cause until none is weak; return the others and the dropped ones, with their gains."""
     kept, dropped = list(causes), list[Cause]()
@@ -80,18 +79,21 @@ class Selection:
     def __init__(self, grams: Grams, causes: Sequence[Cause], least: LeastSizes, beside: Sequence[Cause] = ()) -> None:
         """Judge all candidates."""
         # `beside` holds causes that are taken as present, so that no other effect is credited with what they explain.
-        self.grams = grams
-        self._beside = _Beside(beside)
+        self.grams, self.causes = grams, list(causes)
         self.shares = [grams.surviving(cause.direction.mix) for cause in causes]
-        self.causes = list(causes)
-        self.base = grams.by_stretch(*self._beside.judged(grams)) if beside else grams.by_stretch(None, None)
+        self._beside = [cause.direction for cause in beside]
+        self.base = grams.by_stretch(None, None)
+        if beside:
+            known = _joined(*self._beside)
+            self.base = grams.by_stretch(known.mix, grams.error(known.mix, known.low, known.high)[1])
         effects = {cause.effect for cause in beside}
         judged = []
         for cause, share in zip(causes, self.shares, strict=True):
             if share < ABSORBED or cause.effect in effects:
                 continue
-            columns = self._beside.with_(cause.direction)
-            magnitudes = grams.magnitudes(*columns)[len(self._beside.low) :]
+            both = _joined(*self._beside, cause.direction)
+            columns = both.mix, both.low, both.high
+            magnitudes = grams.magnitudes(*columns)[-len(cause.direction.low) :]
             if least.resolved(cause, magnitudes):
                 error, by_fold = grams.error(*columns)
                 if error <= (1.0 - cause.direction.least_gain) ** 2 * self.base.sum():
@@ -110,8 +112,7 @@ class Selection:
     def _judged(self, number: int) -> Cause:
         if number not in self._known:
             _, cause, magnitudes, by_fold = self._results[number]
-            mix, _, _ = self._beside.with_(cause.direction)
-            unseen = self.grams.by_stretch(mix, by_fold)
+            unseen = self.grams.by_stretch(_joined(*self._beside, cause.direction).mix, by_fold)
             self._known[number] = replace(cause, magnitudes=magnitudes, unseen=unseen)
         return self._known[number]
 
@@ -175,26 +176,13 @@ def is_alike(other: Numbers, best: Numbers) -> bool:
     return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
 
 
-class _Beside:
-    """Columns of causes that are always present."""
-
-    def __init__(self, causes: Sequence[Cause]) -> None:
-        self._mixes = [cause.direction.mix for cause in causes]
-        self.low = np.concatenate([np.zeros(0), *(cause.direction.low for cause in causes)])
-        self._high = np.concatenate([np.zeros(0), *(cause.direction.high for cause in causes)])
-
-    def judged(self, grams: Grams) -> tuple[Numbers, Numbers]:
-        """Return the mix of all columns [c, d], and their magnitudes without each fold [f, d]."""
-        mix = np.concatenate(self._mixes, axis=1)
-        return mix, grams.error(mix, self.low, self._high)[1]
-
-    def with_(self, direction: Direction) -> tuple[Numbers, Numbers, Numbers]:
-        """Return mix and bounds of all, this direction last."""
-        return (
-            np.concatenate([*self._mixes, direction.mix], axis=1),
-            np.concatenate([self.low, direction.low]),
-            np.concatenate([self._high, direction.high]),
-        )
+def _joined(*directions: Direction) -> Direction:
+    """Return the direction of several causes together."""
+    return Direction(
+        np.concatenate([direction.mix for direction in directions], axis=1),
+        np.concatenate([direction.low for direction in directions]),
+        np.concatenate([direction.high for direction in directions]),
+    )
 
 
 def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
@@ -210,9 +198,6 @@ def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
 
 
 # --- what recordings cannot show -------------------------------------------------------------------------------------
-
-
-SMALLEST_GAIN = 1e-6  # where every gain counts as material
 
 
 def invisible_effects(

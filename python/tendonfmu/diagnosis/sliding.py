@@ -75,7 +75,7 @@ def sliding_alone(
         return None
     finger = replace(given, data=chosen.signals.description(given.data))
     own = estimation_recordings(finger, free, chosen.signals)
-    stuck, sliding = (_squares(model.data, each, chosen.grid) for each in (_without(chosen.recordings, own), own))
+    stuck, sliding = (_squares(model.data, samples, chosen.grid) for samples in (_without(chosen.recordings, own), own))
     if stuck <= WORSE**2 * sliding:
         return None
     start = starting_point(given, part_of(given, free), chosen.signals, chosen.settings).start

@@ -42,6 +42,8 @@ from tendonfmu.statistics import (
     residual_of,
 )
 
+MOST_SHIFT = 10.0  # times the largest measured force
+
 
 @dataclass(frozen=True)
 class View:
@@ -153,9 +155,6 @@ def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Sp
 
 
 # --- forces that a model predicts ------------------------------------------------------------------------------------
-
-
-MOST_SHIFT = 10.0  # times the largest measured force
 
 
 def predicted_forces(

@@ -34,7 +34,7 @@ _APART = 2.0  # rad, over the joint's range, between neighbours in the grid: hal
 _MOST_PULLEYS = 60  # a joint that turns many times, or angles that the arms do not determine, would ask for millions
 _FEWEST = 1.5 * 2.0 * np.pi  # rad, over the joint's range, of a fast pulley: less looks like any function
 _HARDENINGS = (0.01, 0.2)  # hardening·e²/(k·e) at the largest force, e = f/k
-_DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (starting_point.py)
+_DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (signal_choice.py)
 _LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: the smallest visible delay, and what the model remembers
 OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances of presliding, of the median travel between reversals

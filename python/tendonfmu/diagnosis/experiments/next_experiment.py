@@ -207,7 +207,7 @@ class _Laboratory:
         values = np.concatenate([columns.nominal, columns.values], axis=2).astype(np.float64) / self.noise[:, None]
         time = np.bincount(blocks.of[0], weights=recording.time) / blocks.sizes()
         rest = _without_bias(time, values, self.constant_bias)
-        flat, all_ = (each.reshape(-1, each.shape[2]) for each in (rest, values - values.mean(axis=0)))
+        flat, all_ = (part.reshape(-1, part.shape[2]) for part in (rest, values - values.mean(axis=0)))
         return _Seen(flat.T @ flat, all_.T @ all_, np.einsum("bjc,bjc->cj", rest, rest), blocks.count)
 
     def _answer(self, question: Question, entry: Entry, new: _Seen) -> Answer:
