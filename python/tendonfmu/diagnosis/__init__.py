@@ -1,9 +1,10 @@
 """Find what a model gets wrong, which cause it has, and what correcting it gains (`tendonfmu diagnose`).
 
-- `series` averages recordings over blocks of time; `cause_search` turns a description and recordings into columns.
+- `inputs` reads and checks recordings; `signal_choice` chooses signals, delay and presliding to start with.
+- `series` averages recordings over blocks of time; `view` turns a description and recordings into columns.
 - `cause` is what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates; `extension_search` adds what a description lacks, `change_search` what has changed
-  since a reference.
+- `selection` judges candidates; `search` adds what a description lacks, `change_search` what has changed since a
+  reference.
 - `extension_fit` fits the extended finger; `gain` and `cause_gains` measure on unseen data.
 - `extension_diagnosis` and `change_diagnosis` report; `diagnosis` begins.
 - `experiments` finds what to record next; `effects` holds the table of effects.

@@ -2,10 +2,10 @@
 
 1. A candidate has a place, its terms in a description and its direction in the candidate columns (`hypotheses`).
 2. Judged, it has magnitudes and its error on unseen stretches (`selection`).
-3. Named, it has a p-value, a gain, and the causes that the data cannot distinguish from it (`extension_search`,
+3. Named, it has a p-value, a gain, and the causes that the data cannot distinguish from it (`search`,
    `change_search`).
-4. Confirmed, its gain is that on unseen data, and every place has its numbers (`cause_gains`).
-5. Reported, it has its size in words and its pictures (`diagnosis`).
+4. Confirmed, its gain is that on unseen data, and every place has its numbers (`cause_gains`, `change_diagnosis`).
+5. Reported, it has its size in words and its pictures (`answer`).
 """
 
 from __future__ import annotations

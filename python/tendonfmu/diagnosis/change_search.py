@@ -1,7 +1,7 @@
 """What is different now: the changes to the reference model that lower the error on new recordings.
 
 All recordings are explained together. They share the model's numbers, the effects that it lacks in both, and a
-background of the motion (`background.py`). A hypothesis is free in the new recordings only. It is a number that the
+background of the motion (`reference.py`). A candidate is free in the new recordings only. It is a number that the
 description has, or a term that it lacks. The error is that on held-out parts of the new recordings.
 """
 
@@ -21,13 +21,20 @@ from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.hypotheses import number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.reference import background_columns, find_repeats, less_reference, outside
+from tendonfmu.diagnosis.reference import (
+    background_columns,
+    find_repeats,
+    folds_of_sides,
+    folds_of_unseen,
+    less_reference,
+    outside,
+)
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model, sample_blocks
+from tendonfmu.diagnosis.series import Grid, block_prediction, exact_model, sample_blocks
 from tendonfmu.diagnosis.view import look, nominal_scale, residual_alone
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import Folds, Grams, Interval, Products, make_folds
+from tendonfmu.statistics import Grams, Interval, Products
 
 MOST_CHANGES = 4
 STEPS = 3  # of Newton's method, with the derivatives of the reference
@@ -399,30 +406,6 @@ def _in_twos(values: Numbers) -> Numbers:
     """Return sums of neighbours [K / 2, d]."""
     even = len(values) // 2 * 2
     return np.concatenate([values[:even].reshape(-1, 2, values.shape[1]).sum(axis=1), values[even:]])
-
-
-def folds_of_sides(series: Series, is_now: Flags) -> tuple[Folds, Flags]:
-    """Return parts of the new recordings, then of the reference, and which of them are of the new ones [f]."""
-    now, then = (make_folds(replace(series, used=series.used & side)) for side in (is_now, ~is_now))
-    return _joined(now, then), np.arange(now.folds + then.folds) < now.folds
-
-
-def folds_of_unseen(series: Series, unseen: Flags) -> tuple[Folds, Flags]:
-    """Return unseen blocks as one part and all others as the other, and that only the first is judged [2]."""
-    both = [make_folds(replace(series, used=series.used & side)) for side in (unseen, ~unseen)]
-    one, other = (replace(folds, fold=np.zeros_like(folds.fold), folds=1) for folds in both)
-    return _joined(one, other), np.array([True, False])
-
-
-def _joined(one: Folds, other: Folds) -> Folds:
-    return Folds(
-        rows=np.concatenate([one.rows, other.rows]),
-        run=np.concatenate([one.run, other.run + 1 + one.run.max(initial=-1)]),
-        stretch=np.concatenate([one.stretch, other.stretch + one.stretches]),
-        fold=np.concatenate([one.fold, other.fold + one.folds]),
-        stretches=one.stretches + other.stretches,
-        folds=one.folds + other.folds,
-    )
 
 
 # --- gains ------------------------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ counts events, false alarms and delays.
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Sequence
@@ -30,7 +29,7 @@ from tendonfmu.detect import (
 )
 from tendonfmu.diagnosis.result import DetectionGain
 from tendonfmu.errors import InputError
-from tendonfmu.model import Finger, native
+from tendonfmu.model import Finger, finger_from_data
 from tendonfmu.recordings import FitRecording, Recording
 
 RATE = 6.0  # 1/h; false alarm rate that both are tuned for, or the lowest that the free motion supports
@@ -47,7 +46,7 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
     if not labelled:
         return None
     kinematics = recordings[0].kinematics
-    free = _free_motion(_described(nominal), [recording.recording for recording in recordings], kinematics)
+    free = _free_motion(finger_from_data(nominal), [recording.recording for recording in recordings], kinematics)
     if not free:
         return None
     hours = sum(float(recording.time[-1] - recording.time[0]) - SETTLING for recording in free) / 3600
@@ -119,7 +118,7 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
 def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> Data:
     method = str((data["contact"] or {}).get("method") or "innovation")
     tuning = ContactTuning(
-        _described(data),
+        finger_from_data(data),
         false_alarms_per_hour=rate,
         confidence=CONFIDENCE,
         method=method,
@@ -132,7 +131,7 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
 
 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
-    subject = Subject(Path("finger"), _described(data), packed=False)
+    subject = Subject(Path("finger"), finger_from_data(data), packed=False)
     return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
 
 
@@ -145,8 +144,3 @@ def _thresholds(data: Data) -> tuple[float, ...]:
 
 def _median(score: DetectionScore) -> float | None:
     return float(np.median(score.delays)) if len(score.delays) else None
-
-
-def _described(data: Data) -> Finger:
-    text = json.dumps(data).encode()
-    return Finger(Path("finger"), text, data, native.image_from_json(text))

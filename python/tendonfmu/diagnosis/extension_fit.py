@@ -6,7 +6,6 @@ judged one by one here, so that a selection can fit many times.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.diagnosis.effects import Term
-from tendonfmu.errors import InputError
 from tendonfmu.estimate import (
     Choice,
     FrictionFitOptions,
@@ -30,10 +28,13 @@ from tendonfmu.estimate import (
     unknowns,
     with_values,
 )
-from tendonfmu.model import Finger, law_path, moment_arms, native
+from tendonfmu.model import finger_from_data, law_path, moment_arms, native
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
+PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
+MOST_PASSES = 60  # over the recordings
+TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -42,9 +43,6 @@ class FitSettings:
     """Options of a fit, as of `FrictionFit` with method batch."""
 
     choice: Choice = field(default_factory=Choice)  # which numbers are fitted
-    prior: float = 1.0  # prior standard deviation, in units of each number's expected magnitude
-    max_passes: int = 60  # largest number of passes over the recordings
-    tolerance: float = 0.3  # length of the last step, in standard errors of all unknowns together
     threads: int = 0  # number of threads; 0 for all cores
     path: Path = Path("finger")  # file of the description, for messages
 
@@ -92,12 +90,10 @@ def learn_numbers(
     """Fit the numbers of a description and return everything known about the fit."""
     every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
-    structure = _with_scale(build_structure(_described(data, settings.path), settings.choice), given)
-    options = Settings(
-        FrictionFitOptions(prior=settings.prior, tolerance=settings.tolerance, threads=settings.threads),
-        passes=settings.max_passes,
-        effective=False,  # a diagnosis has its own noise model (`whitening`)
-    )
+    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
+    # a diagnosis has its own noise model, so the effective number of samples does not matter
+    fit = FrictionFitOptions(prior=PRIOR, tolerance=TOLERANCE, threads=settings.threads)
+    options = Settings(fit, passes=MOST_PASSES, effective=False)
     try:
         return structure, learn_batch(structure, recordings, Watch(None), options, None)
     except Interrupted:  # the intermediate result of a partial fit is of no use
@@ -114,14 +110,7 @@ def fit_extended(
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
-    begin = extended_description(nominal.data, causes)
-    choice = settings.choice
-    if choice.only:
-        new = {path for own in added_paths(nominal.data, causes) for path in own}
-        structure = build_structure(_described(begin, settings.path), Choice(choice.sides))
-        known = {number.path for number in structure.numbers}
-        choice = replace(choice, only=(*choice.only, *sorted(new & known)))
-    return fit_numbers(begin, recordings, replace(settings, choice=choice), given=nominal.given)
+    return fit_numbers(extended_description(nominal.data, causes), recordings, settings, given=nominal.given)
 
 
 def cause_parameters(
@@ -187,14 +176,6 @@ def _thinned(recording: FitRecording, every: int) -> FitRecording:
     if every == 1:
         return recording
     return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
-
-
-def _described(data: Mapping[str, Any], path: Path) -> Finger:
-    text = json.dumps(data).encode()
-    try:
-        return Finger(path, text, data, native.image_from_json(text))
-    except native.NativeError as refused:
-        raise InputError(f"{path}: {refused}") from None
 
 
 def _coarser(path: str) -> list[str]:

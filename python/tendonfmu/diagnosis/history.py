@@ -2,7 +2,7 @@
 
 ::
 
-    found = diagnose_history("finger.json", ["2026-03-01.parquet", "2026-03-08.parquet", ...])
+    history = diagnose_history("finger.json", ["2026-03-01.parquet", "2026-03-08.parquet", ...])
 
 The recordings are in order of time and each is compared with the reference. Each recording is diagnosed by itself; then
 the sizes of all causes that were named in any recording are estimated in all of them.

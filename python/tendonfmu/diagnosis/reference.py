@@ -8,7 +8,7 @@ was repeated exactly, aligned samples are subtracted instead, and almost nothing
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.remainder_features import Features, features
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.model import moment_arms
+from tendonfmu.statistics import Folds, make_folds
 
 GROUPS = (
     "angle",
@@ -189,3 +190,30 @@ def _apart(one: Numbers, other: Numbers, lag: int) -> float:
     if end <= begin:
         return np.inf
     return float(np.mean((one[begin:end] - other[begin + lag : end + lag]) ** 2))
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+
+def folds_of_sides(series: Series, is_now: Flags) -> tuple[Folds, Flags]:
+    """Return parts of the new recordings, then of the reference, and which of them are of the new ones [f]."""
+    now, then = (make_folds(replace(series, used=series.used & side)) for side in (is_now, ~is_now))
+    return _joined(now, then), np.arange(now.folds + then.folds) < now.folds
+
+
+def folds_of_unseen(series: Series, unseen: Flags) -> tuple[Folds, Flags]:
+    """Return unseen blocks as one part and all others as the other, and that only the first is judged [2]."""
+    both = [make_folds(replace(series, used=series.used & side)) for side in (unseen, ~unseen)]
+    one, other = (replace(folds, fold=np.zeros_like(folds.fold), folds=1) for folds in both)
+    return _joined(one, other), np.array([True, False])
+
+
+def _joined(one: Folds, other: Folds) -> Folds:
+    return Folds(
+        rows=np.concatenate([one.rows, other.rows]),
+        run=np.concatenate([one.run, other.run + 1 + one.run.max(initial=-1)]),
+        stretch=np.concatenate([one.stretch, other.stretch + one.stretches]),
+        fold=np.concatenate([one.fold, other.fold + one.folds]),
+        stretches=one.stretches + other.stretches,
+        folds=one.folds + other.folds,
+    )

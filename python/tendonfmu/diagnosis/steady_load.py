@@ -8,10 +8,10 @@ import numpy as np
 from scipy import stats
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.cause import ChangedSize
+from tendonfmu.diagnosis.cause import ChangedSize, with_error
 from tendonfmu.diagnosis.result import SteadyLoad
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics import Interval, gain_interval, make_folds
+from tendonfmu.statistics import gain_interval, make_folds
 
 BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
 LEVEL = 0.01  # largest share of stretches whose mean is on the other side
@@ -80,11 +80,7 @@ def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
         return None
     gain = gain_interval(now.about(then.level), now.about(now.level), seed)
     error = float(np.hypot(then.error, now.error))
-    levels = (_interval(then.level, then.error), _interval(now.level, now.error), _interval(moved, error))
+    levels = (with_error(then.level, then.error), with_error(now.level, now.error), with_error(moved, error))
     size = ChangedSize("torque", "N.m", *levels)
     p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
     return SteadyLoad(joint + 1, size, gain, p_value)
-
-
-def _interval(value: float, error: float) -> Interval:
-    return Interval(value, value - 1.96 * error, value + 1.96 * error)
