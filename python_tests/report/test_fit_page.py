@@ -23,7 +23,7 @@ from repetitions import repeated
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.report.fit_page import PAGE, fit_page, write_fit_page
 from tendonfmu.report.fit_text import consistency, page_tables, residual_tables
 from tendonfmu.report.numbers import rounded

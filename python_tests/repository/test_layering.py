@@ -48,7 +48,7 @@ ONLY = {
     "tendonfmu._plant": "simulate/plant.py",
     "tendonfmu._estimation": "estimate/estimation.py",
     "plotly": "drawing/figures.py",
-    "PIL": "drawing/raster.py",
+    "PIL": "drawing/finger_picture.py",
     "rich": "cli/console.py",
     "dask": "tasks/jobs.py",
     "distributed": "tasks/jobs.py",
