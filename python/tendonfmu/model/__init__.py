@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         extension_rows,
         law_path,
         number_of,
+        part_of,
         place_of,
         steps_of,
     )

@@ -129,6 +129,12 @@ def steps_of(path: str) -> list[Step]:
     return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]
 
 
+def part_of(path: str) -> tuple[str, int, str] | None:
+    """Split the path of a number of a joint or tendon: `joints` or `tendons`, its number, and the rest of the path."""
+    found = re.match(r"(joints|tendons)\[(\d+)\]\.?", path)
+    return None if found is None else (found[1], int(found[2]), path[found.end() :])
+
+
 def law_path(path: str) -> LawPath | None:
     """Split the path of a law or of a number in one; None if it is another path."""
     found = _LAW.fullmatch(path)

@@ -130,18 +130,16 @@ def run_sheets(
             section="joints",
             name=f"joint_{j}",
             title=name,
-            caption="",
-            keys=tuple(_keys_of(table, j)),
-            panels=tuple(_torque_panels(table, j, name, factor, unit)),
+            keys=list(_keys_of(table, j)),
+            panels=list(_torque_panels(table, j, name, factor, unit)),
         )
     yield _events_sheet(table, joints, tendons, label)
     yield Sheet(
         section="motion",
         name="motion",
         title="Joint angles and speeds",
-        caption="",
         keys=(("fitted", "angle"), ("slow", "speed")),
-        panels=tuple(_motion_panels(table, joints)),
+        panels=list(_motion_panels(table, joints)),
         folded=True,
     )
 
