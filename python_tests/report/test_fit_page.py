@@ -190,7 +190,7 @@ def test_the_innovations_are_described_where_they_are_known(written: Written) ->
         size, *white = consistency(changed(written[0], innovations=innovations))
         assert "(NIS) 4;" in size and "factor of 2;" in size and len(white) == bool(names)
         for k in names:
-            assert f"{written[0].joint_names[k]} {lag_one[k]:.2f}" in white[0]
+            assert f"{written[0].fitted.joint_names[k]} {lag_one[k]:.2f}" in white[0]
 
 
 def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ Numbers = NDArray[np.float64]
 
 
 def finger_of(data: dict[str, Any]) -> Finger:
-    return finger_from_data(Path("finger.json"), data)
+    return finger_from_data(data)
 
 
 def index_finger() -> dict[str, Any]:
