@@ -3,12 +3,6 @@
 There is one `FitSeries` per recording: those trained on (role "training"; held-out blocks of time have `used` False),
 and whole recordings that were held out or given to compare with (role "comparison", such as the motion at four times
 the pretension).
-
-Examples
---------
->>> picture = FitPicture(report, start=start, fitted=description, unknowns=estimator.unknowns, z=result.z,
-...                      covariance=result.covariance, series=[...])
->>> write_fit_page(picture, Path("figures"))  # report/fit_page.py: PNG files and report.html
 """
 
 from __future__ import annotations
