@@ -132,8 +132,8 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
     if sums is None or not len(sums.samples):
         return None
     moments = np.hstack([sums.samples[:, None], sums.x, sums.y, sums.xx, sums.yy, sums.xy])
-    told = ~np.isnan(sums.within).any(axis=1)
-    within = np.column_stack([sums.samples, sums.within])[told]
+    known = ~np.isnan(sums.within).any(axis=1)
+    within = np.column_stack([sums.samples, sums.within])[known]
     return ContactError(
         rms=intervals.of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
         correlation=intervals.of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
