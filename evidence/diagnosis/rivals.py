@@ -31,7 +31,7 @@ from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.result import Where
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.model import read_finger
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.recordings import Held, prepare, read_recording
 
 TRAIN, TEST = 30.0, 15.0  # s

@@ -33,8 +33,8 @@ from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid
 from tendonfmu.diagnosis.signal_choice import choose, least_sizes
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.starting_point import delay_of_positions, scan
-from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Finger
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.model.native import Instance, image_from_json
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording

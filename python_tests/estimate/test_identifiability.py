@@ -15,7 +15,7 @@ from tendonfmu.estimate.identifiability import LIMIT
 from tendonfmu.excite.excitation import Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.friction_places import balanced_forces
 
 
 @pytest.fixture

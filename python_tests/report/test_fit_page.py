@@ -23,7 +23,7 @@ from repetitions import repeated
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.balance import balanced_forces, moment_arms
+from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.report.fit_page import PAGE, fit_page, write_fit_page
 from tendonfmu.report.fit_text import consistency, page_tables, residual_tables
 from tendonfmu.report.numbers import rounded
@@ -126,11 +126,11 @@ def text_of(picture: FitPicture) -> str:
 
 def test_names_and_warnings_are_escaped(written: Written) -> None:
     picture = written[0]
-    fitted = copy.deepcopy(dict(picture.fitted))
+    fitted = copy.deepcopy(dict(picture.fitted.data))
     fitted["joints"][0]["name"] = fitted["tendons"][0]["name"] = HOSTILE
     recordings = [{**picture.report["recordings"][0], "path": HOSTILE}]
     hostile = changed(picture, finger=HOSTILE, warnings=[HOSTILE], recordings=recordings, options={HOSTILE: [HOSTILE]})
-    text = fit_page(dataclasses.replace(hostile, fitted=fitted))
+    text = fit_page(dataclasses.replace(hostile, fitted=dataclasses.replace(picture.fitted, data=fitted)))
     assert "<script" not in text  # nor one of its own: no figures
     assert text.count("&lt;script&gt;") >= 6
 
@@ -167,7 +167,7 @@ def test_comparisons_have_tables_and_many_of_them_one_tile(written: Written) -> 
 def test_one_joint_has_one_table(written: Written) -> None:
     """A row for each set of data instead of a table."""
     picture = written[0]
-    one = copy.deepcopy(dict(picture.fitted))
+    one = copy.deepcopy(dict(picture.fitted.data))
     del one["joints"][1:]
     residual = {key: value[:1] for key, value in picture.report["residual"]["train"].items()}
     report: dict[str, Any] = {
@@ -175,7 +175,9 @@ def test_one_joint_has_one_table(written: Written) -> None:
         "parameters": [each for each in picture.report["parameters"] if each["path"].startswith("joints[1].")],
         "innovations": {"nis": {"mean": None}, "whiteness": {"lag_one": [0.0], "ljung_box_p": [1.0]}},
     }
-    found = page_tables(dataclasses.replace(changed(picture, **report), fitted=one))
+    found = page_tables(
+        dataclasses.replace(changed(picture, **report), fitted=dataclasses.replace(picture.fitted, data=one))
+    )
     assert [row.name for row in found[0].rows] == ["Training", "Held out of training", "Not trained on: b"]
     assert len(found) == 1 and found[0].rows[1].fitted == pytest.approx(1e3 * residual["rms"][0])
 
@@ -188,7 +190,7 @@ def test_the_innovations_are_described_where_they_are_known(written: Written) ->
         size, *white = consistency(changed(written[0], innovations=innovations))
         assert "(NIS) 4;" in size and "factor of 2;" in size and len(white) == bool(names)
         for k in names:
-            assert f"{written[0].joint_names[k]} {lag_one[k]:.2f}" in white[0]
+            assert f"{written[0].fitted.joint_names[k]} {lag_one[k]:.2f}" in white[0]
 
 
 def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:
