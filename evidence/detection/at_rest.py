@@ -1,11 +1,8 @@
 """Pushes of 0.02 to 1 N on a finger at rest: how many contact.rest finds with the bounds that `tune` learns for it.
 
-On the simulated index finger (the pushes in stiction of slots.py). Bounds come from rests without pushes, alarms are
-counted in others.
-
     python -m evidence.detection.at_rest -o FOLDER
 
-Recordings are kept in the folder. Prints a table.
+Bounds come from rests without pushes (slots.py), alarms are counted in others. Recordings are kept. Prints a table.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""How well contact is detected on the simulated hand (docs/evidence/contact.md).
-
-300 pushes of 0.1 to 2 N in 30 min at 10, 20 and 40 N of pretension (hand.py), a fit on free motion at low pretension,
-simpler models with the best thresholds each (rivals.py), and the best that could be done with the residual
-(matched.py).
+"""How well contact is detected on the simulated hand, beside simpler models and the best that the residual allows.
 
     python -m evidence.detection.contact -o FOLDER [--finger NAME=FILE ...]
 

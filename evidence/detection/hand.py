@@ -1,13 +1,8 @@
-"""Recordings of the simulated index finger that moves and rests, pushed and left alone, and what is true of them.
+"""Recordings of the simulated index finger (examples/rigs) that moves and rests, pushed and left alone, with the truth.
 
-The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
-them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has recordings of
-10 min, of other seeds each: three with 100 *light* pushes, 0.1 to 2 N, uniform in the logarithm, anywhere on the
-finger; two with 100 *firm* ones, uniform in the force; two with 100 *strong* ones, 1 to 2 N on the fingertip, since at
-high pretension few others reach several times the residual; and three *free* of pushes. Every pushed recording has a
-*twin*: the same motion and the same sensor noise without the pushes. What differs between the two is what a push does.
-
-Everything is kept in a folder under its name, and what is there is not made again.
+*Light* pushes are of 0.1 to 2 N, uniform in the logarithm, anywhere on the finger; *firm* ones uniform in the force;
+*strong* ones 1 to 2 N on the fingertip, since at high pretension few others reach several times the residual. Every
+pushed recording has a *twin*: the same motion and sensor noise without the pushes. What is there is not made again.
 """
 
 from __future__ import annotations

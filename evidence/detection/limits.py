@@ -1,10 +1,8 @@
 """Where detection ends and how it recovers: slow pushes, pushes in stiction, disturbances (docs/evidence/contact.md).
 
-On the virtual index finger (slots.py), any number of descriptions beside one another:
-
     python -m evidence.detection.limits -o FOLDER --finger paper=fitted.json --finger recommended=tuned.json
 
-Recordings are kept in the folder. Writes detection_limits.md.
+Recordings (slots.py) are kept in the folder. Writes detection_limits.md.
 """
 
 from __future__ import annotations

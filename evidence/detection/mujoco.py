@@ -1,9 +1,5 @@
 """How well contact is detected on fingers of another physics engine that `tendonfmu calibrate` alone made ready.
 
-Each finger of mujoco_pushes.py is calibrated by the command from a rough description and 26 min of free motion at two
-pretensions, and scored on 100 labelled pushes that no step before has seen. A push's size is the largest torque that it
-makes at a joint, over the rms of the free residual there, as calibration.json counts it.
-
     python -m evidence.detection.mujoco -o FOLDER [--fingers 1 3 19 4 6]
     python -m evidence.detection.mujoco -o FOLDER --slow --fingers 3 4
 

@@ -2,9 +2,8 @@
 
     python -m evidence.detection.place -o FOLDER --finger TUNED.json
 
-The recordings are those of hand.py, made in FOLDER where they are missing; the links are added to the finger from the
-rig. Each push counts once, in the middle of its hold. Writes contact_place.md into FOLDER, with the same rule on the
-true torques beside what the product says: what is lost there is lost to the torques themselves.
+Each push counts once, in the middle of its hold. Writes contact_place.md into FOLDER, with the same rule on the true
+torques beside what the product says: what is lost there is lost to the torques themselves.
 """
 
 from __future__ import annotations

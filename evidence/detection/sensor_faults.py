@@ -1,15 +1,9 @@
-"""Failing sensors: reported as faults or as contact, and faults that are reported where every sensor is sound.
-
-Fingers in MuJoCo (mujoco_pushes.py, calibrated as in mujoco.py) and the simulated index finger are tuned on free
-motion; the keys of sensor_fault are learned from their training recordings alone. A fault is put into one tendon in
-each slot of 8 s, of four kinds in turn: its force reads 0, its force freezes, its force jumps by 2 to 10 N (uniform in
-the logarithm, up or down), its position freezes. It begins 1 to 2.5 s into the slot and lasts 3 s; what a frozen sensor
-reads is its last sound value, to the last bit. Sound recordings, those of fingers in numpy and, with --foreign, of a
-folder with case_NN.json, case_NN_train.parquet, case_NN_test.parquet among them, must show none.
+"""Failing sensors: reported as faults or as contact, and faults reported where every sensor is sound.
 
     python -m evidence.detection.sensor_faults -o FOLDER [--foreign FOLDER]
 
-Everything is kept in the folder; writes sensor_faults.md.
+--foreign: a folder with case_NN.json, case_NN_train.parquet, case_NN_test.parquet. Everything is kept in the folder;
+writes sensor_faults.md.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Recordings of the simulated index finger: slow pushes, pushes in stiction, a finger to be disturbed.
 
-The rig is examples/rigs/index_finger.json. Pushes come in slots, each of which a fresh finger is run over: what one
-push leaves in the bias is not counted against the next. At rest a slot begins with a move of 1 s to another posture.
-Everything is kept in a folder under its name, and what is there is not made again.
+Pushes come in slots, each of which a fresh finger is run over: what one push leaves in the bias is not counted against
+the next. At rest a slot begins with a move of 1 s to another posture. What is there is not made again.
 """
 
 from __future__ import annotations

@@ -1,15 +1,6 @@
 """Changes of measured machines: known ones put on recordings of EMPS and the da Vinci jaw, and real ones of the jaw.
 
-`then` and `now` are different stretches of the recordings; `now` has a known effect on it (measured.py), or nothing.
-EMPS: two recordings of the same path, of which one has pulses of the drive's force on it; these may stand as motor
-force or as known load. da Vinci: 15 runs, ten loads at 0.1 Hz and five at 0.5 Hz.
-
-Strength: variance of the torque that the change adds over the variance of what the case's model leaves of the unaltered
-`now`, both in blocks of 10 ms and without a constant of each recording (the machines' biases are constants). The part
-that refitting the model's own numbers to `now` absorbs does not count. Where that is more than half of it, the change
-is one of numbers that the model has, `then` pins them, and the whole torque counts.
-
-Needs the recordings in ../shared/data or $TENDONFMU_DATA.
+What `then`, `now` and the strength of a change are: README.md. Needs ../shared/data or $TENDONFMU_DATA.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
-"""The bed `simulated`: fingers whose truth is exact, from simulators that share no code with the product.
+"""Changes of simulated fingers whose truth is exact, from simulators that share no code with the product.
 
-`then` and `now` are the same finger with one number changed in between, or none. `now` repeats the motion exactly
-(other noise), is another motion, is shorter, or has another pretension: the random numbers of motion and of noise come
-from seeds of their own. The description is the simulator's, fitted to `then`.
-
-Strength: variance of the torque that the change adds (the same `now` simulated with and without it, less the slow bias)
-over that of what the description leaves of the unchanged `now`, at the joint where that is largest, rounded down to a
-step of STEPS. Below the first of them nobody is asked to see it.
+`then` and `now` are the same finger with one number changed in between, or none: README.md. Motion and noise have seeds
+of their own. The description is the simulator's, fitted to `then`.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
 """How often `tendonfmu diagnose --reference` says what changed: python -m evidence.diagnosis.changes hidden -o FOLDER
 
-- hidden: different stretches of EMPS and da Vinci recordings, with a known change put on `now`, or nothing; asked with
-  and without the reference (change_measured.py);
-- real: another load of the da Vinci instrument that no sensor shows, or another speed (change_measured.py);
-- simulated: foreign fingers recorded twice, with one number of the simulator changed, or none (change_simulated.py).
-
-Develop on odd cases, report even ones. Writes FOLDER/changes.md. `history` writes no table, but six dated recordings:
+The beds are described in README.md. Develop on odd cases, report even ones. Writes FOLDER/changes.md. `history` writes
+no table, but six dated recordings:
 
     python -m evidence.diagnosis.changes history -o history
     tendonfmu diagnose history/finger.json history/2026-*.parquet --history -o out

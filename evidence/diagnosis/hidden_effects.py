@@ -1,9 +1,7 @@
 """What the matched rig can hide: every effect that `diagnose` may name, and three kinds it may not.
 
-Each builder takes a hand and a random generator, chooses a place, removes the effect from both descriptions where it
-stands there, and says how the true finger differs by one magnitude. `hide` scales the magnitude to a strength.
-All formulas are physics written here; nothing is taken from the candidates. Places count from 0 inside, from 1 in
-`Hidden`.
+Each builder takes the effect out of both descriptions at a random place and says how the true finger differs by one
+magnitude; `hide` scales it to a strength. Formulas are physics written here. Places count from 0, in `Hidden` from 1.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """How often effects hidden in the EMPS and da Vinci recordings are found: python -m evidence.diagnosis.measured_cases
 
-What is to be hidden is first taken off recording and model where they have it already, so that on the unaltered
-recording there is nothing to name: that is the null. Strength: variance of the torque that the effect adds and that
-refitting the model's own numbers cannot absorb, over the variance of what the model leaves of the unaltered recording,
-both in blocks of 10 ms. Needs the recordings in ../shared/data or $TENDONFMU_DATA. Writes FOLDER/measured.md.
+What is to be hidden is first taken off recording and model where they have it already. Strength: variance of the torque
+that the effect adds and that refitting the model's own numbers cannot absorb, over that of what the model leaves of the
+unaltered recording, both in blocks of 10 ms. Needs ../shared/data or $TENDONFMU_DATA. Writes FOLDER/measured.md.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""`diagnose` and its rivals on the same cases, in one table: python -m evidence.diagnosis.rivals -o FOLDER
+"""`diagnose` and its rivals (rival_methods.py) on the same cases: python -m evidence.diagnosis.rivals -o FOLDER
 
-Every case has a training recording of 30 s and a test recording of 15 s. Matched: 12 with nothing hidden, each effect
-of the list once at a strength of 0.3, each effect that is not on it at 0.3 and at 1. Foreign: the even cases in numpy
-and MuJoCo, without what refitting absorbs; their sizes are their own. Writes FOLDER/rivals.md. The rivals (see
-rival_methods.py) work on the very residual and columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without
-them sindy and knockoffs are left out) and requirements-foreign.lock.
+Foreign: the even cases in numpy and MuJoCo, without what refitting absorbs. The rivals work on the very residual and
+columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without them sindy and knockoffs are left out) and
+requirements-foreign.lock. Writes FOLDER/rivals.md.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Friction of a tendon finger in numpy, over all samples at once: what the matched rig is made of.
 
-Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with
-the runtime, the package or the oracle. Indices start at 0 here. A description is read as plain JSON data.
-
-Where the oracle walks from sample to sample, this file works on whole series: what moves and what sticks follows from
-the velocities alone, so that every bias jump can be placed at once.
+Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with the runtime,
+the package or the oracle. What moves and what sticks follows from the velocities alone, so that every bias jump can be
+placed at once. Indices start at 0 here.
 """
 
 from __future__ import annotations

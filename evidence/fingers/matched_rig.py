@@ -1,18 +1,10 @@
-"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect.
+"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect (diagnosis/README.md).
 
     hand = random_hand(seed=1, joints=2)                       # the truth, and the tool's nominal description
     hidden = hide(hand, "load_friction", strength=0.1, seed=3) # hidden_effects.py; strength after refitting, over noise
-    made = record(hidden, seed=5, seconds=60.0)                # made.columns: a recording; made.nominal: for the tool
-    made.write(folder)                                         # recording.parquet, nominal.json
+    made = record(hidden, seed=5, seconds=60.0)                # made.columns: a recording; hand.nominal: for the tool
 
-The torque balance is Rᵀ f = T(q, q̇, f) + bias + noise (+ what is hidden); friction depends on the forces, so the
-forces are found by fixed-point iteration over the whole series at once. Bias wander and coloured noise are torques
-that act on the finger; encoders are quantised, force sensors have a little white noise of their own.
-
-"Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
-delay of every recording), at rest the torque stays what it was (`entry_load`, forget_rate 0), or
-every effect has presliding in the form of its extension. What remains to the tool is noise, wander, quantisation
-and what was hidden.
+Friction depends on the forces: they are found by fixed-point iteration over the whole series at once.
 """
 
 from __future__ import annotations

@@ -3,11 +3,8 @@
     pip install --require-hashes -r requirements-fit-peers.lock    # filterpy; left out where it is not there
     python -m evidence.fit.compare --output fit.json
 
-The index finger (472 numbers) over 400 s of an `excite` motion at 1 kHz; forces made by the model itself, with other
-numbers than the fit starts from, white noise and a wandering bias. Each way runs in a process of its own, one after the
-other, whose peak memory is the kernel's. The product uses all cores, the peers (peers.py) one. They take as many
-samples as they can finish, and their times are scaled by the samples; the iterations of least squares are its own, on
-the samples that it took. Before any time is worth anything they must agree with the product on those samples.
+Each way runs in a process of its own. The peers (peers.py) take as many samples as they can finish, and their times are
+scaled by the samples. Before any time is worth anything they must agree with the product on those samples.
 """
 
 from __future__ import annotations

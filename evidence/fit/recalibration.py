@@ -1,9 +1,5 @@
 """The da Vinci jaw recalibrated on one recording of 20 s, judged on all others.
 
-The jaw with its diagnosed structure (examples/davinci/jaw_extended.json) is fitted on the even loads. It is then fitted
-again on each single run in turn, from the numbers as they were and with the joint's Coulomb friction changed by 30 %
-beforehand, and judged by compensated minus external torque on all other runs.
-
     python -m evidence.fit.recalibration [--change X ...]
 
 Needs the recordings in ../shared/data or $TENDONFMU_DATA. Prints the tables of docs/evidence/recalibration.md.

@@ -1,11 +1,7 @@
-"""How well a fit finds numbers that are known (docs/evidence/fit.md).
-
-A finger makes recordings of its own (recovery_case.py): 472 numbers, 400 s at 1 kHz, noise and a wandering bias. Which
-numbers can be told is decided from the Fisher information at the truth before anything is fitted. Every number then
-starts 25 % off, and the batch method and the extended Kalman filter fit all of them.
+"""How well a fit finds numbers that are known, and which numbers another motion and noise would tell.
 
     python -m evidence.fit.recovery -o FOLDER --seeds 20
-    python -m evidence.fit.recovery -o FOLDER --levers      # which numbers another motion and noise would tell
+    python -m evidence.fit.recovery -o FOLDER --levers
 
 Seeds and levers that are there already are not run again.
 """

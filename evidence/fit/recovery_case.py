@@ -1,18 +1,7 @@
-"""One case of the recovery campaign: a finger whose numbers are known, a recording that it made itself, what of the
-numbers that recording can tell, and how far a fit is from them.
+"""A finger with 472 known numbers that makes its own recording, and which of the numbers that recording can tell.
 
-The finger is examples/fingers/index_finger.json: 4 joints, 8 tendons, 468 numbers of friction and covers, and the bias
-of each joint at the start, 472 in all. Its noise is replaced, since its own stands for errors of the model too:
-
-- 0.5 mN·m of white noise in each joint torque at 1 kHz. With the finger's moment arms (root of their squares 14, 24, 13
-  and 7 mm by joint) that is 20 to 75 mN in each tendon force, as strain gauges for 100 N have.
-- a bias that wanders by 0.1 mN·m in 1 s, 2 mN·m in 400 s: 0.1 N of drift in each force sensor.
-
-The motion is `tendonfmu excite --vary-tension 15:60 --max-speed 3 --max-acceleration 20 --rate 1000`, another seed in
-each case. The recording holds time, tendon forces and positions, as a robot does, from which the fit takes angles and
-velocities (kinematics source 1), and `external_torque`: a reference sensor, whose noise and wander these are. Tendons
-carry what the model makes of friction and covers alone. If they carried the bias too, it would pull them slack: what
-fig. 5's jumps leave in it, where a load or an angle changes while something rests, adds up to 1 N·m in 400 s.
+The motion and the noise are described in docs/evidence/fit.md. Tendons carry the model's friction and covers alone:
+the wander of the bias adds up to 1 N·m in 400 s, which would pull them slack. It comes as `external_torque`.
 """
 
 from __future__ import annotations

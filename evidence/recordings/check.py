@@ -1,11 +1,9 @@
-"""How often `tendonfmu check` finds what is wrong with a recording.
+"""How often `tendonfmu check` finds what is wrong with a recording (fingers/corruptions.py).
 
     python -m evidence.recordings.check -o FOLDER --half even
 
-Each sound test recording of the foreign cases is corrupted in every way of evidence/fingers/corruptions.py and checked;
-sound ones are checked as they are, without their joint angles, and against descriptions with rough numbers. Constants
-of the product are chosen on odd cases; figures that are published come from even ones. rows/CASE.json in the folder has
-what was said of each recording.
+Constants of the product are chosen on odd cases; figures that are published come from even ones. rows/CASE.json in the
+folder has what was said of each recording.
 """
 
 from __future__ import annotations
