@@ -21,6 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from evidence.detection.hand import PRETENSIONS, TWINS, Take, read_truth, recording, states, takes
 from evidence.detection.rivals import Detector, HighPass
+from evidence.fingers.matched_strength import averaged
 from evidence.runner import say, write
 from tendonfmu.arrays import Flags, Indices, Numbers
 
@@ -139,9 +140,7 @@ def _rate(time: Numbers) -> float:
 
 def _means(signals: Numbers, rate: float) -> Numbers:
     """[N/k, n] means over `STEP`."""
-    size = round(STEP * rate)
-    whole = len(signals) // size * size
-    return np.asarray(signals[:whole].reshape(-1, size, signals.shape[1]).mean(axis=1))
+    return averaged(signals, round(STEP * rate))
 
 
 def _cut(signals: Numbers, time: Numbers, onset: float) -> Numbers:

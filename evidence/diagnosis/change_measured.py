@@ -38,6 +38,7 @@ from evidence.diagnosis.measured import (
     residual,
     residuals,
 )
+from evidence.fingers.matched_strength import averaged
 from evidence.judge import Truth
 from evidence.runner import DATA, EXAMPLES
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
@@ -111,8 +112,7 @@ def part_of(columns: Columns, begin: float, end: float) -> Columns:
 
 def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
     """Means of so many samples each."""
-    rows = len(columns["time"]) // to_one * to_one
-    return {name: values[:rows].reshape(-1, to_one).mean(axis=1) for name, values in columns.items()}
+    return {name: averaged(values, to_one) for name, values in columns.items()}
 
 
 def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> dict[str, Columns]:

@@ -32,6 +32,7 @@ from evidence.fingers import (
     numpy_maxwell,
     numpy_tanh,
 )
+from evidence.fingers.matched_strength import averaged
 from evidence.fingers.mujoco_model import Physics
 from evidence.judge import Truth
 from evidence.runner import write
@@ -118,9 +119,7 @@ def record(simulator: ModuleType | None, difference: Difference, how: How) -> Re
         columns[f"tendon_force[{tendon}]"] = columns[f"tendon_force[{tendon}]"] + force
         measured = measured + force * arms[tendon - 1]
     to_one = round(1.0 / (RATE * float(np.median(np.diff(columns["time"])))))
-    rows = len(measured) // to_one * to_one
-    means = measured[:rows].reshape(-1, to_one, measured.shape[1]).mean(axis=1)
-    return Recorded(thinned(columns, to_one), means)
+    return Recorded(thinned(columns, to_one), averaged(measured, to_one))
 
 
 def _numpy(simulator: ModuleType, difference: Difference, how: How) -> tuple[Any, Array, Array]:

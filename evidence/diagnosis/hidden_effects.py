@@ -12,16 +12,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from evidence.diagnosis.hidden_sensors import SENSORS
-from evidence.fingers.matched_physics import Effect, Finger, Motion, last_true
+from evidence.diagnosis.hidden_sensors import SENSORS, Random
+from evidence.fingers.matched_physics import Array, Effect, Finger, Motion, held_sign
 from evidence.fingers.matched_rig import Description, Hand, Hidden, Unreachable, record
 from evidence.fingers.matched_strength import look, residual, surviving
 
-Array = NDArray[Any]
-Random = np.random.Generator
 Builder = Callable[[Hand, Random], tuple[Hand, Hidden]]
 CLOSE = 0.05  # in its logarithm, of the strength asked for
 STILL_CLOSE = 0.3  # the same where sticking and sliding make strength a rough function of the magnitude
@@ -171,12 +168,6 @@ def inner_joint(hand: Hand, rng: Random) -> dict[str, int]:
 
 def both(hand: Hand, rng: Random) -> dict[str, int]:
     return joint(hand, rng) | {"tendon": int(rng.integers(len(hand.truth["tendons"])))}
-
-
-def held_sign(velocity: Array, threshold: float) -> Array:
-    """Sign of the last velocity above the threshold, 0 before there was one."""
-    last = last_true(np.abs(velocity) > threshold)
-    return np.where(last >= 0, np.sign(velocity[last]), 0.0)
 
 
 def at_joints(motion: Motion, joints: int | slice, torque: Array) -> Array:

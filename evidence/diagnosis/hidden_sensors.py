@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evidence.fingers.matched_physics import Finger, Motion
+from evidence.fingers.matched_physics import Array, Finger, Motion
 from evidence.fingers.matched_rig import Hand, Hidden
 
-Array = NDArray[Any]
 Random = np.random.Generator
 CROSSING = 0.03  # s in which the drive crosses the play at a reversal
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evidence.fingers.matched_strength import orthonormal
+from evidence.fingers.matched_strength import averaged, orthonormal
 from tendonfmu.model.native import run_recording
 
 Array = NDArray[np.float64]
@@ -288,8 +288,7 @@ def residual(machine: Machine, columns: Columns) -> Array:
     arrays = {key.removesuffix("[1]"): value if key == "time" else value[:, None] for key, value in columns.items()}
     outputs = run_recording(machine.model, arrays, machine.kinematics)
     left = (outputs["compensated_torque"][:, 0] - columns[LOAD]).astype(float)
-    size = max(1, round(BLOCK / float(np.median(np.diff(columns["time"])))))
-    return np.asarray(left[: len(left) // size * size].reshape(-1, size).mean(axis=1))
+    return averaged(left, max(1, round(BLOCK / float(np.median(np.diff(columns["time"]))))))
 
 
 def residuals(machine: Machine) -> Array:

@@ -49,6 +49,12 @@ def last_true(flags: Array) -> Array:
     return np.maximum.accumulate(np.where(flags, np.arange(len(flags)), -1))
 
 
+def held_sign(velocity: Array, threshold: float) -> Array:
+    """[N] sign of the last velocity above the threshold, 0 before there was one."""
+    last = last_true(np.abs(velocity) > threshold)
+    return np.where(last >= 0, np.sign(velocity[last]), 0.0)
+
+
 @dataclass
 class Effect:
     """One friction effect and what the series of its velocity made of it.
@@ -78,9 +84,7 @@ class Contacts:
 
 
 def contacts_of(velocity: Array, threshold: float) -> Contacts:
-    moving = np.abs(velocity) > threshold
-    last = last_true(moving)
-    side = np.where(last >= 0, np.sign(velocity[last]), 0.0)
+    moving, side = np.abs(velocity) > threshold, held_sign(velocity, threshold)
     enters = np.flatnonzero(moving[:-1] & ~moving[1:]) + 1
     leaves = np.flatnonzero(~moving[:-1] & moving[1:]) + 1
     position = np.searchsorted(enters, leaves) - 1

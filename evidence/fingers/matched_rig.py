@@ -19,15 +19,21 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
+from evidence.fingers.matched_physics import (
+    Array,
+    Description,
+    Finger,
+    Motion,
+    filtered_velocity,
+    motion_of,
+    read_finger,
+    torque_of,
+)
 
-Array = NDArray[Any]
-Description = dict[str, Any]
 ITERATIONS = 60  # of the balance, at most: it contracts by some tenths of the friction coefficients
 BALANCED = 1e-9  # N
 

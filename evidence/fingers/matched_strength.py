@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from evidence.fingers.matched_physics import (
+    Array,
     Finger,
     Motion,
     filtered_velocity,
@@ -27,7 +26,6 @@ from evidence.fingers.matched_physics import (
 )
 from evidence.fingers.matched_rig import Hand, Made, record
 
-Array = NDArray[Any]
 BLOCK = 0.01  # s, over which series are averaged
 KNOTS = 2.0  # s, of the slow bias, which looks like a slow effect
 STEP = 1e-4  # relative, of the numeric derivative

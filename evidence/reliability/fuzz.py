@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evidence.recordings.log_cases import FORMATS, sound, write
+from evidence.recordings.log_faults import FORMATS, sound, write
 from evidence.reliability.programs import CALIBRATED
 from evidence.reliability.row import Measure, Outcome, Run, Unavailable, called, spoken
 from evidence.runner import ROOT

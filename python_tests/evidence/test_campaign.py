@@ -9,11 +9,10 @@ from typing import Any
 import pandas as pd
 
 from evidence.diagnosis import makers
-from evidence.diagnosis.campaign import STRENGTHS, judged, markdown, planned, rate, rates, rates_by_part
+from evidence.diagnosis.campaign import STRENGTHS, judged, markdown, planned, rates
 from evidence.diagnosis.case import Case
 from evidence.diagnosis.makers import Plan
 from evidence.judge import Truth
-from optional_parts import require
 from tendonfmu.diagnosis.result import FoundPlace, Where
 
 
@@ -66,13 +65,6 @@ def test_foreign_fingers_of_numpy_follow_the_seed() -> None:
     assert not cases[0].recordings[0].equals(cases[2].recordings[0])
     assert cases[0].truths == (Truth(("edge_friction",), 2, 5),) and "presliding" in cases[0].also
     assert len(cases[0].gain_recordings) == 2 and len(cases[0].test) == 1
-
-
-def test_foreign_fingers_of_mujoco_have_the_joints_asked_for() -> None:
-    require("mujoco")
-    case = makers.mujoco_finger(9, 24, 4, 2.0, 250.0)
-    assert len(case.finger["joints"]) == case.facts["joints"] == 4
-    assert "inertia" in case.also and case.test == ()
 
 
 # --- rows -------------------------------------------------------------------------------------------------------------
@@ -134,12 +126,6 @@ def test_unknown_is_said_or_a_name_is_wrong() -> None:
 # --- the table --------------------------------------------------------------------------------------------------------
 
 
-def test_rates_have_exact_intervals() -> None:
-    line = rate("x", "", [{"a": k < 3} for k in range(10)] + [{"a": None}], lambda row: row["a"])
-    assert line == ["x", "", "30.0 %", "3/10", "6.7 to 65.2 %"]
-    assert rate("x", "", [], lambda row: True)[3] == "0"
-
-
 def test_the_gain_is_covered_where_the_interval_has_the_true_one() -> None:
     base = row("single", GRAVITY, causes=(cause("gravity"),), strength=0.1)
     known = counted([base | {"true_gain": true} for true in (0.1, 0.149, 0.2)])
@@ -152,16 +138,6 @@ def test_an_absorbed_effect_that_no_motion_shows_is_not_asked_for() -> None:
     known = counted([base | {"shown_strength": strength} for strength in (1e-6, 0.29, 0.31)])
     assert known["absorbed by refitting: “not visible”, with an experiment"] == "3/3"
     assert known["the same where a motion shows it: named after the experiment"] == "0/1"
-
-
-def test_rates_by_rig_and_joints_where_there_are_several() -> None:
-    rows = [row("null"), row("null", joints=2), row("null", joints=2, rig="numpy", causes=(cause("gravity"),))]
-    by_part = {line[0]: line[3] for line in rates_by_part(rows)}
-    assert by_part["nothing hidden: a false cause; matched"] == "0/2"
-    assert by_part["nothing hidden: a false cause; numpy"] == "1/1"
-    assert by_part["nothing hidden: a false cause; 1 joint"] == "0/1"
-    assert by_part["nothing hidden: a false cause; 2 joints"] == "1/2"
-    assert not rates_by_part(rows[:1])
 
 
 def test_a_case_that_failed_is_in_no_rate() -> None:

@@ -21,9 +21,7 @@ from evidence.diagnosis.change_measured import (
     changed_case,
     check_sound,
     hide,
-    part_of,
     real_plans,
-    thinned,
     with_pulses_as_load,
 )
 from evidence.diagnosis.changes import WITH, answer_of, markdown, run_case
@@ -150,13 +148,6 @@ def test_a_change_of_a_number_counts_as_a_whole_and_one_of_no_number_by_what_ref
     assert spring.by == "survives_now" and spring.survives_now == pytest.approx(1.0, rel=0.03)
 
 
-def test_what_is_hidden_has_its_strength_in_the_recordings() -> None:
-    hidden = hide(NOW, EFFECTS["less_coulomb"], 0.3, NOW)
-    before, after = (residual(NOW, columns) for columns in (NOW.recordings["run 2"], hidden.now["run 2"]))
-    assert np.var(after - before) / np.var(before) == pytest.approx(0.3, rel=0.03)
-    assert hidden.magnitude < 0.0
-
-
 def test_what_no_sound_magnitude_has_is_refused() -> None:
     with pytest.raises(ValueError, match="strength 1: no sound magnitude"):
         hide(NOW, replace(EFFECTS["delay"], most=1e-6), 1.0, NOW)
@@ -171,17 +162,6 @@ def test_the_search_for_a_strength_finds_it_from_anywhere(power: float, first: f
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
-
-
-def test_parts_begin_at_zero_and_keep_their_samples() -> None:
-    part = part_of(recording(3), 2.0, 4.0)
-    assert part["time"][0] == 0.0 and len(part["time"]) == 2000
-    assert np.array_equal(part[FORCE], recording(3)[FORCE][2000:4000])
-
-
-def test_thinning_takes_means() -> None:
-    columns = {"time": np.arange(5.0), FORCE: np.array([1.0, 3.0, 5.0, 9.0, 100.0])}
-    assert thinned(columns, 2)[FORCE].tolist() == [2.0, 7.0]
 
 
 def test_pulses_become_a_known_load_that_leaves_the_balance_alone(tmp_path: Path) -> None:
@@ -260,15 +240,6 @@ def test_a_number_is_changed_inside_and_put_back(simulated: Any) -> None:
     stiffer, usual = (simulated.record(tanh, difference, how).measured for difference in differences)
     more = np.std(stiffer - usual, axis=0)
     assert more[0] > 1e-4 and more[1] < 0.02 * more[0] and before == tanh.COVER
-
-
-def test_an_offset_is_on_the_sensor_alone(simulated: Any) -> None:
-    tanh, how = simulated.numpy_tanh, simulated.How(motion=1, noise=1, seconds=3.0)
-    differences = (simulated.NONE, simulated.Difference(offset=(3, 1.5)))
-    usual, off = (simulated.record(tanh, difference, how) for difference in differences)
-    moved = {name for name in usual.columns if not np.array_equal(usual.columns[name], off.columns[name])}
-    assert moved == {"tendon_force[3]"}
-    assert np.allclose(off.measured - usual.measured, 1.5 * tanh.ARMS[2])
 
 
 # --- rows and tables --------------------------------------------------------------------------------------------------
