@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,9 @@ from evidence.detection.hand import (
 from evidence.detection.matched import matched_findings
 from evidence.detection.rivals import Detector, best_thresholds, from_json, make_rivals, to_json
 from evidence.runner import INDEX_FINGER, named_finger, parser, publish, run_cases, say, write
+from evidence.tables import Row
 from tendonfmu.recordings import Recording, read_recording
 
-Row = Mapping[str, Any]
 Rows = Sequence[Row]
 Run = Callable[..., list[dict[str, Any]]]  # run_cases with workers
 

@@ -36,13 +36,13 @@ from evidence.detection.slots import (
     slots,
 )
 from evidence.runner import digest, named_finger, parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import Event, score_detection
 from tendonfmu.detect.counting import stretches
 from tendonfmu.model import moment_arms
 from tendonfmu.model.native import run_recording
 
-Row = dict[str, Any]
 Rows = Sequence[Row]
 
 PRESLIDING = 0.004  # rad, of the rig's joints
@@ -234,7 +234,7 @@ def recovered(time: Numbers, out: Arrays, reference: Numbers, limit: Numbers, sp
     # `SETTLED`, none if it never does; at_once, after: alarms that begin in it (0.1 s after its end included), in the
     # minute after; longest: s, of an alarm from its begin on
     begin, end = span
-    alarm = out["contact"].ravel()
+    alarm = out["contact"].ravel().astype(bool)
     sound = np.all(np.abs(out["bias_torque"] - reference) < limit, axis=1) & ~alarm
     minute = (time >= end) & (time <= end + AFTER)
     good, step = sound[minute], float(time[1] - time[0])

@@ -22,12 +22,11 @@ import numpy as np
 from evidence import tables
 from evidence.detection.mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place, pushes_of
 from evidence.runner import parser, publish, run_cases, write
+from evidence.tables import Row
 from tendonfmu.detect import score_detection
 from tendonfmu.model import read_finger
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings import read_recording
-
-Row = dict[str, Any]
 
 FINGERS = (1, 3, 19, 4, 6)
 SIZES = (6.0, 3.0)  # times the residual's rms: least sizes of classes

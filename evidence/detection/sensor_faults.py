@@ -20,6 +20,7 @@ import numpy as np
 from evidence import tables
 from evidence.fingers import numpy_cases
 from evidence.runner import INDEX_FINGER, INDEX_RIG, parser, publish, run_cases, say, write
+from evidence.tables import Row
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import ContactTuning, TuneWarning
 from tendonfmu.detect.free_motion import FreePart
@@ -31,7 +32,6 @@ from tendonfmu.recordings import read_recording
 from tendonfmu.simulate import read_rig, simulate
 
 Arrays = dict[str, Numbers]
-Row = dict[str, Any]
 
 FINGERS = (1, 3, 4, 6)  # numbers of evidence/fingers
 OFF = (0.05, 0.1)  # standard deviation of factors on springs; half of it on moment arms

@@ -88,7 +88,7 @@ class Slot:
 def slots(case: Case) -> list[Slot]:
     random = np.random.default_rng([case.seed, 1])
     if case.kind == "stuck":
-        forces = np.exp(random.uniform(*np.log(STUCK_FORCE), STUCK_COUNT))
+        forces = np.exp(random.uniform(np.log(STUCK_FORCE[0]), np.log(STUCK_FORCE[1]), STUCK_COUNT))
         wanted = [(float(force), STUCK_RISES[k % 2], STUCK_HOLD) for k, force in enumerate(forces)]
     else:
         wanted = [(force, rise, HOLD) for force in FORCES for rise in RISES]

@@ -113,9 +113,9 @@ def play(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
         x[:, place] = before_play(x[:, place], signals["time"], magnitude)
 
     def joint(angle: Array, magnitude: float) -> Array:
-        true = angle.copy()
-        true[:, place] = after_play(angle[:, place], magnitude)
-        return true
+        turned: Array = angle.copy()
+        turned[:, place] = after_play(angle[:, place], magnitude)
+        return turned
 
     if at_tendon:
         return hand, Hidden("backlash", tendon=place + 1, magnitude=2e-4, sensors=motor)

@@ -80,7 +80,8 @@ def absorbed(seed: int, options: Options, effect: str) -> Case:
     hand, label = _suitable(effect, None, seed, options, absorbed=True)
 
     def experiment(motion: Mapping[str, Any]) -> pd.DataFrame:
-        return pd.DataFrame(perform(hand, motion, seed).columns)
+        frame: pd.DataFrame = pd.DataFrame(perform(hand, motion, seed).columns)
+        return frame
 
     facts = _facts_of(label) | {"shown_strength": shown_strength(hand, seed, options.seconds)}
     return replace(_case(hand, seed, options, (_truth_of(label),), facts), experiment=experiment)

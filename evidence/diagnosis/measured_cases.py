@@ -72,7 +72,8 @@ def law_torque(law: Description, speed: Array, side: Array) -> Array:
 
     def one(half: Description) -> Array:
         drop, slow = half["static"] - half["coulomb"], half["stribeck_velocity"]
-        return half["coulomb"] + drop * np.exp(-np.abs(speed) / slow) + half.get("viscous", 0.0) * np.abs(speed)
+        fading = drop * np.exp(-np.abs(speed) / slow)
+        return np.asarray(half["coulomb"] + fading + half.get("viscous", 0.0) * np.abs(speed))
 
     forward, back = law.get("positive", law), law.get("negative", law)
     return np.where(side > 0, one(forward), -one(back))

@@ -7,7 +7,7 @@ mujoco_cases.py (1, 2 and 20, of one and two joints), with nothing hidden. Write
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -29,7 +29,7 @@ WAYS = ("always count", "may be left out")
 @contextmanager
 def searching(way: str) -> Iterator[None]:
     """A search for which stuck samples count in this way."""
-    alone: Callable[..., object] = search.sliding_alone if way == WAYS[1] else lambda *given: None
+    alone = vars(search)["sliding_alone"] if way == WAYS[1] else lambda *given: None
     with mock.patch.object(search, "sliding_alone", alone):
         yield
 
@@ -91,13 +91,13 @@ def main() -> None:
         lines = by(rows, ["way"], lambda some: [count(row["false"] for row in some)])
         publish(given.output / "stuck_mujoco.md", table(("stuck samples", "a false name"), lines) + "\n")
         return
-    cases = {
+    by_hidden = {
         f"{hidden}_{seed}_{way.replace(' ', '_')}": (hidden, way, 100 + seed)
         for hidden in ("nothing", "gravity")
         for way in WAYS
         for seed in range(given.seeds)
     }
-    rows = run_cases(of_sticking_finger, cases, given.output, given.workers, given.scheduler)
+    rows = run_cases(of_sticking_finger, by_hidden, given.output, given.workers, given.scheduler)
     head = ("hidden", "stuck samples", "named", "a false name", "friction, nominal", "friction, extended", "gain")
     publish(given.output / "stuck.md", table(head, by(rows, ["hidden", "way"], cells), 2) + "\n")
 

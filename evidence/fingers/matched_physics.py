@@ -241,7 +241,7 @@ def friction_torque(finger: Finger, motion: Motion, values: Sequence[Values], fo
     """[N, n] T of eq. (10) and the jumps of the bias so far, for tendon forces [N, m]."""
     samples, joints = motion.angle.shape
     lost = np.zeros((samples, *finger.arms.shape))  # by tendon i at joint j: what eqs. (6), (7) sum up
-    torque = finger.cover * (motion.angle - finger.rest)
+    torque: Array = finger.cover * (motion.angle - finger.rest)
     by_place = {(effect.kind, effect.at): value for effect, value in zip(finger.effects, values, strict=True)}
     f, between = np.maximum(force, 0.0), np.zeros_like(lost)
     for j in range(joints):

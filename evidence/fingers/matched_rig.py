@@ -259,7 +259,7 @@ def wandering(rng: np.random.Generator, time: Array, knots: float) -> Array:
     """[N] smooth random signal between -1 and 1: a cubic through random values some `knots` seconds apart."""
     count = max(4, int((time[-1] - time[0]) / knots) + 2)
     places = np.linspace(time[0], time[-1], count)
-    return np.clip(CubicSpline(places, rng.uniform(-1.0, 1.0, count))(time), -1.0, 1.0)
+    return np.asarray(np.clip(CubicSpline(places, rng.uniform(-1.0, 1.0, count))(time), -1.0, 1.0))
 
 
 def pulling_null_vector(arms: Array) -> Array | None:
@@ -309,7 +309,7 @@ def coloured(rng: np.random.Generator, samples: int, width: int, step: float, no
 def balanced_forces(finger: Finger, motion: Motion, pretensions: Array, load: Array) -> Array:
     """[N, m] N with Rᵀ f = G(f) + load, by iteration; pretensions [N, m] make no torque. load [N, n]."""
     spread = np.linalg.pinv(finger.arms.T)
-    force = pretensions + load @ spread.T
+    force: Array = pretensions + load @ spread.T
     for _ in range(ITERATIONS):
         last = force
         force = pretensions + (torque_of(finger, motion, force) + load) @ spread.T

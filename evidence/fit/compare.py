@@ -109,7 +109,7 @@ def make_data(folder: Path, duration: float) -> None:
         for k, column in enumerate(array.T, start=1)
     }
     write_table(folder / f"{FILE}.parquet", {"time": motion.time} | columns)
-    np.savez(folder / f"{FILE}.npz", **arrays)
+    np.savez(folder / f"{FILE}.npz", allow_pickle=False, **arrays)
 
 
 def load(folder: Path, samples: int) -> dict[str, Array]:
@@ -265,7 +265,7 @@ def line_of(name: str, folder: Path, scale: float) -> dict[str, Any]:
     """One line of the table, as JSON: seconds as measured and as scaled to all samples, memory, agreement."""
     way = WAYS[name]
     figures = apart_from(name, folder, max(100, min(way.samples, round(FULL * scale))))
-    line = {"way": name, "what": way.what}
+    line: dict[str, Any] = {"way": name, "what": way.what}
     kept = ("missing", "samples", "seconds", "cpu_seconds", "peak_memory", "iterations", "passes", "converged", "cost")
     line |= {key: figures[key] for key in kept if key in figures}
     if "missing" in figures:

@@ -136,7 +136,7 @@ def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
 
 def joints_of(truth: pd.DataFrame, name: str) -> Numbers:
     """[N, n] of a signal of the truth."""
-    return truth[[column for column in truth.columns if column.startswith(f"{name}[")]].to_numpy()
+    return np.asarray(truth[[column for column in truth.columns if column.startswith(f"{name}[")]])
 
 
 def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from evidence import tables
 from evidence.runner import EXAMPLES, parser
+from evidence.tables import Row
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import report_text, write_table
 from tendonfmu.model.native import run_recording
@@ -28,8 +29,6 @@ from tendonfmu.recordings import Recording, convert_file, read_recording
 
 sys.path.insert(0, str(EXAMPLES / "davinci"))
 from jaw_recordings import FAST, FAULT, SLOW, data_folder, rms, torque_error
-
-Row = dict[str, Any]
 
 STRUCTURE = EXAMPLES / "davinci" / "jaw_extended.json"
 EVEN = ("00", "02", "04", "06", "08")
@@ -86,7 +85,7 @@ def judged(finger: Mapping[str, Any], runs: Mapping[str, Recording], left_out: s
     """Rms in N·m of compensated minus external torque over all samples of all runs but one."""
     others = [recording for name, recording in runs.items() if name != left_out]
     errors = [torque_error(recording, run_recording(finger, recording.arrays())) for recording in others]
-    return rms(np.concatenate(errors))
+    return float(rms(np.concatenate(errors)))
 
 
 def fitted(finger: Any, recordings: Sequence[Recording], options: Mapping[str, Any]) -> FrictionFit:

@@ -17,11 +17,11 @@ from evidence import tables
 from evidence.fit import recovery_case as case
 from evidence.fit.recovery_case import DURATION, RATE, Case, Scale, identifiable, image, make_case
 from evidence.runner import parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.estimate import Estimator
 from tendonfmu.estimate.estimation import Learner
 
-Row = dict[str, Any]
 KINDS = ("static", "coulomb", "stribeck_velocity", "viscous", "stiffness", "initial_torque")
 FAR = 3.0  # standard errors
 PRIOR = 0.3  # of a number's size: about as far as the starts are off

@@ -142,11 +142,11 @@ class Scale:
 
     def _numbers(self, known: Estimator, z: Numbers) -> Numbers:
         values = known.values(z)[self._moved]
-        return np.where(self.kinds == "stribeck_velocity", 1.0 / values, values)
+        return np.asarray(np.where(self.kinds == "stribeck_velocity", 1.0 / values, values))
 
     def standard_errors(self, covariance: Numbers) -> Numbers:
         """[q] from the covariance of the unknowns."""
-        return np.sqrt(np.einsum("ij,jk,ik->i", self._slopes, covariance, self._slopes))
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", self._slopes, covariance, self._slopes)))
 
     def difference(self, z: Numbers, other: Numbers) -> Numbers:
         """[q] numbers of the unknowns z minus those of others."""
@@ -158,5 +158,5 @@ def identifiable(case: Case, scale: Scale) -> Flags:
     known = Estimator(image(case.truth))
     known.add_recording(case.recording, external_torque=case.recording["external_torque"])
     _, _, information = known.evaluate(known.start)
-    covariance = np.linalg.inv(information + np.diag((NEARLY_NOTHING * known.scale) ** -2.0))
+    covariance = np.asarray(np.linalg.inv(information + np.diag((NEARLY_NOTHING * known.scale) ** -2.0)), dtype=float)
     return np.asarray(scale.standard_errors(covariance) < LIMIT * np.abs(scale.value))

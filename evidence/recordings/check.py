@@ -25,11 +25,10 @@ from evidence import tables
 from evidence.fingers.corruptions import Corruption, applicable, columns_of, corrupt, corruptions
 from evidence.fingers.foreign import Nominal
 from evidence.runner import parser, publish, run_cases, say
+from evidence.tables import Row
 from tendonfmu.model import Finding, Finger, read_finger
 from tendonfmu.recordings import Recording, belongs
 from tendonfmu.recordings.recording import GROUPS
-
-Row = dict[str, Any]
 
 FAMILIES = {"recorded": "recorded", "mujoco": "mujoco_cases", "numpy": "numpy_cases"}
 ROUGH = (0.05, 0.15)  # relative errors of moment arms and stiffness, standard deviation

@@ -133,7 +133,7 @@ def header(store: Any, ns: int) -> Any:
 def cdr(table: Table) -> list[tuple[int, bytes]]:
     """(ns of the recorder, message) of each row."""
     store = ros_store()
-    made = []
+    made: list[tuple[int, bytes]] = []
     for t, force, spool in zip(*(table[name].tolist() for name in ("t", "force", "spool")), strict=True):
         message = store.types[TYPE](header=header(store, START + 1_000_000 * t), force=force, spool=spool)
         made.append((START + 5_000_000 * len(made), bytes(store.serialize_cdr(message, TYPE))))
@@ -158,7 +158,7 @@ def mcap_cdr(compression: str) -> Any:
 
         definition, _ = ros_store().generate_msgdef(TYPE, ros_version=2)
         with open(file, "wb") as raw:
-            writer = Writer(raw, chunk_size=2048, compression=CompressionType[compression])
+            writer: Any = Writer(raw, chunk_size=2048, compression=CompressionType[compression])
             writer.start(profile="ros2")
             schema = writer.register_schema(TYPE, "ros2msg", definition.encode())
             channel = writer.register_channel("/hand", "cdr", schema)
@@ -173,7 +173,7 @@ def mcap_json(file: Path, table: Table) -> None:
     from mcap.writer import Writer
 
     with open(file, "wb") as raw:
-        writer = Writer(raw, chunk_size=2048)
+        writer: Any = Writer(raw, chunk_size=2048)
         writer.start()
         schema = writer.register_schema("Tendon", "jsonschema", b'{"type": "object"}')
         channel = writer.register_channel("/hand", "json", schema)
@@ -200,12 +200,12 @@ def mcap_protobuf(file: Path, table: Table) -> None:
             writer.write_message("/hand", kind(**dict(zip(table, row, strict=True))), START + k, START + k)
 
 
-PLAIN = {"column": "t", "unit": "ms"}
+PLAIN: dict[str, Any] = {"column": "t", "unit": "ms"}
 STAMP = {"column": "/hand.header.stamp", "unit": "datetime"}
-ROS = {"time": STAMP, "force": "/hand.force", "spool": "/hand.spool"}
-MESSAGE = {"time": {"column": "/hand.t", "unit": "ms"}, "force": "/hand.force", "spool": "/hand.spool"}
-STRUCT = {"time": {"column": "log.t", "unit": "ms"}, "force": "log.force", "spool": "log.spool", "recovers": False}
-GROUP = {"time": {"column": "/log/t", "unit": "ms"}, "force": "/log/force", "spool": "/log/spool", "recovers": False}
+ROS: dict[str, Any] = {"time": STAMP, "force": "/hand.force", "spool": "/hand.spool"}
+MESSAGE: dict[str, Any] = {"time": {"column": "/hand.t", "unit": "ms"}, "force": "/hand.force", "spool": "/hand.spool"}
+STRUCT: dict[str, Any] = {"time": {"column": "log.t", "unit": "ms"}, "force": "log.force", "spool": "log.spool"}
+GROUP: dict[str, Any] = {"time": {"column": "/log/t", "unit": "ms"}, "force": "/log/force", "spool": "/log/spool"}
 NOTES = "# Logger 3\n# made by hand\n\n"
 
 FORMATS = {
@@ -215,9 +215,9 @@ FORMATS = {
     "CSV, latin-1": Format("log.dat", text(",", ".", "# Prüfstand µ\n", "latin-1"), PLAIN),
     "CSV in gzip": Format("log.csv.gz", text(), PLAIN),
     "Parquet": Format("log.parquet", parquet, PLAIN, recovers=False),
-    "MATLAB 5": Format("log.mat", matlab, **STRUCT),
-    "MATLAB 7.3": Format("log.mat", matlab_73, **STRUCT),
-    "HDF5": Format("log.h5", hdf5, **GROUP),
+    "MATLAB 5": Format("log.mat", matlab, **STRUCT, recovers=False),
+    "MATLAB 7.3": Format("log.mat", matlab_73, **STRUCT, recovers=False),
+    "HDF5": Format("log.h5", hdf5, **GROUP, recovers=False),
     "MCAP, ROS 2, zstd": Format("log.mcap", mcap_cdr("ZSTD"), **ROS),
     "MCAP, ROS 2, lz4": Format("log.mcap", mcap_cdr("LZ4"), **ROS),
     "MCAP, ROS 2, plain": Format("log.mcap", mcap_cdr("NONE"), **ROS),

@@ -76,9 +76,22 @@ def calls(run: Run) -> Outcome:
 
 # --- parsers ----------------------------------------------------------------------------------------------------------
 
-WORDS = (b"nan", b"-inf", b"1e999", b'"', b"{", b"]", b",", b"\n", b"\r", b"\0", b"\xff\xfe", b"null", b"-0", b"1e-400")
-WORDS += (b";", b"\t", b"[0]", b"\xc3")
-BAD_NUMBERS = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
+WORDS: tuple[bytes, ...] = (
+    b"nan",
+    b"-inf",
+    b"1e999",
+    b'"',
+    b"{",
+    b"]",
+    b",",
+    b"\n",
+    b"\r",
+    b"\0",
+    b"\xff\xfe",
+    b"null",
+)
+WORDS += (b"-0", b"1e-400", b";", b"\t", b"[0]", b"\xc3")
+BAD_NUMBERS: tuple[Any, ...] = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
 
 
 def spoilt(chance: random.Random, content: bytes) -> bytes:
@@ -130,7 +143,7 @@ def spoil_and_read(run: Run) -> tuple[str, list[str]]:
 
 def numbers_of(tree: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Path, container and key of each number in a description."""
-    pairs = tree.items() if isinstance(tree, dict) else enumerate(tree, start=1)
+    pairs: Any = tree.items() if isinstance(tree, dict) else enumerate(tree, start=1)
     for key, value in pairs:
         here = (f"{path}.{key}" if path else key) if isinstance(tree, dict) else f"{path}[{key}]"
         if isinstance(value, dict | list):
