@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from evidence import tables
-from evidence.detection.hand import PRETENSIONS, Arrays
+from evidence.detection.hand import PRETENSIONS, Arrays, Take
 from evidence.detection.limits import PRESLIDING
-from evidence.detection.slots import Case, Slot, cut, made, slots
+from evidence.detection.slots import Slot, cut, made, slots
 from evidence.runner import INDEX_FINGER, parser, publish, say
 from tendonfmu.detect import free_parts
 from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
@@ -43,7 +43,7 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
     def rests_of(chosen: Sequence[int]) -> list[Any]:
         rests = []
         for part, pretension in itertools.product(chosen, PRETENSIONS):
-            groups = inputs(made(folder, Case("stuck_twin", pretension, part)))
+            groups = inputs(made(folder, Take("stuck_twin", pretension, part)))
             recording = Recording(Path("recording"), groups.pop("time"), groups)
             rests += free_parts(finger, recording, 1)[0]
         return rests
@@ -60,9 +60,9 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
     at_rest = {**finger.data, "contact": {"threshold": [1e9] * joints, "rest": dict(rule.keys)}}
     rows = []
     for part, pretension in itertools.product(parts, PRETENSIONS):
-        case = Case("stuck", pretension, part)
-        whole = made(folder, case)
-        rows += [pushed(at_rest, cut(whole, slot.begin, slot.end), slot) for slot in slots(case)]
+        take = Take("stuck", pretension, part)
+        whole = made(folder, take)
+        rows += [pushed(at_rest, cut(whole, slot.begin, slot.end), slot) for slot in slots(take)]
     below, forced = ([row for row in rows if row[key]] for key in ("below", "forced"))
     both = [row for row in below if row["forced"]]
     counts = [tables.count(row["found"] for row in chosen) for chosen in (below, both, forced)]

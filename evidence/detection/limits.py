@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from evidence import tables
-from evidence.detection.hand import LEAST_FORCE, Arrays
+from evidence.detection.hand import LEAST_FORCE, Arrays, Take
 from evidence.detection.slots import (
     AFTER,
     DISTURBED,
@@ -29,11 +29,11 @@ from evidence.detection.slots import (
     PUSH_TIME,
     RATE,
     WARM,
-    Case,
     Slot,
     cut,
     made,
     slots,
+    twin_of,
 )
 from evidence.runner import digest, named_finger, parser, publish, run_cases
 from evidence.tables import Row
@@ -57,15 +57,15 @@ Subject = tuple[str, Mapping[str, Any]]  # a description under a name
 # --- pushes: computing ------------------------------------------------------------------------------------------------
 
 
-def pushed_rows(folder: Path, case: Case, subjects: Sequence[Subject]) -> Row:
+def pushed_rows(folder: Path, take: Take, subjects: Sequence[Subject]) -> Row:
     """Every push of a recording under every description, a fresh finger for each."""
     rows: list[Row] = []
-    whole = made(folder, case)
-    twin = None if case.kind == "stuck" else made(folder, case.twin)
-    for slot in slots(case):
+    whole = made(folder, take)
+    twin = None if take.kind == "stuck" else made(folder, twin_of(take))
+    for slot in slots(take):
         arrays = cut(whole, slot.begin, slot.end)
         alone = None if twin is None else cut(twin, slot.begin, slot.end)
-        common = {"kind": case.kind, "pretension": case.pretension, "force": slot.force, "rise": slot.rise}
+        common = {"kind": take.kind, "pretension": take.pretension, "force": slot.force, "rise": slot.rise}
         common |= _stuck(arrays, slot, subjects[0][1]) if alone is None else {}
         rows += [common | {"finger": name} | _pushed(data, arrays, alone, slot) for name, data in subjects]
     return {"rows": rows}
@@ -193,14 +193,14 @@ DISTURBANCES = (
 
 def disturbed_rows(folder: Path, pretension: float, parts: int, subjects: Sequence[Subject]) -> Row:
     """Every disturbance under every description, one recording for each part."""
-    twins = [_started(made(folder, Case("still", pretension, part))) for part in range(1, parts + 1)]
+    twins = [_started(made(folder, Take("still", pretension, part))) for part in range(1, parts + 1)]
     free = [[_undetecting(data, twin) for twin in twins] for _, data in subjects]
     limit = 2.0 * np.sqrt(np.mean([np.mean(out["residual"][1:] ** 2, axis=0) for out in free[0]], axis=0))
     rows: list[Row] = []
     for number, twin in enumerate(twins):
         recordings = {"still": twin}
         for kind in ("pushed", "wrist"):
-            recordings[kind] = _started(made(folder, Case(kind, pretension, number + 1)))
+            recordings[kind] = _started(made(folder, Take(kind, pretension, number + 1)))
         tendon = 3 * number % twin["tendon_force"].shape[1]
         for disturbance in DISTURBANCES:
             arrays = disturbance.applied(recordings[disturbance.kind], tendon)
@@ -350,12 +350,12 @@ def main() -> None:
         rows = run_cases(function, named, folder / "scores", given.workers, given.scheduler)
         return list(itertools.chain(*(row["rows"] for row in rows)))
 
-    ramps = [Case(kind, p, part) for kind in ("rest", "motion") for p in (10.0, 40.0) for part in numbers]
-    stuck = [Case("stuck", p, part) for p in (10.0, 20.0, 40.0) for part in numbers]
+    ramps = [Take(kind, p, part) for kind in ("rest", "motion") for p in (10.0, 40.0) for part in numbers]
+    stuck = [Take("stuck", p, part) for p in (10.0, 20.0, 40.0) for part in numbers]
     parts = {
         "Recovery": rows_of(disturbed_rows, {f"recovery_{p:g}_{given.parts}": (p, given.parts) for p in (10.0, 40.0)}),
-        "Pushes in stiction": rows_of(pushed_rows, {case.name: (case,) for case in stuck}),
-        "Slow pushes": rows_of(pushed_rows, {case.name: (case,) for case in ramps}),
+        "Pushes in stiction": rows_of(pushed_rows, {take.name: (take,) for take in stuck}),
+        "Slow pushes": rows_of(pushed_rows, {take.name: (take,) for take in ramps}),
     }
     shown = zip(parts.items(), (recovery_table, stuck_tables, ramp_tables), strict=True)
     publish(folder / "detection_limits.md", tables.page({name: show(rows) for (name, rows), show in shown}))

@@ -20,7 +20,6 @@ from tendonfmu.diagnosis import Diagnosis, diagnose
 
 LIMIT = 3600.0  # s that the command may take
 PROGRAM = (sys.executable, "-c", "from tendonfmu.cli import main; main()")
-HALVES = {"odd": (1,), "even": (0,), "all": (0, 1)}  # of a case's number: odd to develop on, even to report
 ALARMS = ("unexplained", "partly explained")  # verdicts
 
 

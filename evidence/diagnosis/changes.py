@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from evidence.diagnosis.case import HALVES, Case, Run, run_command
+from evidence.diagnosis.case import Case, Run, run_command
 from evidence.diagnosis.change_measured import LOAD_NAMES, UNCHANGED, Makers, hidden_makers, real_makers
+from evidence.fingers.families import HALVES
 from evidence.judge import Cause, alternatives, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import Row, by, count, table

@@ -5,20 +5,18 @@ Constants of the product are chosen on odd cases; figures that are published com
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import ModuleType
 from typing import Any
 
-from evidence.diagnosis.case import HALVES, Run, run_command
+from evidence.diagnosis.case import Run, run_command
 from evidence.diagnosis.makers import foreign_finger
 from evidence.fingers import foreign
+from evidence.fingers.families import HALVES, cases_of, module_of
 from evidence.judge import SYNONYMS, Truth, judge
-from evidence.runner import parser, publish, run_cases, say
+from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, count, page, table
 
-FAMILIES = {"recorded": "recorded", "mujoco": "mujoco_cases", "numpy": "numpy_cases"}
 TERMLESS = ("unknown", "contact")  # causes without a term in the extended model have no gain of their own
 VISIBLE = 0.1  # of the residual's variance: README of the recorded cases
 
@@ -109,24 +107,6 @@ def judged(report: Mapping[str, Any], truth: foreign.Truth) -> dict[str, Any]:
         "error_ratio": float((extended / nominal) ** 0.5) if nominal > 0.0 else 1.0,
         "test_rms": errors,
     }
-
-
-def module_of(family: str) -> ModuleType:
-    return importlib.import_module(f"evidence.fingers.{FAMILIES[family]}")
-
-
-def cases_of(half: str) -> dict[str, tuple[str, int]]:
-    """All cases of a half that can be made here."""
-    cases: dict[str, tuple[str, int]] = {}
-    for family in FAMILIES:
-        try:
-            module = module_of(family)
-        except ModuleNotFoundError as missing:
-            say(f"SKIPPED: the family {family}: {missing.name} is not installed")
-            continue
-        numbers = module.numbers() if family == "recorded" else module.NUMBERS
-        cases |= {f"{family}_{number:02d}": (family, number) for number in numbers if number % 2 in HALVES[half]}
-    return cases
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------

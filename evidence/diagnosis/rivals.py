@@ -16,10 +16,11 @@ from typing import Any
 from evidence.diagnosis import makers, rival_methods
 from evidence.diagnosis.campaign import row_of
 from evidence.diagnosis.case import Case, causes_of, leaves_unnamed
-from evidence.diagnosis.foreign_cases import is_absorbed, is_outside, module_of
+from evidence.diagnosis.foreign_cases import is_absorbed, is_outside
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
 from evidence.diagnosis.makers import Options, Plan
 from evidence.fingers import foreign
+from evidence.fingers.families import module_of
 from evidence.judge import SYNONYMS, Cause, Truth, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, count, table

@@ -15,9 +15,10 @@ import pytest
 
 from evidence.diagnosis import case as diagnosis_case
 from evidence.diagnosis.case import run_command
-from evidence.diagnosis.foreign_cases import cases_of, markdown, row_of
+from evidence.diagnosis.foreign_cases import markdown, row_of
 from evidence.diagnosis.makers import foreign_finger
 from evidence.fingers import numpy_cases, recorded
+from evidence.fingers.families import cases_of
 from evidence.fingers.foreign import Array, Truth
 from optional_parts import is_there, needs
 from repetitions import repeated
