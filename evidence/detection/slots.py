@@ -12,11 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from evidence.detection.hand import LEAST_FORCE, Arrays, Take, grouped
-from evidence.runner import INDEX_RIG, write
+from evidence.detection.hand import Arrays, Take, grouped, motion_columns, rig_of, simulated
+from evidence.runner import write
 from tendonfmu.files import read_table, write_table
-from tendonfmu.simulate import read_rig, simulate
-from tendonfmu.statistics.quintic import evaluate
 
 RATE = 500.0  # Hz, the rig's
 FORCES, RISES, HOLD, FALL = (0.25, 0.5, 1.0, 2.0), (0.1, 1.0, 10.0), 3.0, 0.1  # N, s
@@ -92,25 +90,16 @@ def slots(take: Take) -> list[Slot]:
 
 
 def write_rig(folder: Path, take: Take) -> Path:
-    rig: dict[str, Any] = {
-        "format": "tendonfmu-rig-1",
-        "base": str(INDEX_RIG),
-        "name": take.name,
-        "seed": seed_of(take),
-        "physics": {"contact_force": LEAST_FORCE},
-        "motion": {"pretension": take.pretension, "seed": seed_of(take), "duration": None},
-        "pushes": [],
-        "recording": {"columns": ["joint_position", "external_torque", "contact"]},
-    }
+    moves = {"pretension": take.pretension, "seed": seed_of(take), "duration": None}
+    rig = rig_of(take.name, seed_of(take), moves, WARM + DISTURBED + LONGEST + AFTER + 1.0) | {"pushes": []}
     if pushes_of(take) in ("still", "pushed", "wrist"):
-        duration = WARM + DISTURBED + LONGEST + AFTER + 1.0
         if take.kind == "pushed":
             rig["pushes"] = [_push(WARM - 1.0, 0.1, 0.9 + PUSH_TIME, RECOVERY_FORCE)]
         if take.kind == "wrist":
             rig["physics"]["wrist"] = WRIST
     else:
         planned = slots(take)
-        duration = planned[-1].end + 1.0
+        duration = rig["recording"]["duration"] = planned[-1].end + 1.0
         if take.kind == pushes_of(take):
             rig["pushes"] = [_push(slot.push, slot.rise, slot.hold, slot.force) for slot in planned]
         if pushes_of(take) == "motion":
@@ -119,7 +108,6 @@ def write_rig(folder: Path, take: Take) -> Path:
             file = folder / f"motion_{take.name}.parquet"
             write_table(file, _postures(take, planned, duration))
             rig["motion"] = {"kind": "file", "file": file.name, "pretension": take.pretension}
-    rig["recording"]["duration"] = duration
     file = folder / f"{take.name}.json"
     write(file, rig)
     return file
@@ -137,24 +125,19 @@ def _postures(take: Take, planned: list[Slot], duration: float) -> Arrays:
         time += [slot.begin, slot.begin + MOVE]
         posture += [posture[-1], CENTRE + SPREAD * random.uniform(-1.0, 1.0, len(CENTRE))]
     time, posture = [*time, duration], [*posture, posture[-1]]
-    table: Arrays = {"time": np.array(time)}
-    for j, angles in enumerate(np.array(posture).T, start=1):
-        knots = np.column_stack([time, angles, np.zeros((len(time), 2))])
-        for name, values in zip(("position", "velocity", "acceleration"), evaluate(knots, np.array(time)), strict=True):
-            table[f"joint_{name}[{j}]"] = values
-    return table
+    still = np.zeros((len(time), 2))
+    knots = [np.column_stack([time, angles, still]) for angles in np.array(posture).T]
+    return motion_columns(np.array(time), knots)
 
 
 def made(folder: Path, take: Take) -> Arrays:
     """The recording, contact_force [N], and the groups of `TRUE` as true_NAME [N, n]."""
     file = folder / f"{take.name}.parquet"
     if not file.exists():
-        run = simulate(read_rig(write_rig(folder, take)), truth=True)
-        assert run.truth is not None
-        kept = {name: run.recording[name] for name in run.recording if name.startswith(("time", "tendon_"))}
-        kept |= {f"true_{name}": values for name, values in run.truth.items() if name.split("[")[0] in TRUE}
-        kept["contact_force"] = np.sqrt(sum(run.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)))
-        write_table(file, kept)
+        recorded, true = simulated(write_rig(folder, take), TRUE)
+        kept = {name: values for name, values in recorded.items() if name.startswith(("time", "tendon_"))}
+        force = true.pop("contact_force")
+        write_table(file, {**kept, **{f"true_{name}": values for name, values in true.items()}, "contact_force": force})
     return grouped(read_table(file, lambda _path, _names: None))
 
 
