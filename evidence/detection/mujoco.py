@@ -65,18 +65,18 @@ def calibration(folder: Path, number: int) -> Row:
 
 
 def report(rows: Sequence[Row]) -> str:
-    def line(name: str, own: Sequence[Row]) -> list[str]:
-        sizes = [[row["sizes"].get(f"{size:g}", (0, 0)) for row in own] for size in SIZES]
+    def line(name: str, group: Sequence[Row]) -> list[str]:
+        sizes = [[row["sizes"].get(f"{size:g}", (0, 0)) for row in group] for size in SIZES]
         cells = [f"{sum(found for found, _ in size)}/{sum(count for _, count in size)}" for size in sizes]
-        cells.append(f"{sum(row['alarms'] for row in own)} in {sum(row['minutes'] for row in own):.1f}")
-        cells.append(", ".join(tables.number(row["delay"], ".0f", 1e3) for row in own))
-        return [name, *cells, ", ".join(f"{row['cpu']:.0f}" for row in own)]
+        cells.append(f"{sum(row['alarms'] for row in group)} in {sum(row['minutes'] for row in group):.1f}")
+        cells.append(", ".join(tables.number(row["delay"], ".0f", 1e3) for row in group))
+        return [name, *cells, ", ".join(f"{row['cpu']:.0f}" for row in group)]
 
     lines = []
     for parity, name in ((1, "odd"), (0, "even")):
-        own = [row for row in rows if row["finger"] % 2 == parity]
-        lines += [line(str(row["finger"]), [row]) for row in own]
-        lines += [line(f"**all {name}**", own)] if len(own) > 1 else []
+        group = [row for row in rows if row["finger"] % 2 == parity]
+        lines += [line(str(row["finger"]), [row]) for row in group]
+        lines += [line(f"**all {name}**", group)] if len(group) > 1 else []
     head = ["finger", "≥ 6 × rms", "3 to 6", "false alarms in min", "median delay, ms", "CPU time, s"]
     return tables.table(head, lines) + "\n"
 

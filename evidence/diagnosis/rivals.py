@@ -106,8 +106,8 @@ class Answer:
 def run_case(plan: Plan) -> dict[str, Any]:
     case = plan.make()
     diagnosis = case.diagnosed()
-    own = Answer(causes_of(diagnosis), unnamed=leaves_unnamed(diagnosis), gain=diagnosis.gain.value)
-    answers = {OWN: own, **rival_answers(case)}
+    diagnosed = Answer(causes_of(diagnosis), unnamed=leaves_unnamed(diagnosis), gain=diagnosis.gain.value)
+    answers = {OWN: diagnosed, **rival_answers(case)}
     return row_of(plan, case) | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
 
 

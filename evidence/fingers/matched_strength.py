@@ -42,7 +42,6 @@ class Seen:
 
     effect: Array
     nuisance: Array
-    blocks: int
 
 
 def group(columns: dict[str, Array], name: str) -> Array:
@@ -111,7 +110,7 @@ def splines(time: Array) -> Array:
 def look(hand: Hand, made: Made) -> Seen:
     """What the nominal model at its true numbers leaves of a quiet recording, and all that refitting can bend."""
     columns = np.hstack([number_columns(hand, made), bias_columns(hand, made)])
-    return Seen(residual(hand, made), orthonormal(columns), len(columns) // len(hand.truth["joints"]))
+    return Seen(residual(hand, made), orthonormal(columns))
 
 
 def number_columns(hand: Hand, made: Made) -> Array:
@@ -154,13 +153,6 @@ def surviving(seen: Seen, effect: Array, hand: Hand) -> tuple[float, float]:
     by_joint = np.mean(left.reshape(joints, -1) ** 2, axis=1)
     whole = float(flat @ flat)
     return float(by_joint.max() / hand.noise.std**2), float(left @ left) / whole if whole > 0.0 else 0.0
-
-
-def strength_of(hand: Hand, seed: int, seconds: float) -> tuple[float, float]:
-    """(strength, share) of what this hand hides in the recording of this seed."""
-    made = record(hand, seed, seconds, quiet=True)
-    seen = look(hand, made)
-    return surviving(seen, seen.effect, hand)
 
 
 # --- what another motion shows ----------------------------------------------------------------------------------------

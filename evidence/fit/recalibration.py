@@ -152,16 +152,16 @@ def sample_counts() -> list[list[str]]:
 def report(rows: Sequence[Row]) -> str:
     """A line for each way and planted factor; the ratio of each run without a planted change; samples."""
 
-    def cells(own: Sequence[Row]) -> list[str]:
-        before, after = (1e3 * tables.column(own, name) for name in ("before", "after"))
-        worst = [max(row["ratio"] for row in own if belongs(row["run"])) for belongs in GROUPS.values()]
-        above = sum(row["ratio"] > LIMIT for row in own)
+    def cells(group: Sequence[Row]) -> list[str]:
+        before, after = (1e3 * tables.column(group, name) for name in ("before", "after"))
+        worst = [max(row["ratio"] for row in group if belongs(row["run"])) for belongs in GROUPS.values()]
+        above = sum(row["ratio"] > LIMIT for row in group)
         errors = [f"{value:.1f}" for value in (np.median(before), np.median(after), after.max())]
-        return [*errors, *(f"{value:.2f}" for value in worst), f"{above} of {len(own)}"]
+        return [*errors, *(f"{value:.2f}" for value in worst), f"{above} of {len(group)}"]
 
     unchanged = tables.where(rows, planted=1.0)
     runs = tables.values_of(rows, "run")
-    by_run = tables.by(unchanged, ["way"], lambda own: [f"{row['ratio']:.2f}" for row in own])
+    by_run = tables.by(unchanged, ["way"], lambda group: [f"{row['ratio']:.2f}" for row in group])
     lines = [[way, f"× {factor}", *rest] for way, factor, *rest in tables.by(rows, ["way", "planted"], cells)]
     head = ["Fitted again", "Coulomb friction", "before, mN·m", "after, mN·m: median", "worst"]
     ratios = ["worst after/before: even", "odd", "0.5 Hz", f"above {LIMIT}"]

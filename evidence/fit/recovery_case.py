@@ -50,7 +50,6 @@ class Case:
     truth: Description  # with the true numbers
     start: Description  # with those that a fit starts from
     recording: dict[str, Numbers]  # as a fit takes it
-    least_force: float  # N, of any tendon
 
 
 def true_finger() -> Description:
@@ -90,7 +89,7 @@ def make_case(seed: int, duration: float = DURATION, rate: float = RATE) -> Case
     first = random.standard_normal(len(START_BIAS)) * np.sqrt(BIAS["initial_variance"])
     bias = np.array(START_BIAS) + first + wander + jumps
     recording["external_torque"] = force @ moment_arms(truth) - (friction + bias + noise)
-    return Case(truth, _start(truth, seed), recording, float(force.min()))
+    return Case(truth, _start(truth, seed), recording)
 
 
 def _start(truth: Description, seed: int) -> Description:

@@ -166,7 +166,7 @@ def report(rows: Sequence[Row]) -> str:
     """Two tables: of sound recordings, and of corrupted ones."""
 
     def sums(*keys: str) -> Any:
-        return lambda own: [str(len(own)), *(str(sum(row[key] for row in own)) for key in keys)]
+        return lambda group: [str(len(group)), *(str(sum(row[key] for row in group)) for key in keys)]
 
     sound, broken = tables.where(rows, family="sound"), [row for row in rows if row["family"] != "sound"]
     cells = sums("found", "explained", "false")

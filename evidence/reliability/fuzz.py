@@ -63,9 +63,9 @@ def fuzzed(run: Run, name: str, full: int, minutes: float, *options: str) -> tup
 def calls(run: Run) -> Outcome:
     tried, findings = [], []
     for name, full in (("fuzz_fmi2", 5_000_000), ("fuzz_fmi3", 5_000_000), ("fuzz_plant_fmi2", 1_000_000)):
-        count, found = fuzzed(run, name, full, run.minutes / 3, "-max_len=150")
+        count, finding = fuzzed(run, name, full, run.minutes / 3, "-max_len=150")
         tried.append(spoken(count))
-        findings += [found] if found else []
+        findings += [finding] if finding else []
     number = (
         f"{tried[0]} sequences of FMI 2.0 calls, {tried[1]} of FMI 3.0 calls, and {tried[2]} on simulated fingers, up "
         "to 150 bytes (some 25 calls, 6 of them steps) (libFuzzer, ASan, UBSan, leaks)"
