@@ -76,21 +76,8 @@ def calls(run: Run) -> Outcome:
 
 # --- parsers ----------------------------------------------------------------------------------------------------------
 
-WORDS: tuple[bytes, ...] = (
-    b"nan",
-    b"-inf",
-    b"1e999",
-    b'"',
-    b"{",
-    b"]",
-    b",",
-    b"\n",
-    b"\r",
-    b"\0",
-    b"\xff\xfe",
-    b"null",
-)
-WORDS += (b"-0", b"1e-400", b";", b"\t", b"[0]", b"\xc3")
+WORDS: tuple[bytes, ...] = (b"nan", b"-inf", b"1e999", b'"', b"{", b"]", b",", b"\n", b"\r", b"\0", b"\xff\xfe")
+WORDS += (b"null", b"-0", b"1e-400", b";", b"\t", b"[0]", b"\xc3")
 BAD_NUMBERS: tuple[Any, ...] = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
 
 
