@@ -13,7 +13,7 @@ from tendonfmu.statistics.intervals import Interval, quantile, rate, share
 NOTHING = "–"  # in a cell without a case
 SEED = 0  # of resampling
 
-Row = Mapping[str, Any]
+Row = dict[str, Any]
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], text_columns: int = 1) -> str:

@@ -128,7 +128,7 @@ def by_bic(data: Plain, power: Numbers) -> Trial | None:
 
     def fall(trial: Trial) -> float:
         explained = float(np.sum((basis(data.of(trial)).T @ data.target) ** 2)) if shows(trial, power) else 0.0
-        return -rows * np.log(max(1.0 - explained / total, 1e-12)) - len(trial.numbers) * np.log(rows)
+        return float(-rows * np.log(max(1.0 - explained / total, 1e-12)) - len(trial.numbers) * np.log(rows))
 
     best = max(data.trials, key=fall, default=None)
     return best if best is not None and fall(best) > 0.0 else None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN, hide, placed, scaled
 from evidence.fingers.matched_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
 from evidence.fingers.matched_rig import Hand, Made, Noise, coloured, random_hand, record
-from evidence.fingers.matched_strength import group, kinematics, residual, shown_strength, strength_of
+from evidence.fingers.matched_strength import group, kinematics, look, residual, shown_strength, surviving
 from repetitions import repeated
 from tendonfmu.model import native
 
@@ -113,6 +113,12 @@ def test_the_torque_stands_still_while_everything_rests() -> None:
     assert len(found.enters) > 3 and len(found.leaves) > 3
 
 
+def strength_of(hand: Hand, seed: int, seconds: float) -> tuple[float, float]:
+    """Strength, and the share that survives, of what this hand hides in the recording of this seed."""
+    seen = look(hand, record(hand, seed, seconds, quiet=True))
+    return surviving(seen, seen.effect, hand)
+
+
 @pytest.mark.parametrize(
     "effect", repeated(["gravity", "edge_friction", "inertia", "time_delay", "backlash", "rubbing"], 0, 5)
 )
@@ -121,12 +127,12 @@ def test_strength_is_what_was_asked_for(effect: str) -> None:
     hand, label = hide(
         random_hand(31, 2, presliding=True, rate=250.0), effect, 0.1, seed=1, motion=2, seconds=20.0
     )  # fmt: skip
-    found, share = strength_of(hand, 2, 20.0)
-    assert found == pytest.approx(0.1, rel=0.06)
-    assert (found, share) == pytest.approx((label["strength"], label["surviving_share"]), rel=0.15)
+    strength, share = strength_of(hand, 2, 20.0)
+    assert strength == pytest.approx(0.1, rel=0.06)
+    assert (strength, share) == pytest.approx((label["strength"], label["surviving_share"]), rel=0.15)
     assert 0.0 < share <= 1.0
     whole = residual(replace(hand, hidden=hand.hidden), record(hand, 2, 20.0, quiet=True)).var(axis=0).max()
-    assert whole > 0.9 * found * hand.noise.std**2  # what survives is a part of what was there
+    assert whole > 0.9 * strength * hand.noise.std**2  # what survives is a part of what was there
 
 
 def test_nothing_hidden_has_no_strength() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evidence.recordings.log_cases import (
+from evidence.recordings.log_faults import (
     FAULTS,
     FORMATS,
     ROWS,

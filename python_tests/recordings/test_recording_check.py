@@ -23,7 +23,7 @@ def case() -> Any:
 @pytest.mark.slow
 @pytest.mark.long
 def test_every_corruption_of_a_finger_is_explained(case: Any) -> None:
-    rows = check.checked("evidence.fingers.numpy_cases", 2)["rows"]
+    rows = check.checked("numpy", 2)["rows"]
     broken = [row for row in rows if row["family"] != "sound"]
     assert [row for row in broken if not row["explained"]] == []
     assert len(broken) > 60
