@@ -14,8 +14,6 @@ import pytest
 
 from optional_parts import DATA, needs
 from repository_paths import ROOT
-from tendonfmu.diagnosis.diagnosis import diagnose
-from tendonfmu.files.tables import write_table
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.recordings.recording import Recording
@@ -25,7 +23,6 @@ davinci = needs("davinci data")
 EMPS_LIMITS = {"DATA_EMPS": 2.2, "DATA_EMPS_PULSES": 3.1}  # % of the force
 JAW_LIMIT = 0.008  # N·m
 ODD = ("01", "03", "05", "07", "09")
-STALL = (17.08, 17.45)  # s, run 07
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -67,41 +64,3 @@ def jaw_error(model: dict[str, Any]) -> float:
 def test_the_diagnosed_jaw_tells_the_torque_at_loads_it_was_not_trained_on() -> None:
     assert jaw_error(read_json(ROOT / "examples" / "davinci" / "jaw_extended.json")) <= JAW_LIMIT
     assert jaw_error(read_json(ROOT / "examples" / "davinci" / "jaw_nominal.json")) > 2 * JAW_LIMIT
-
-
-def written(file: Path, format_: str, source: Path, options: dict[str, float]) -> Path:
-    write_table(file, convert_file(format_, source, options))
-    return file
-
-
-@emps
-@pytest.mark.long
-def test_the_carriage_s_causes_are_named(tmp_path: Path) -> None:
-    """The published cause, and those that the publication does not have; nothing of the mass, which is known."""
-    source = DATA / "emps" / "DATA_EMPS.mat"
-    recording = written(tmp_path / "emps.parquet", "emps", source, {"decimation": 1})
-    found = diagnose(ROOT / "examples" / "emps" / "emps.json", [recording], kinematics=3)
-    named = [cause.where.effect for cause in found.causes]
-    assert {"asymmetric_friction", "time_delay", "stribeck"} <= set(named[:3])
-    assert "inertia" not in named
-    assert found.extended_data["extensions"]
-    recordings = example("emps", "emps_recordings")
-    whole = recordings.read_emps(source, decimation=1)
-    assert recordings.relative_as_published(found.extended_data, whole) <= EMPS_LIMITS["DATA_EMPS"]
-
-
-@davinci
-@pytest.mark.long
-def test_the_jaw_s_causes_are_named_and_its_stall_is_an_event(tmp_path: Path) -> None:
-    folder = DATA / "davinci_tool" / "Tool_4_Maryland_L_4"
-    even, odd = (
-        [written(tmp_path / f"{k}.parquet", "davinci", folder / f"{k}.TXT", {"pretension": 13.0}) for k in names]
-        for names in (("00", "02", "04", "06", "08"), ODD)
-    )
-    found = diagnose(ROOT / "examples" / "davinci" / "jaw_nominal.json", even, odd)
-    growing = {"load_friction", "joint_load_friction", "edge_friction"}
-    named = [cause.where.effect for cause in found.causes[:3]]
-    assert "presliding" in named and growing & set(named)
-    stalls = [event for event in found.events if Path(event.recording).stem == "07"]
-    assert any(event.start < STALL[1] and event.end > STALL[0] for event in stalls)
-    assert jaw_error(dict(found.extended_data)) <= JAW_LIMIT

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 import re
 import subprocess
 import sys
@@ -40,11 +39,7 @@ RESULT_ALONE = """<?xml version="1.0" encoding="UTF-8"?>
     <Related type="text/csv" source="SOURCE" role="result" description="Output of the default experiment"/>
 </fmiReferences>
 """
-LARGEST = (
-    np.abs(np.genfromtxt(INPUTS.with_name("cable_loop_ref.csv"), delimiter=",", skip_header=1, usecols=(2, 3)))
-    .max(axis=0)
-    .max()
-)  # N·m, what the tolerance of compensated_torque[1] is relative to
+LARGEST = np.abs(np.genfromtxt(INPUTS.with_name("cable_loop_ref.csv"), delimiter=",", skip_header=1, usecols=1)).max()
 Edit = Callable[[dict[str, bytes]], None]
 
 
@@ -64,7 +59,7 @@ def members(fmu: Path) -> dict[str, bytes]:
 
 
 def tolerance_in(done: Answer) -> float:
-    """Of the first row, that of compensated_torque[1]."""
+    """Of the first row, that of compensated_torque[1], which LARGEST is of."""
     return float(done.out.splitlines()[1].split()[2])
 
 
@@ -283,21 +278,6 @@ def test_fmpy_finds_no_outlier(fmu: Path, tmp_path: Path) -> None:
     moved = reference.copy()
     moved["joint_angle[1]"] += 0.2 * np.ptp(reference["joint_angle[1]"])
     assert validate_result(result, moved, options["StopTime"]) > 0.0
-
-
-def test_a_changed_parameter_or_finger_differs(fmu: Path, edited: Callable[[Edit], Path], tmp_path: Path) -> None:
-    assert check(fmu, "--set", "bias.forget_rate=7").status == 1
-    description = json.loads(DESCRIPTION.read_text(encoding="utf-8"))
-    description["tendons"][0]["stiffness"] *= 1.001
-    other = members(tf.build(description, tmp_path / "other.fmu"))
-    extra = {name: content for name, content in members(fmu).items() if name.startswith("extra/")}
-
-    def with_another_finger(files: dict[str, bytes]) -> None:
-        files.clear()
-        files.update(other | extra)
-
-    done = check(edited(with_another_finger))
-    assert done.status == 1 and "joint_angle[1]" in done.out
 
 
 def alone(source: str) -> Edit:

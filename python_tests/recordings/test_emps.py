@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -256,38 +254,3 @@ def test_the_errors_are_those_of_the_benchmark(recordings: dict[str, Path]) -> N
     asymmetric = fitted("emps_asymmetric", recordings["DATA_EMPS"], "--fix", "bias.initial_torque[1]")
     assert error(asymmetric, recordings["DATA_EMPS"]) <= 3.15
     assert error(recordings["emps"], recordings["DATA_EMPS_PULSES"]) <= 5.99
-
-
-@pytest.mark.long
-@measured
-def test_the_numbers_are_the_published_ones_within_one_percent(recordings: dict[str, Path]) -> None:
-    finger = json.loads(recordings["emps"].read_text(encoding="utf-8"))
-    law = finger["joints"][0]["friction"]
-    found = [law["viscous"], law["coulomb"], finger["bias"]["initial_torque"][0]]
-    assert found == pytest.approx(PUBLISHED[:3].tolist(), rel=0.01)
-    assert law["static"] == law["coulomb"]
-
-
-@measured
-@pytest.mark.long
-def test_the_script_finds_the_mass_too() -> None:
-    """The rows of its first table: published, published M, all fitted, at 1 kHz, the same decimated."""
-    environment = os.environ | {"TENDONFMU_DATA": str(DATA)}
-    script = [sys.executable, str(EXAMPLE / "fit_emps.py")]
-    done = subprocess.run(script, capture_output=True, text=True, env=environment)
-    assert done.returncode == 0, done.stderr
-    page = (ROOT / "docs" / "evidence" / "fit.md").read_text(encoding="utf-8").replace("**", "")
-    rows = [line for line in done.stdout.splitlines() if line.startswith(("| all fitted |", "| at 1 kHz |"))]
-    assert len(rows) == 4 and [row for row in rows if row not in page] == []
-    symmetric, asymmetric = (
-        {cells[1].strip(): [float(cell.split()[0]) for cell in cells[2:-1] if cell.strip()] for cells in rows[2:]}
-        for rows in ([line.split("|") for line in part.splitlines()] for part in done.stdout.strip().split("\n\n"))
-    )
-    expected = [PUBLISHED[3], *PUBLISHED[:3]]
-    for name in ("all fitted", "at 1 kHz"):
-        assert symmetric[name][:4] == pytest.approx(expected, rel=0.01)
-    assert symmetric["all fitted"][4] <= 4.1 and symmetric["all fitted"][5] <= 5.99
-    assert asymmetric["all fitted"][5] <= 3.15
-    # judged as the authors did: 4.04, 5.95 and 3.06 by least squares, as the data's own notes have it
-    assert symmetric["at 1 kHz, the error decimated"][4:] == pytest.approx([4.04, 5.95], abs=0.02)
-    assert asymmetric["at 1 kHz, the error decimated"][5] == pytest.approx(3.06, abs=0.02)
