@@ -39,7 +39,8 @@ def test_case(runner: Runner, name: str) -> None:
     def run(description: Any, samples: Any, source: int = 3) -> Any:
         return runner(description, samples, source)
 
-    CASES[name](run)
+    check = CASES[name]
+    check(run)
 
 
 def test_the_step_does_not_matter_while_moving(runner: Runner) -> None:
