@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from fit_pictures import finger_of, index_finger, internal_values, made_up_picture, made_up_unknowns
-from tendonfmu.drawing.panel import STYLES, Curve, Panel, Sheet
+from tendonfmu.drawing.panel import Curve, Panel, Sheet
 from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import native
 from tendonfmu.model.friction_places import Effect, effects
-from tendonfmu.report import fit_laws
 from tendonfmu.report.fit_figures import (
     SHOWN,
     correlation,
@@ -269,13 +268,6 @@ def test_every_law_has_its_panel(picture: FitPicture, sheets: list[Sheet]) -> No
     assert known == picture.report["identified"]["count"] - sum(entry["identified"] for entry in covers)
 
 
-def test_what_is_not_drawn_is_said(picture: FitPicture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fit_laws, "LAWS_DRAWN", 10)
-    drawn = list(law_sheets(picture))
-    assert sum(len(sheet.panels) for sheet in drawn) == 10
-    assert all("34 further laws" in sheet.caption for sheet in drawn)
-
-
 def test_directions_differ_where_the_law_does() -> None:
     data = index_finger()
     edge = data["tendons"][6]["edge_friction"][1]
@@ -349,12 +341,3 @@ def test_groups_cover_the_matrix(picture: FitPicture) -> None:
         assert [name for _, name in panel.y_ticks] == ["mcp_abduction … dip_flexion", *picture.fitted.tendon_names]
         fourth = panel.borders[4] - panel.borders[3]
         assert 2 * fourth == sum(unknown.path.startswith("tendons[3].") for unknown in picture.unknowns)
-
-
-def test_every_style_is_known(sheets: list[Sheet]) -> None:
-    used = {style for sheet in sheets for style, _ in sheet.keys}
-    for sheet in sheets:
-        for panel in sheet.panels:
-            assert panel.alt and panel.title
-            used |= {part.style for part in (*panel.curves, *panel.bands, *panel.dots)} | set(panel.stripes)
-    assert used <= set(STYLES)
