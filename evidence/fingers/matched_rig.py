@@ -221,10 +221,13 @@ def random_hand(
     source: int = 2,
     rate: float = 1000.0,
     wander: float = 1.0,
+    cutoff: float = 0.0,
 ) -> Hand:
-    """A finger of its own for every seed. source: kinematics 1 to 3; wander: factor of the bias's random walk."""
+    """A finger of its own for every seed. source: kinematics 1 to 3; wander: factor of the bias's random walk. cutoff:
+    Hz of the filter behind which friction sees velocity, 0: none."""
     rng = np.random.default_rng([seed, 60])
     truth = random_truth(rng, joints, presliding)
+    truth["velocity_filter_cutoff"] = cutoff
     noise = Noise(std=float(rng.uniform(0.0015, 0.003)), time=float(rng.uniform(0.01, 0.03)))
     noise = replace(noise, wander=noise.wander * wander)
     truth["bias"] |= {"noise_std": noise.std, "drift_variance": max(noise.wander, 3e-4) ** 2}
