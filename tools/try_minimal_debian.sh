@@ -68,8 +68,12 @@ if [ "$(id -u)" -ne 0 ]; then die "needs root: chroot and mounts"; fi
 if ! command -v mmdebstrap >/dev/null; then quietly "installing mmdebstrap" apt_install mmdebstrap; fi
 if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$folder"' EXIT; fi
 quietly "making a minimal Debian" make_debian "$folder/minimal"
+trial readme README.md 2>&1 | sed -u 's/^/readme: /' &
+readme=$!
 trial wheel docs/reference/packages.md 2>&1 | sed -u 's/^/wheel: /' &
+wheel=$!
+# Not `trial ... || failed=1`: set -e is off in what stands before ||, and a failed step would be passed over.
 failed=0
-trial readme README.md 2>&1 | sed -u 's/^/readme: /' || failed=1
-wait $! || failed=1
+wait "$readme" || failed=1
+wait "$wheel" || failed=1
 exit "$failed"

@@ -47,7 +47,7 @@ RATE, COULOMB, VISCOUS, NOISE, PRESLIDING = 1000.0, 8.0, 30.0, 0.5, 1e-5
 
 
 def recording(seed: int, noise: float = NOISE) -> Columns:
-    """A carriage that goes to and fro for 10 s under a load that comes and goes; `model` is exact but for the noise."""
+    """A carriage that moves back and forth for 10 s under a load that varies; `model` is exact but for the noise."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 10.0, 1.0 / RATE)
     angle = 0.1 * np.sin(2 * np.pi * (0.4 * time + 0.1 * np.sin(0.7 * time)) + rng.uniform(0.0, 6.0))
