@@ -1,9 +1,12 @@
 """Makes every table of docs/evidence/ again: python -m evidence -o FOLDER
 
-The commands are those of the pages (pages.py finds them), run as they stand there; their seeds are in them
-and in the programs that they call. What each prints and writes as Markdown goes to FOLDER/NAME.md, what else it says to
-FOLDER/NAME.log, its files to FOLDER/work. A table whose file is there is not made again. Tables that need recordings
-of ../shared, or packages, that are not there are skipped, and it says so.
+The commands are the shell blocks (```sh) of the pages, run as they stand there. What each prints and writes as Markdown
+goes to FOLDER/NAME.md, what else it says to FOLDER/NAME.log, its files to FOLDER/work. A table whose file is there is
+not made again. Tables that need recordings of ../shared, or packages, that are not there are skipped, and it says so.
+The first line of a block is a comment with its time and needs:
+
+    # 20 min of one core; needs requirements-foreign.lock, ../shared/data
+    # time not measured
 
     python -m evidence --list
     python -m evidence -o FOLDER --only recalibration emps --again
@@ -16,14 +19,15 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import os
+import re
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from evidence.pages import Block, blocks_of, pages
 from evidence.runner import ROOT, parser, say, write
 
 PACKAGES = {
@@ -33,10 +37,69 @@ PACKAGES = {
     "requirements-peers.lock": ("pythonfmu",),
 }
 LINKED = ("evidence", "docs", "examples", "python_tests")  # that commands of the pages name
+RUNNER = "python -m evidence -o"
+UNITS = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
+
+_KNOWN = re.compile(r"# (?:(?P<time>[\d.]+) (?P<unit>s|min|h) of one core|time not measured)(?:; needs (?P<needs>.+))?")
+_HEADING = re.compile(r"(?P<level>#+) (?P<text>.+)")
 
 
-def every_block() -> list[Block]:
-    return [block for page in pages() for block in blocks_of(page)]
+# --- the shell blocks of the pages ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Block:
+    """Commands of a page."""
+
+    name: str  # of the file that its tables go to
+    page: Path
+    section: str
+    line: int  # from 0
+    commands: str
+    known: bool  # time and needs are said
+    minutes: float | None  # of one core; None: not measured
+    needs: tuple[str, ...]  # what has to be installed or there
+
+
+def pages() -> list[Path]:
+    every = sorted((ROOT / "docs" / "evidence").glob("*.md"))
+    return [page for page in every if page.name != "README.md"]  # README.md is the index
+
+
+def blocks_of(page: Path) -> list[Block]:
+    """All blocks of shell commands, without those that make all tables."""
+    lines = page.read_text(encoding="utf-8").splitlines()
+    blocks: list[Block] = []
+    heading, begin = "", None
+    for number, line in enumerate(lines):
+        if begin is None and (match := _HEADING.fullmatch(line)):
+            heading = match["text"] if len(match["level"]) > 1 else ""
+        elif line == "```sh":
+            begin = number + 1
+        elif line == "```" and begin is not None:
+            commands = "\n".join(lines[begin:number])
+            if RUNNER not in commands:
+                blocks.append(_block(page, heading, begin, commands))
+            begin = None
+    return blocks
+
+
+def _block(page: Path, heading: str, line: int, commands: str) -> Block:
+    known = _KNOWN.fullmatch(commands.splitlines()[0])
+    short = re.sub(r"\W+", "_", re.split(r"[:,]", heading)[0].lower())
+    return Block(
+        name="_".join(part for part in (page.stem, short.strip("_")) if part),
+        page=page,
+        section=heading,
+        line=line,
+        commands=commands,
+        known=known is not None,
+        minutes=float(known["time"]) * UNITS[known["unit"]] if known and known["time"] else None,
+        needs=tuple(known["needs"].split(", ")) if known and known["needs"] else (),
+    )
+
+
+# --- running them -----------------------------------------------------------------------------------------------------
 
 
 def shared_folder() -> Path | None:
@@ -158,7 +221,7 @@ def main() -> None:
     options.add_argument("--again", action="store_true", help="make tables that are there once more")
     options.add_argument("--list", action="store_true", help="names, known times and needs")
     given = options.parse_args()
-    blocks = every_block()
+    blocks = [block for page in pages() for block in blocks_of(page)]
     unknown = set(given.only or ()) - {block.name for block in blocks}
     if unknown:
         options.error(f"--only {min(unknown)}: no such table; --list has the names")

@@ -70,6 +70,7 @@ class Judgement:
 
     named: tuple[str, ...]  # names that count as an answer, in order
     false: tuple[str, ...]  # of these, the ones that neither are the truth, nor list it, nor are allowed
+    friction: tuple[str, ...]  # of the false ones
     unknown: bool  # something is reported without a name
     in_set: bool | None  # the truth is named, or may be confused with something that is
     first: bool | None  # the first name is the truth
@@ -77,21 +78,17 @@ class Judgement:
     sign: bool | None  # the first cause that is the truth by its own name changes the right way
     set_size: int | None  # effects in the set that has the truth, or else in the first one
 
-    @property
-    def friction(self) -> tuple[str, ...]:
-        return tuple(name for name in self.false if name in FRICTION)
-
 
 def judge(causes: Sequence[Cause], truth: Truth) -> Judgement:
     holding = [cause for cause in causes if holds(cause, truth)]
     counted = [cause for cause in causes if cause["effect"] not in truth.neutral]
     asked = bool(truth.effects) and truth.visible
     shown = [*holding, *counted][:1]
+    false = [cause["effect"] for cause in counted if cause not in holding and cause["effect"] not in truth.allowed]
     return Judgement(
         named=tuple(cause["effect"] for cause in counted),
-        false=tuple(
-            cause["effect"] for cause in counted if cause not in holding and cause["effect"] not in truth.allowed
-        ),
+        false=tuple(false),
+        friction=tuple(effect for effect in false if effect in FRICTION),
         unknown=any(cause["effect"] == UNKNOWN for cause in causes),
         in_set=bool(holding) if asked else None,
         first=any(is_truth(cause, truth) for cause in counted[:1]) if asked else None,

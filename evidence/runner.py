@@ -1,13 +1,7 @@
 """Named cases of a bench, here or on workers of dask, resumed at any time; and what benches say on the command line.
 
-A bench is a function of one case and a table of its rows:
-
-    def measure(seed: int) -> Row: ...
-
-    given = parser(__doc__).parse_args()
-    rows = run_cases(measure, {f"seed_{seed}": (seed,) for seed in range(20)}, given.output, given.workers)
-
-The row of a case is FOLDER/rows/NAME.json (tendonfmu.tasks writes it); a case that has one is not run again.
+A bench is a function of one case and a table of its rows. The row of a case is FOLDER/rows/NAME.json (tendonfmu.tasks
+writes it); a case that has one is not run again.
 """
 
 from __future__ import annotations

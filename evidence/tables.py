@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.statistics.intervals import Estimate, quantile, rate, share
+from tendonfmu.statistics.intervals import Interval, quantile, rate, share
 
 NOTHING = "–"  # in a cell without a case
 SEED = 0  # of resampling
 
-Row = Mapping[str, Any]
+Row = dict[str, Any]
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], text_columns: int = 1) -> str:
@@ -35,7 +35,7 @@ def number(value: float | None, form: str = ".2f", scale: float = 1.0) -> str:
     return NOTHING if value is None or math.isnan(value) else format(scale * value, form)
 
 
-def estimate(known: Estimate, form: str = ".2f", scale: float = 1.0) -> str:
+def estimate(known: Interval, form: str = ".2f", scale: float = 1.0) -> str:
     """A value with its interval."""
     if math.isnan(known.low):
         return number(known.value, form, scale)

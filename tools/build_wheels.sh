@@ -4,7 +4,8 @@
 #
 # Sets up what is missing, as ./run does. FOLDER/dist takes the results. zig compiles against an old C library (GLIBC) and
 # links the C++ library in; auditwheel confirms the tag.
-#   PYTHONS   interpreters to build and try with; default: what is found of python3.10 to python3.13
+#   VERSIONS  of Python, default: 3.10 3.11 3.12 3.13; what is not found is left out
+#   PYTHONS   interpreters to build and try with, in place of those
 #   EXTRAS    extras installed and imported with the last of them: `logs,mujoco,campaign,notebook`; default: none
 # Exit status: 0 all built, tried and alike; anything else: something failed, or no interpreter was found.
 set -euo pipefail
@@ -32,7 +33,7 @@ timed() {
 
 find_pythons() {
   local version candidate
-  for version in 3.10 3.11 3.12 3.13; do
+  for version in ${VERSIONS:-3.10 3.11 3.12 3.13}; do
     for candidate in "python$version" "${PYENV_ROOT:-$HOME/.pyenv}/versions/$version".*/bin/python ""; do
       if [ -z "$candidate" ]; then
         say "SKIPPED: Python $version not found" >&2

@@ -3,6 +3,7 @@
 # machine's package settings and nothing else, and runs there, each in a fresh clone of the last commit,
 #   - the two commands of README.md,
 #   - the recipe of docs/reference/packages.md.
+# both at once, each line with the name of its trial in front.
 # tools/try_minimal_debian.sh [FOLDER]     default: a temporary folder, removed at the end
 # Needs root. Exit status: 0 all succeeded.
 set -euo pipefail
@@ -29,8 +30,9 @@ settings_of_environment() {
   if [ -e "$certificates" ]; then printf '%s=/etc/machine-certificates.crt\n' PIP_CERT SSL_CERT_FILE REQUESTS_CA_BUNDLE; fi
 }
 
+# make_debian FOLDER
 make_debian() {
-  local sources
+  local root=$1 sources
   sources=$(find /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list -type f 2>/dev/null | head -n 1)
   mmdebstrap --variant=minbase "$suite" "$root" ${sources:+"$sources"}
   package_settings | xargs tar -ch 2>/dev/null | tar -x -C "$root"
@@ -38,35 +40,40 @@ make_debian() {
   if [ -e "$certificates" ]; then cp "$certificates" "$root/etc/machine-certificates.crt"; fi
 }
 
-# in_debian COMMAND: in a namespace of its own, so that no mount outlives it.
+# in_debian ROOT COMMAND: in a namespace of its own, so that no mount outlives it.
 in_debian() {
   local settings
   mapfile -t settings < <(settings_of_environment)
   unshare --mount bash -euo pipefail -c '
     mount -t proc proc "$0/proc" && mount --rbind /sys "$0/sys" && mount --rbind /dev "$0/dev"
     exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv CI="${CI:-}" "${@:2}" bash -euo pipefail -c "$1"
-  ' "$root" "$1" "${settings[@]}" </dev/null
+  ' "$1" "$2" "${settings[@]}" </dev/null
 }
-
-fresh_clone() { git clone --quiet --no-hardlinks . "$root/srv/$1"; }
 
 # The first block of commands of a page.
 commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed 's/^    //'; }
 
 # Each page in a Debian of its own: what one installs, the other must not find.
 trial() {
-  local name=$1 page=$2 started=$SECONDS
-  root=$folder/$name
-  quietly "making a minimal Debian" make_debian
-  fresh_clone "$name"
+  local name=$1 page=$2 root=$folder/$1 started=$SECONDS
+  cp -a "$folder/minimal" "$root"
+  git clone --quiet --no-hardlinks . "$root/srv/$name"
   echo "--- $page"
   commands_of "$page"
-  in_debian "cd /srv/$name; set -x; $(commands_of "$page")"
+  in_debian "$root" "cd /srv/$name; set -x; $(commands_of "$page")"
   echo "--- $page: done in $((SECONDS - started)) s"
 }
 
 if [ "$(id -u)" -ne 0 ]; then die "needs root: chroot and mounts"; fi
 if ! command -v mmdebstrap >/dev/null; then quietly "installing mmdebstrap" apt_install mmdebstrap; fi
 if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$folder"' EXIT; fi
-trial readme README.md
-trial wheel docs/reference/packages.md
+quietly "making a minimal Debian" make_debian "$folder/minimal"
+trial readme README.md 2>&1 | sed -u 's/^/readme: /' &
+readme=$!
+trial wheel docs/reference/packages.md 2>&1 | sed -u 's/^/wheel: /' &
+wheel=$!
+# Not `trial ... || failed=1`: set -e is off in what stands before ||, and a failed step would be passed over.
+failed=0
+wait "$readme" || failed=1
+wait "$wheel" || failed=1
+exit "$failed"

@@ -1,11 +1,8 @@
 """Pushes of 0.02 to 1 N on a finger at rest: how many contact.rest finds with the bounds that `tune` learns for it.
 
-On the simulated index finger (the pushes in stiction of slots.py). Bounds come from rests without pushes, alarms are
-counted in others.
-
     python -m evidence.detection.at_rest -o FOLDER
 
-Recordings are kept in the folder. Prints a table.
+Bounds come from rests without pushes (slots.py), alarms are counted in others. Recordings are kept. Prints a table.
 """
 
 from __future__ import annotations
@@ -19,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from evidence import tables
-from evidence.detection.hand import PRETENSIONS, Arrays
+from evidence.detection.hand import PRETENSIONS, Arrays, Take
 from evidence.detection.limits import PRESLIDING
-from evidence.detection.slots import Case, Slot, cut, made, slots
+from evidence.detection.slots import Slot, cut, made, slots
 from evidence.runner import INDEX_FINGER, parser, publish, say
 from tendonfmu.detect import free_parts
 from tendonfmu.detect.contact_at_rest import count_alarms, find_rests, learn_rest
@@ -46,7 +43,7 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
     def rests_of(chosen: Sequence[int]) -> list[Any]:
         rests = []
         for part, pretension in itertools.product(chosen, PRETENSIONS):
-            groups = inputs(made(folder, Case("stuck_twin", pretension, part)))
+            groups = inputs(made(folder, Take("stuck_twin", pretension, part)))
             recording = Recording(Path("recording"), groups.pop("time"), groups)
             rests += free_parts(finger, recording, 1)[0]
         return rests
@@ -63,9 +60,9 @@ def measure(folder: Path, parts: Sequence[int]) -> list[Any]:
     at_rest = {**finger.data, "contact": {"threshold": [1e9] * joints, "rest": dict(rule.keys)}}
     rows = []
     for part, pretension in itertools.product(parts, PRETENSIONS):
-        case = Case("stuck", pretension, part)
-        whole = made(folder, case)
-        rows += [pushed(at_rest, cut(whole, slot.begin, slot.end), slot) for slot in slots(case)]
+        take = Take("stuck", pretension, part)
+        whole = made(folder, take)
+        rows += [pushed(at_rest, cut(whole, slot.begin, slot.end), slot) for slot in slots(take)]
     below, forced = ([row for row in rows if row[key]] for key in ("below", "forced"))
     both = [row for row in below if row["forced"]]
     counts = [tables.count(row["found"] for row in chosen) for chosen in (below, both, forced)]

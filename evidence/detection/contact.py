@@ -1,8 +1,4 @@
-"""How well contact is detected on the simulated hand (docs/evidence/contact.md).
-
-300 pushes of 0.1 to 2 N in 30 min at 10, 20 and 40 N of pretension (hand.py), a fit on free motion at low pretension,
-simpler models with the best thresholds each (rivals.py), and the best that could be done with the residual
-(matched.py).
+"""How well contact is detected on the simulated hand, beside simpler models and the best that the residual allows.
 
     python -m evidence.detection.contact -o FOLDER [--finger NAME=FILE ...]
 
@@ -14,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +32,9 @@ from evidence.detection.hand import (
 from evidence.detection.matched import matched_findings
 from evidence.detection.rivals import Detector, best_thresholds, from_json, make_rivals, to_json
 from evidence.runner import INDEX_FINGER, named_finger, parser, publish, run_cases, say, write
+from evidence.tables import Row
 from tendonfmu.recordings import Recording, read_recording
 
-Row = Mapping[str, Any]
 Rows = Sequence[Row]
 Run = Callable[..., list[dict[str, Any]]]  # run_cases with workers
 

@@ -1,13 +1,8 @@
-"""Recordings of the simulated index finger that moves and rests, pushed and left alone, and what is true of them.
+"""Recordings of the simulated index finger (examples/rigs) that moves and rests, pushed and left alone, with the truth.
 
-The rig is examples/rigs/index_finger.json. Its strokes come in stretches of 6 to 13 s, with all joints at rest between
-them; a push begins anywhere within its slot of 6 s, whatever the finger does then. Each pretension has recordings of
-10 min, of other seeds each: three with 100 *light* pushes, 0.1 to 2 N, uniform in the logarithm, anywhere on the
-finger; two with 100 *firm* ones, uniform in the force; two with 100 *strong* ones, 1 to 2 N on the fingertip, since at
-high pretension few others reach several times the residual; and three *free* of pushes. Every pushed recording has a
-*twin*: the same motion and the same sensor noise without the pushes. What differs between the two is what a push does.
-
-Everything is kept in a folder under its name, and what is there is not made again.
+*Light* pushes are of 0.1 to 2 N, uniform in the logarithm, anywhere on the finger; *firm* ones uniform in the force;
+*strong* ones 1 to 2 N on the fingertip, since at high pretension few others reach several times the residual. Every
+pushed recording has a *twin*: the same motion and sensor noise without the pushes. What is there is not made again.
 """
 
 from __future__ import annotations
@@ -15,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -94,6 +89,16 @@ def takes(*kinds: str, parts: int = PARTS, pretensions: tuple[float, ...] = PRET
 # --- rigs -------------------------------------------------------------------------------------------------------------
 
 
+def motion_columns(time: Numbers, knots: Sequence[Numbers]) -> Arrays:
+    """A motion file from the knots [K, 4] of each joint: time, position, velocity, acceleration."""
+    table: Arrays = {"time": time}
+    for j, knots_of_joint in enumerate(knots, start=1):
+        curve = evaluate(knots_of_joint, time)
+        for name, values in zip(("position", "velocity", "acceleration"), curve, strict=True):
+            table[f"joint_{name}[{j}]"] = values
+    return table
+
+
 def motion_table(base: Mapping[str, Any], seed: int, duration: float) -> Arrays:
     """A motion file: stretches of the base rig's strokes, all joints at rest between them."""
     links = base["physics"]["links"]
@@ -113,13 +118,8 @@ def motion_table(base: Mapping[str, Any], seed: int, duration: float) -> Arrays:
             knots_of_joint.extend([begin + time, angle, 0.0, 0.0] for time, angle in moves)
         begin, stretch = begin + changed["duration"], stretch + 1
     time = np.unique(np.concatenate([[duration], *(np.array(knots_of_joint)[:, 0] for knots_of_joint in knots)]))
-    table: Arrays = {"time": time}
     # between the knots of other joints it is the same polynomial again
-    for j, knots_of_joint in enumerate(knots, start=1):
-        curve = evaluate(np.array(knots_of_joint), time)
-        for name, values in zip(("position", "velocity", "acceleration"), curve, strict=True):
-            table[f"joint_{name}[{j}]"] = values
-    return table
+    return motion_columns(time, [np.array(knots_of_joint) for knots_of_joint in knots])
 
 
 def _placed(pushes: list[dict[str, Any]], take: Take) -> list[dict[str, Any]]:
@@ -137,6 +137,19 @@ def _placed(pushes: list[dict[str, Any]], take: Take) -> list[dict[str, Any]]:
     return placed
 
 
+def rig_of(name: str, seed: int, motion: Mapping[str, Any], duration: float) -> dict[str, Any]:
+    """A rig of the index finger without pushes."""
+    return {
+        "format": "tendonfmu-rig-1",
+        "base": str(INDEX_RIG),
+        "name": name,
+        "seed": seed,
+        "physics": {"contact_force": LEAST_FORCE},
+        "motion": dict(motion),
+        "recording": {"duration": duration, "columns": ["joint_position", "external_torque", "contact"]},
+    }
+
+
 def write_rig(folder: Path, take: Take) -> Path:
     """The rig of a recording and its motion file."""
     base = json.loads(INDEX_RIG.read_text(encoding="utf-8"))
@@ -144,15 +157,8 @@ def write_rig(folder: Path, take: Take) -> Path:
     motion = folder / f"motion_{of}_{take.pretension:g}_{take.part}.parquet"
     if not motion.exists():
         write_table(motion, motion_table(base, take.seed(_MOTION), DURATION))
-    rig: dict[str, Any] = {
-        "format": "tendonfmu-rig-1",
-        "base": str(INDEX_RIG),
-        "name": take.name,
-        "seed": take.seed(_NOISE),
-        "physics": {"contact_force": LEAST_FORCE},
-        "motion": {"kind": "file", "file": motion.name, "pretension": take.pretension},
-        "recording": {"duration": DURATION, "columns": ["joint_position", "external_torque", "contact"]},
-    }
+    moves = {"kind": "file", "file": motion.name, "pretension": take.pretension}
+    rig = rig_of(take.name, take.seed(_NOISE), moves, DURATION)
     file = folder / f"{take.name}.json"
     if take.kind in TWINS:
         where = "tip" if take.kind == "strong" else "anywhere"
@@ -166,16 +172,22 @@ def write_rig(folder: Path, take: Take) -> Path:
 # --- recordings -------------------------------------------------------------------------------------------------------
 
 
+def simulated(rig: Path, names: Collection[str]) -> tuple[Arrays, Arrays]:
+    """Columns of a rig's recording, and of its truth: these signals and the contact force, N."""
+    made = simulate(read_rig(rig), truth=True)
+    assert made.truth is not None
+    true = {name: values for name, values in made.truth.items() if name.split("[")[0] in names}
+    true["contact_force"] = np.sqrt(np.sum([made.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)], axis=0))
+    return dict(made.recording), true
+
+
 def recording_file(folder: Path, take: Take) -> Path:
     """Made if it is not there; beside it NAME_truth.parquet."""
     file, truth = folder / f"{take.name}.parquet", folder / f"{take.name}_truth.parquet"
     if not (file.exists() and truth.exists()):
-        made = simulate(read_rig(write_rig(folder, take)), truth=True)
-        assert made.truth is not None
-        force = np.sqrt(sum(made.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)))
-        kept = {name: values for name, values in made.truth.items() if name.split("[")[0] in TRUE}
-        write_table(truth, {"time": made.truth["time"], **kept, "contact_force": np.asarray(force)})
-        write_table(file, made.recording)
+        recorded, true = simulated(write_rig(folder, take), ("time", *TRUE))
+        write_table(truth, true)
+        write_table(file, recorded)
     return file
 
 

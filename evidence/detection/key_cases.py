@@ -80,7 +80,7 @@ class Take:
 
 
 def times(duration: float) -> Numbers:
-    return np.arange(round(duration * RATE)) * STEP
+    return np.asarray(np.arange(round(duration * RATE)) * STEP)
 
 
 def noise(random: np.random.Generator, count: int, time: float = 0.0) -> Numbers:
@@ -280,7 +280,7 @@ def stiffened(seed: int, follows: bool, rest: float = 0.2, count: int = 20) -> t
     held = pull if follows else np.where(phase >= 0, np.where(stroke % 2, PULL, 20.0), pull)
     velocity, time = np.where(phase >= 0, 0.0, 0.3), times(len(stroke) * STEP)
     torque = friction(held) + NOISE * random.standard_normal(len(time))
-    return Take(time, np.cumsum(velocity) * STEP, velocity, pull, torque), np.arange(1, count) * (moved + rested)
+    return Take(time, np.cumsum(velocity) * STEP, velocity, pull, torque), np.arange(1.0, count) * (moved + rested)
 
 
 # --- a load just after the start, and a wrong start -------------------------------------------------------------------
@@ -326,7 +326,8 @@ def rests(seed: int, rest: float, drift: float, absorbable: bool, count: int = 1
     random = np.random.default_rng([seed, 9, round(1e3 * rest), absorbable])
     moved, rested = round(0.5 * RATE), round(rest * RATE)
     sides = random.choice([-1.0, 1.0], count + 1)
-    velocity, held, exits = [np.full(moved, 0.3 * sides[0])], [np.full(moved, sides[0])], []
+    velocity, held = [np.full(moved, 0.3 * sides[0])], [np.full(moved, sides[0])]
+    exits: list[int] = []
     for before, side in pairwise(sides):
         at = random.integers(0, rested) if absorbable else rested
         velocity += [np.zeros(rested), np.full(moved, 0.3 * side)]

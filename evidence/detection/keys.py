@@ -45,7 +45,7 @@ class Trial:
     def markdown(self) -> str:
         values = self.run(range(self.seeds))
         lines = [
-            [f"{measure}, {unit}", *(_cell(own[:, k], factor) for own in values.values())]
+            [f"{measure}, {unit}", *(_cell(of_setting[:, k], factor) for of_setting in values.values())]
             for k, (measure, (unit, factor)) in enumerate(self.units.items())
         ]
         return f"{self.title} ({self.seeds} seeds)\n\n{tables.table(['', *self.settings], lines)}\n"

@@ -1,10 +1,8 @@
 """Where detection ends and how it recovers: slow pushes, pushes in stiction, disturbances (docs/evidence/contact.md).
 
-On the virtual index finger (slots.py), any number of descriptions beside one another:
-
     python -m evidence.detection.limits -o FOLDER --finger paper=fitted.json --finger recommended=tuned.json
 
-Recordings are kept in the folder. Writes detection_limits.md.
+Recordings (slots.py) are kept in the folder. Writes detection_limits.md.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from evidence import tables
-from evidence.detection.hand import LEAST_FORCE, Arrays
+from evidence.detection.hand import LEAST_FORCE, Arrays, Take
 from evidence.detection.slots import (
     AFTER,
     DISTURBED,
@@ -31,20 +29,20 @@ from evidence.detection.slots import (
     PUSH_TIME,
     RATE,
     WARM,
-    Case,
     Slot,
     cut,
     made,
     slots,
+    twin_of,
 )
 from evidence.runner import digest, named_finger, parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import Event, score_detection
 from tendonfmu.detect.counting import stretches
 from tendonfmu.model import moment_arms
 from tendonfmu.model.native import run_recording
 
-Row = dict[str, Any]
 Rows = Sequence[Row]
 
 PRESLIDING = 0.004  # rad, of the rig's joints
@@ -59,15 +57,15 @@ Subject = tuple[str, Mapping[str, Any]]  # a description under a name
 # --- pushes: computing ------------------------------------------------------------------------------------------------
 
 
-def pushed_rows(folder: Path, case: Case, subjects: Sequence[Subject]) -> Row:
+def pushed_rows(folder: Path, take: Take, subjects: Sequence[Subject]) -> Row:
     """Every push of a recording under every description, a fresh finger for each."""
     rows: list[Row] = []
-    whole = made(folder, case)
-    twin = None if case.kind == "stuck" else made(folder, case.twin)
-    for slot in slots(case):
+    whole = made(folder, take)
+    twin = None if take.kind == "stuck" else made(folder, twin_of(take))
+    for slot in slots(take):
         arrays = cut(whole, slot.begin, slot.end)
         alone = None if twin is None else cut(twin, slot.begin, slot.end)
-        common = {"kind": case.kind, "pretension": case.pretension, "force": slot.force, "rise": slot.rise}
+        common = {"kind": take.kind, "pretension": take.pretension, "force": slot.force, "rise": slot.rise}
         common |= _stuck(arrays, slot, subjects[0][1]) if alone is None else {}
         rows += [common | {"finger": name} | _pushed(data, arrays, alone, slot) for name, data in subjects]
     return {"rows": rows}
@@ -195,14 +193,14 @@ DISTURBANCES = (
 
 def disturbed_rows(folder: Path, pretension: float, parts: int, subjects: Sequence[Subject]) -> Row:
     """Every disturbance under every description, one recording for each part."""
-    twins = [_started(made(folder, Case("still", pretension, part))) for part in range(1, parts + 1)]
+    twins = [_started(made(folder, Take("still", pretension, part))) for part in range(1, parts + 1)]
     free = [[_undetecting(data, twin) for twin in twins] for _, data in subjects]
     limit = 2.0 * np.sqrt(np.mean([np.mean(out["residual"][1:] ** 2, axis=0) for out in free[0]], axis=0))
     rows: list[Row] = []
     for number, twin in enumerate(twins):
         recordings = {"still": twin}
         for kind in ("pushed", "wrist"):
-            recordings[kind] = _started(made(folder, Case(kind, pretension, number + 1)))
+            recordings[kind] = _started(made(folder, Take(kind, pretension, number + 1)))
         tendon = 3 * number % twin["tendon_force"].shape[1]
         for disturbance in DISTURBANCES:
             arrays = disturbance.applied(recordings[disturbance.kind], tendon)
@@ -236,7 +234,7 @@ def recovered(time: Numbers, out: Arrays, reference: Numbers, limit: Numbers, sp
     # `SETTLED`, none if it never does; at_once, after: alarms that begin in it (0.1 s after its end included), in the
     # minute after; longest: s, of an alarm from its begin on
     begin, end = span
-    alarm = out["contact"].ravel()
+    alarm = out["contact"].ravel().astype(bool)
     sound = np.all(np.abs(out["bias_torque"] - reference) < limit, axis=1) & ~alarm
     minute = (time >= end) & (time <= end + AFTER)
     good, step = sound[minute], float(time[1] - time[0])
@@ -352,12 +350,12 @@ def main() -> None:
         rows = run_cases(function, named, folder / "scores", given.workers, given.scheduler)
         return list(itertools.chain(*(row["rows"] for row in rows)))
 
-    ramps = [Case(kind, p, part) for kind in ("rest", "motion") for p in (10.0, 40.0) for part in numbers]
-    stuck = [Case("stuck", p, part) for p in (10.0, 20.0, 40.0) for part in numbers]
+    ramps = [Take(kind, p, part) for kind in ("rest", "motion") for p in (10.0, 40.0) for part in numbers]
+    stuck = [Take("stuck", p, part) for p in (10.0, 20.0, 40.0) for part in numbers]
     parts = {
         "Recovery": rows_of(disturbed_rows, {f"recovery_{p:g}_{given.parts}": (p, given.parts) for p in (10.0, 40.0)}),
-        "Pushes in stiction": rows_of(pushed_rows, {case.name: (case,) for case in stuck}),
-        "Slow pushes": rows_of(pushed_rows, {case.name: (case,) for case in ramps}),
+        "Pushes in stiction": rows_of(pushed_rows, {take.name: (take,) for take in stuck}),
+        "Slow pushes": rows_of(pushed_rows, {take.name: (take,) for take in ramps}),
     }
     shown = zip(parts.items(), (recovery_table, stuck_tables, ramp_tables), strict=True)
     publish(folder / "detection_limits.md", tables.page({name: show(rows) for (name, rows), show in shown}))

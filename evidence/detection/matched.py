@@ -1,23 +1,11 @@
 """The best that a detector could do with a given residual: one that knows each push beforehand.
 
-Of every push it knows when it comes, what it does to the residual of all joints, and how the finger would have moved;
-the only question is whether it is there. The free residual is taken as a Gaussian process, coloured, and stationary in
-each of three states: at rest, in motion, and while a joint sets off, which is where models of friction fail most. The
-covariances C are those of the free recordings of the same pretension, over windows of all joints at 100 Hz (means of
-10 ms), from 0.1 s before the onset to some time after it. The likelihood ratio is then linear in the
-residual x: wᵀ x with C w = s, s the known signal (Kay, *Fundamentals of Statistical Signal Processing: Detection
-Theory*, 1998, sect. 4.4).
-
-It is given two ways (`KINDS`):
-
-- *torque known*: s is the true external torque behind the bias filter, x what was left of the push in the residual.
-  The threshold is what wᵀ x exceeds once in 10 min of the free recordings themselves.
-- *effect known*: likewise, with s the difference of the residual with and without the push (the twin recording), after
-  friction took its part. This is what is left to be found.
-
-A detector that must find out when, where and in which direction somebody pushes asks all these questions at once, at
-the same rate of false alarms. Where free residuals have outliers, as here, one that is not linear, or that knows more
-of the motion than these states, can still do better.
+It knows when a push comes, how the finger would have moved, and either the true torque of the push behind the bias
+filter or its effect on the residual (the difference from the twin); the only question is whether it is there. The free
+residual is taken as a Gaussian process, stationary in each of three states. The likelihood ratio is then linear in the
+residual x: wᵀ x with C w = s, s the known signal and C the covariance of the free recordings (Kay, *Fundamentals of
+Statistical Signal Processing: Detection Theory*, 1998, sect. 4.4). The threshold is what wᵀ x exceeds once in 10 min of
+the free recordings. Where free residuals have outliers, one that is not linear can still do better.
 """
 
 from __future__ import annotations
@@ -33,6 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from evidence.detection.hand import PRETENSIONS, TWINS, Take, read_truth, recording, states, takes
 from evidence.detection.rivals import Detector, HighPass
+from evidence.fingers.matched_strength import averaged
 from evidence.runner import say, write
 from tendonfmu.arrays import Flags, Indices, Numbers
 
@@ -151,9 +140,7 @@ def _rate(time: Numbers) -> float:
 
 def _means(signals: Numbers, rate: float) -> Numbers:
     """[N/k, n] means over `STEP`."""
-    size = round(STEP * rate)
-    whole = len(signals) // size * size
-    return np.asarray(signals[:whole].reshape(-1, size, signals.shape[1]).mean(axis=1))
+    return averaged(signals, round(STEP * rate))
 
 
 def _cut(signals: Numbers, time: Numbers, onset: float) -> Numbers:

@@ -1,9 +1,5 @@
 """How well contact is detected on fingers of another physics engine that `tendonfmu calibrate` alone made ready.
 
-Each finger of mujoco_pushes.py is calibrated by the command from a rough description and 26 min of free motion at two
-pretensions, and scored on 100 labelled pushes that no step before has seen. A push's size is the largest torque that it
-makes at a joint, over the rms of the free residual there, as calibration.json counts it.
-
     python -m evidence.detection.mujoco -o FOLDER [--fingers 1 3 19 4 6]
     python -m evidence.detection.mujoco -o FOLDER --slow --fingers 3 4
 
@@ -26,12 +22,11 @@ import numpy as np
 from evidence import tables
 from evidence.detection.mujoco_pushes import FREE, PRETENSIONS, PUSHED, description_file, make, place, pushes_of
 from evidence.runner import parser, publish, run_cases, write
+from evidence.tables import Row
 from tendonfmu.detect import score_detection
 from tendonfmu.model import read_finger
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings import read_recording
-
-Row = dict[str, Any]
 
 FINGERS = (1, 3, 19, 4, 6)
 SIZES = (6.0, 3.0)  # times the residual's rms: least sizes of classes
@@ -70,18 +65,18 @@ def calibration(folder: Path, number: int) -> Row:
 
 
 def report(rows: Sequence[Row]) -> str:
-    def line(name: str, own: Sequence[Row]) -> list[str]:
-        sizes = [[row["sizes"].get(f"{size:g}", (0, 0)) for row in own] for size in SIZES]
+    def line(name: str, group: Sequence[Row]) -> list[str]:
+        sizes = [[row["sizes"].get(f"{size:g}", (0, 0)) for row in group] for size in SIZES]
         cells = [f"{sum(found for found, _ in size)}/{sum(count for _, count in size)}" for size in sizes]
-        cells.append(f"{sum(row['alarms'] for row in own)} in {sum(row['minutes'] for row in own):.1f}")
-        cells.append(", ".join(tables.number(row["delay"], ".0f", 1e3) for row in own))
-        return [name, *cells, ", ".join(f"{row['cpu']:.0f}" for row in own)]
+        cells.append(f"{sum(row['alarms'] for row in group)} in {sum(row['minutes'] for row in group):.1f}")
+        cells.append(", ".join(tables.number(row["delay"], ".0f", 1e3) for row in group))
+        return [name, *cells, ", ".join(f"{row['cpu']:.0f}" for row in group)]
 
     lines = []
     for parity, name in ((1, "odd"), (0, "even")):
-        own = [row for row in rows if row["finger"] % 2 == parity]
-        lines += [line(str(row["finger"]), [row]) for row in own]
-        lines += [line(f"**all {name}**", own)] if len(own) > 1 else []
+        group = [row for row in rows if row["finger"] % 2 == parity]
+        lines += [line(str(row["finger"]), [row]) for row in group]
+        lines += [line(f"**all {name}**", group)] if len(group) > 1 else []
     head = ["finger", "≥ 6 × rms", "3 to 6", "false alarms in min", "median delay, ms", "CPU time, s"]
     return tables.table(head, lines) + "\n"
 

@@ -1,12 +1,7 @@
 """Recordings of MuJoCo fingers for contact detection: free motion and labelled pushes, each with its truth.
 
-The fingers are those of evidence/fingers (their friction, springs, sensors and hidden effects), which share no code
-with the product. Their motion has rests here, the pretension two mean values, and the free motion of each is two
-motions of 6.5 min: 26 min in all. A push is a force on a link, at right
-angles to it, of 0.1 to 2 N, uniform in the logarithm, that begins anywhere in a slot of 6 s. A *slow* one rises over
-1 to 10 s.
-
-Everything is kept in a folder under its name, and what is there is not made again.
+The fingers are those of evidence/fingers. A push is a force on a link, at right angles to it, of 0.1 to 2 N, uniform in
+the logarithm, that begins anywhere in a slot of 6 s. A *slow* one rises over 1 to 10 s. What is there is kept.
 """
 
 from __future__ import annotations

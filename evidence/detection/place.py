@@ -2,9 +2,8 @@
 
     python -m evidence.detection.place -o FOLDER --finger TUNED.json
 
-The recordings are those of hand.py, made in FOLDER where they are missing; the links are added to the finger from the
-rig. Each push counts once, in the middle of its hold. Writes contact_place.md into FOLDER, with the same rule on the
-true torques beside what the product says: what is lost there is lost to the torques themselves.
+Each push counts once, in the middle of its hold. Writes contact_place.md into FOLDER, with the same rule on the true
+torques beside what the product says: what is lost there is lost to the torques themselves.
 """
 
 from __future__ import annotations
@@ -19,11 +18,10 @@ import numpy as np
 from evidence import tables
 from evidence.detection.hand import TWINS, Take, read_truth, recording, takes, write_rig
 from evidence.runner import INDEX_RIG, digest, parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.arrays import Numbers
 from tendonfmu.model import native
 from tendonfmu.simulate import read_rig
-
-Row = dict[str, Any]
 
 CLASSES = ((0.1, 0.5), (0.5, 1.0), (1.0, 2.0))  # N
 NEAR_TIP = 0.8  # share of the last link's length from which a push is near the tip

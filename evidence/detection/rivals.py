@@ -28,6 +28,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.signal import lfilter
 
+from evidence.fingers.matched_physics import held_sign
 from evidence.runner import digest, plain
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import DetectionScore, score_detection
@@ -135,8 +136,7 @@ def _direction(moved: _Moved, joint: int, scale: float) -> Numbers:
     speed = moved.speed[:, joint]
     if scale > 0:
         return np.asarray(np.tanh(speed / scale))
-    moving = np.maximum.accumulate(np.where(np.abs(speed) > moved.still, np.arange(len(speed)), -1))
-    return np.where(moving >= 0, np.sign(speed[moving]), 0.0)
+    return held_sign(speed, moved.still)
 
 
 def _columns(moved: _Moved, joint: int, tensions: bool, scale: float) -> Numbers:

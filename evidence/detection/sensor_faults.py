@@ -1,15 +1,9 @@
-"""Failing sensors: reported as faults or as contact, and faults that are reported where every sensor is sound.
-
-Fingers in MuJoCo (mujoco_pushes.py, calibrated as in mujoco.py) and the simulated index finger are tuned on free
-motion; the keys of sensor_fault are learned from their training recordings alone. A fault is put into one tendon in
-each slot of 8 s, of four kinds in turn: its force reads 0, its force freezes, its force jumps by 2 to 10 N (uniform in
-the logarithm, up or down), its position freezes. It begins 1 to 2.5 s into the slot and lasts 3 s; what a frozen sensor
-reads is its last sound value, to the last bit. Sound recordings, those of fingers in numpy and, with --foreign, of a
-folder with case_NN.json, case_NN_train.parquet, case_NN_test.parquet among them, must show none.
+"""Failing sensors: reported as faults or as contact, and faults reported where every sensor is sound.
 
     python -m evidence.detection.sensor_faults -o FOLDER [--foreign FOLDER]
 
-Everything is kept in the folder; writes sensor_faults.md.
+--foreign: a folder with case_NN.json, case_NN_train.parquet, case_NN_test.parquet. Everything is kept in the folder;
+writes sensor_faults.md.
 """
 
 from __future__ import annotations
@@ -26,6 +20,7 @@ import numpy as np
 from evidence import tables
 from evidence.fingers import numpy_cases
 from evidence.runner import INDEX_FINGER, INDEX_RIG, parser, publish, run_cases, say, write
+from evidence.tables import Row
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import ContactTuning, TuneWarning
 from tendonfmu.detect.free_motion import FreePart
@@ -37,7 +32,6 @@ from tendonfmu.recordings import read_recording
 from tendonfmu.simulate import read_rig, simulate
 
 Arrays = dict[str, Numbers]
-Row = dict[str, Any]
 
 FINGERS = (1, 3, 4, 6)  # numbers of evidence/fingers
 OFF = (0.05, 0.1)  # standard deviation of factors on springs; half of it on moment arms

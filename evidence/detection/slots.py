@@ -1,8 +1,7 @@
 """Recordings of the simulated index finger: slow pushes, pushes in stiction, a finger to be disturbed.
 
-The rig is examples/rigs/index_finger.json. Pushes come in slots, each of which a fresh finger is run over: what one
-push leaves in the bias is not counted against the next. At rest a slot begins with a move of 1 s to another posture.
-Everything is kept in a folder under its name, and what is there is not made again.
+Pushes come in slots, each of which a fresh finger is run over: what one push leaves in the bias is not counted against
+the next. At rest a slot begins with a move of 1 s to another posture. What is there is not made again.
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from evidence.detection.hand import LEAST_FORCE, Arrays, grouped
-from evidence.runner import INDEX_RIG, write
+from evidence.detection.hand import Arrays, Take, grouped, motion_columns, rig_of, simulated
+from evidence.runner import write
 from tendonfmu.files import read_table, write_table
-from tendonfmu.simulate import read_rig, simulate
-from tendonfmu.statistics.quintic import evaluate
 
 RATE = 500.0  # Hz, the rig's
 FORCES, RISES, HOLD, FALL = (0.25, 0.5, 1.0, 2.0), (0.1, 1.0, 10.0), 3.0, 0.1  # N, s
@@ -39,34 +36,23 @@ WRIST = {
 }
 
 
-@dataclass(frozen=True)
-class Case:
-    """A recording."""
+# Kinds of takes: "rest", "motion" (ramps), "stuck", "still" (to be disturbed), "pushed" (the same with a push at the
+# start), "wrist" (the same over a wrist that turns); "rest_twin", "motion_twin": without the pushes.
 
-    # "rest", "motion" (ramps), "stuck", "still" (to be disturbed), "pushed" (the same with a push at the start),
-    # "wrist" (the same over a wrist that turns); "rest_twin", "motion_twin": without the pushes
-    kind: str
-    pretension: float  # N
-    part: int  # from 1
 
-    @property
-    def name(self) -> str:
-        return f"{self.kind}_{self.pretension:g}_{self.part}"
+def pushes_of(take: Take) -> str:
+    """The kind whose pushes and motion it has."""
+    return take.kind.removesuffix("_twin")
 
-    @property
-    def pushes(self) -> str:
-        """The kind whose pushes and motion it has."""
-        return self.kind.removesuffix("_twin")
 
-    @property
-    def twin(self) -> Case:
-        return replace(self, kind=f"{self.kind}_twin")
+def twin_of(take: Take) -> Take:
+    return replace(take, kind=f"{take.kind}_twin")
 
-    @property
-    def seed(self) -> int:
-        """Of motion and noise, which twins and the recordings of recovery share."""
-        kind = _KINDS.index("still" if self.kind in ("pushed", "wrist") else self.pushes)
-        return 7_000_000 + 10_000 * kind + 100 * round(self.pretension) + self.part
+
+def seed_of(take: Take) -> int:
+    """Of motion and noise, which twins and the recordings of recovery share."""
+    kind = _KINDS.index("still" if take.kind in ("pushed", "wrist") else pushes_of(take))
+    return 7_000_000 + 10_000 * kind + 100 * round(take.pretension) + take.part
 
 
 @dataclass(frozen=True)
@@ -86,10 +72,10 @@ class Slot:
         return self.push + self.rise + self.hold
 
 
-def slots(case: Case) -> list[Slot]:
-    random = np.random.default_rng([case.seed, 1])
-    if case.kind == "stuck":
-        forces = np.exp(random.uniform(*np.log(STUCK_FORCE), STUCK_COUNT))
+def slots(take: Take) -> list[Slot]:
+    random = np.random.default_rng([seed_of(take), 1])
+    if take.kind == "stuck":
+        forces = np.exp(random.uniform(np.log(STUCK_FORCE[0]), np.log(STUCK_FORCE[1]), STUCK_COUNT))
         wanted = [(float(force), STUCK_RISES[k % 2], STUCK_HOLD) for k, force in enumerate(forces)]
     else:
         wanted = [(force, rise, HOLD) for force in FORCES for rise in RISES]
@@ -103,36 +89,26 @@ def slots(case: Case) -> list[Slot]:
     return planned
 
 
-def write_rig(folder: Path, case: Case) -> Path:
-    rig: dict[str, Any] = {
-        "format": "tendonfmu-rig-1",
-        "base": str(INDEX_RIG),
-        "name": case.name,
-        "seed": case.seed,
-        "physics": {"contact_force": LEAST_FORCE},
-        "motion": {"pretension": case.pretension, "seed": case.seed, "duration": None},
-        "pushes": [],
-        "recording": {"columns": ["joint_position", "external_torque", "contact"]},
-    }
-    if case.pushes in ("still", "pushed", "wrist"):
-        duration = WARM + DISTURBED + LONGEST + AFTER + 1.0
-        if case.kind == "pushed":
+def write_rig(folder: Path, take: Take) -> Path:
+    moves = {"pretension": take.pretension, "seed": seed_of(take), "duration": None}
+    rig = rig_of(take.name, seed_of(take), moves, WARM + DISTURBED + LONGEST + AFTER + 1.0) | {"pushes": []}
+    if pushes_of(take) in ("still", "pushed", "wrist"):
+        if take.kind == "pushed":
             rig["pushes"] = [_push(WARM - 1.0, 0.1, 0.9 + PUSH_TIME, RECOVERY_FORCE)]
-        if case.kind == "wrist":
+        if take.kind == "wrist":
             rig["physics"]["wrist"] = WRIST
     else:
-        planned = slots(case)
-        duration = planned[-1].end + 1.0
-        if case.kind == case.pushes:
+        planned = slots(take)
+        duration = rig["recording"]["duration"] = planned[-1].end + 1.0
+        if take.kind == pushes_of(take):
             rig["pushes"] = [_push(slot.push, slot.rise, slot.hold, slot.force) for slot in planned]
-        if case.pushes == "motion":
+        if pushes_of(take) == "motion":
             rig["motion"]["rest_share"] = 0.0
         else:
-            file = folder / f"motion_{case.name}.parquet"
-            write_table(file, _postures(case, planned, duration))
-            rig["motion"] = {"kind": "file", "file": file.name, "pretension": case.pretension}
-    rig["recording"]["duration"] = duration
-    file = folder / f"{case.name}.json"
+            file = folder / f"motion_{take.name}.parquet"
+            write_table(file, _postures(take, planned, duration))
+            rig["motion"] = {"kind": "file", "file": file.name, "pretension": take.pretension}
+    file = folder / f"{take.name}.json"
     write(file, rig)
     return file
 
@@ -141,32 +117,27 @@ def _push(start: float, rise: float, hold: float, force: float) -> dict[str, Any
     return {"start": start, "rise": rise, "hold": hold, "fall": FALL, "force": force, "direction": PAD}
 
 
-def _postures(case: Case, planned: list[Slot], duration: float) -> Arrays:
+def _postures(take: Take, planned: list[Slot], duration: float) -> Arrays:
     """A motion file: a move to another posture at the begin of each slot."""
-    random = np.random.default_rng([case.seed, 2])
+    random = np.random.default_rng([seed_of(take), 2])
     time, posture = [0.0], [CENTRE]
     for slot in planned:
         time += [slot.begin, slot.begin + MOVE]
         posture += [posture[-1], CENTRE + SPREAD * random.uniform(-1.0, 1.0, len(CENTRE))]
     time, posture = [*time, duration], [*posture, posture[-1]]
-    table: Arrays = {"time": np.array(time)}
-    for j, angles in enumerate(np.array(posture).T, start=1):
-        knots = np.column_stack([time, angles, np.zeros((len(time), 2))])
-        for name, values in zip(("position", "velocity", "acceleration"), evaluate(knots, np.array(time)), strict=True):
-            table[f"joint_{name}[{j}]"] = values
-    return table
+    still = np.zeros((len(time), 2))
+    knots = [np.column_stack([time, angles, still]) for angles in np.array(posture).T]
+    return motion_columns(np.array(time), knots)
 
 
-def made(folder: Path, case: Case) -> Arrays:
+def made(folder: Path, take: Take) -> Arrays:
     """The recording, contact_force [N], and the groups of `TRUE` as true_NAME [N, n]."""
-    file = folder / f"{case.name}.parquet"
+    file = folder / f"{take.name}.parquet"
     if not file.exists():
-        run = simulate(read_rig(write_rig(folder, case)), truth=True)
-        assert run.truth is not None
-        kept = {name: run.recording[name] for name in run.recording if name.startswith(("time", "tendon_"))}
-        kept |= {f"true_{name}": values for name, values in run.truth.items() if name.split("[")[0] in TRUE}
-        kept["contact_force"] = np.sqrt(sum(run.truth[f"contact_force[{axis}]"] ** 2 for axis in (1, 2, 3)))
-        write_table(file, kept)
+        recorded, true = simulated(write_rig(folder, take), TRUE)
+        kept = {name: values for name, values in recorded.items() if name.startswith(("time", "tendon_"))}
+        force = true.pop("contact_force")
+        write_table(file, {**kept, **{f"true_{name}": values for name, values in true.items()}, "contact_force": force})
     return grouped(read_table(file, lambda _path, _names: None))
 
 

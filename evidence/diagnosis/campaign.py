@@ -8,23 +8,21 @@ Writes the row of each case as it ends, and FOLDER/rates.md. The same command go
 from __future__ import annotations
 
 import itertools
-import json
 import math
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from evidence.diagnosis import makers
+from evidence.diagnosis.case import ALARMS, Case, causes_of, leaves_unnamed
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
-from evidence.diagnosis.makers import Case, Made, Options
-from evidence.judge import Cause, effects_of, holds, is_exactly_at_place, judge
+from evidence.diagnosis.makers import Options, Plan
+from evidence.judge import holds, is_exactly_at_place, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, table, where
-from tendonfmu.diagnosis import Diagnosis, diagnose, residual_of
+from tendonfmu.diagnosis import Diagnosis, residual_of
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import Held, prepare, read_recording
 from tendonfmu.statistics.intervals import share
@@ -60,7 +58,6 @@ MUJOCO_SINGLE = (3, 5, 6, 8, 10, 11, 12, 13, 14, 16, 21, 24)
 SECOND_JOINT = (6, 10, 12, 16, 17, 18, 24)  # plans whose effect is at joint 2, or at a tendon of it
 FOREIGN_SECONDS, FOREIGN_RATE = 45.0, 500.0  # s, Hz
 
-ALARMS = ("unexplained", "partly explained")
 NEAR = 1.4  # a case counts as one of the strengths within this factor
 SHOWN = 0.3  # strength from which a motion shows an absorbed effect, and at which two effects must both be named
 COVERAGE = "the gain's interval covers the true gain"
@@ -72,7 +69,7 @@ EFFECT_HEADINGS = ("hidden effect", "cases", "detected", "in the set", "first", 
 # --- cases ------------------------------------------------------------------------------------------------------------
 
 
-def planned(seed: int) -> list[Case]:
+def planned(seed: int) -> list[Plan]:
     """All cases, each kind in random order and spread evenly over the whole."""
     kinds = [
         [_matched(f"null_{k}", "null", makers.null, seed + k, wander=(1.0, 3.0)[k % 2]) for k in range(460)],
@@ -87,152 +84,115 @@ def planned(seed: int) -> list[Case]:
         _foreign("contact", (), MUJOCO_CONTACT, 0, 2, seed),
     ]
     random = np.random.default_rng([seed, 68])
-    return makers.in_turn([[cases[k] for k in random.permutation(len(cases))] for cases in kinds])
+    return makers.in_turn([[plans[k] for k in random.permutation(len(plans))] for plans in kinds])
+
+
+def _joints(seed: int) -> tuple[int, np.random.Generator]:
+    """The number of joints of a seed, and the generator that goes on."""
+    rng = np.random.default_rng([seed, 67])
+    return int(rng.choice(JOINTS, p=SHARES)), rng
 
 
 def _matched(
     name: str,
     group: str,
-    maker: Callable[..., Made],
+    maker: Callable[..., Case],
     seed: int,
     *,
     wander: float = 1.0,
     with_gain: bool = False,
     static: bool = False,
     **given: Any,
-) -> Case:
+) -> Plan:
     """A case whose joints and presliding are the seed's; static: without presliding."""
-    rng = np.random.default_rng([seed, 67])
-    joints, presliding = int(rng.choice(JOINTS, p=SHARES)), bool(rng.random() < 0.5)
+    joints, rng = _joints(seed)
+    presliding = bool(rng.random() < 0.5)
     options = Options(joints=joints, presliding=presliding and not static, wander=wander)
     if with_gain:
         options = replace(options, test=MEASURED_SECONDS, gain_recordings=GAIN_RECORDINGS)
-    return Case(name, group, seed, maker, {"options": options, **given})
+    return Plan(name, group, seed, maker, {"options": options, **given})
 
 
-def _singles(times: int, seed: int) -> Iterator[Case]:
+def _singles(times: int, seed: int) -> Iterator[Plan]:
     effects = [effect for effect in BUILDERS if effect != "force_offset"]  # refitting always absorbs it
     for k, (rank, strength), (number, effect) in itertools.product(
         range(times), enumerate(STRENGTHS), enumerate(effects)
     ):
-        yield _matched(
-            f"{effect}_{strength:g}_{k}",
-            "single",
-            makers.single,
-            seed + 100_000 + 1000 * k + 100 * rank + number,
-            with_gain=strength >= LEAST_MEASURED,
-            effect=effect,
-            strength=strength,
-        )
+        name, own_seed = f"{effect}_{strength:g}_{k}", seed + 100_000 + 1000 * k + 100 * rank + number
+        given: dict[str, Any] = {"with_gain": strength >= LEAST_MEASURED, "effect": effect, "strength": strength}
+        yield _matched(name, "single", makers.single, own_seed, **given)
 
 
-def _doubles(count: int, seed: int) -> Iterator[Case]:
+def _doubles(count: int, seed: int) -> Iterator[Plan]:
     rng = np.random.default_rng([seed, 65])
     for k in range(count):
         effects = [str(name) for name in rng.choice(PAIRS, 2, replace=False)]
-        yield _matched(
-            f"double_{k}",
-            "double",
-            makers.double,
-            seed + 200_000 + k,
-            with_gain=True,
-            static="presliding" in effects,
-            effects=effects,
-            strength=0.3,
-        )
+        given: dict[str, Any] = {"static": "presliding" in effects, "effects": effects, "strength": 0.3}
+        yield _matched(f"double_{k}", "double", makers.double, seed + 200_000 + k, with_gain=True, **given)
 
 
-def _absorbed(effect: str, k: int, seed: int) -> Case:
+def _absorbed(effect: str, k: int, seed: int) -> Plan:
     return _matched(f"absorbed_{effect}_{k}", "absorbed", makers.absorbed, seed + 300_000 + k, effect=effect)
 
 
-def _unknown(count: int, seed: int) -> Iterator[Case]:
+def _unknown(count: int, seed: int) -> Iterator[Plan]:
     kinds = itertools.cycle(itertools.product(UNKNOWN_STRENGTHS, UNKNOWN))
     for k, (strength, effect) in zip(range(count), kinds, strict=False):
         given: dict[str, Any] = {"effect": effect, "strength": strength}
-        name = f"{effect}_{strength:g}_{k}"
-        yield _matched(name, "unknown", makers.single, seed + 400_000 + k, **given)
+        yield _matched(f"{effect}_{strength:g}_{k}", "unknown", makers.single, seed + 400_000 + k, **given)
 
 
 def _foreign(
     group: str, in_numpy: Sequence[int], in_mujoco: Sequence[int], times_numpy: int, times_mujoco: int, seed: int
-) -> list[Case]:
-    """Every plan so many times, numpy and MuJoCo in turn."""
-    first = seed + 600_000
-    lists = (
-        [_numpy(group, number, k, first + k) for k in range(times_numpy) for number in in_numpy],
-        [_mujoco(group, number, k, first + 100 * number + k) for k in range(times_mujoco) for number in in_mujoco],
-    )
-    return [case for pair in itertools.zip_longest(*lists) for case in pair if case is not None]
-
-
-def _numpy(group: str, number: int, k: int, seed: int) -> Case:
-    arguments = {"number": number, "seconds": FOREIGN_SECONDS, "gain_recordings": GAIN_RECORDINGS}
-    return Case(f"numpy_{group}_{number:02d}_{k}", group, seed, makers.numpy_finger, arguments)
-
-
-def _mujoco(group: str, number: int, k: int, seed: int) -> Case:
-    joints = int(np.random.default_rng([seed, 67]).choice(JOINTS, p=SHARES))
-    if number in SECOND_JOINT:
-        joints = max(joints, 2)
-    arguments = {"number": number, "joints": joints, "seconds": FOREIGN_SECONDS, "rate": FOREIGN_RATE}
-    return Case(f"mujoco_{group}_{number:02d}_{k}", group, seed, makers.mujoco_finger, arguments)
+) -> list[Plan]:
+    """Every finger so many times, numpy and MuJoCo in turn."""
+    plans: dict[str, list[Plan]] = {"numpy": [], "mujoco": []}
+    for k, number in itertools.product(range(times_numpy), in_numpy):
+        given: dict[str, Any] = {"number": number, "seconds": FOREIGN_SECONDS, "gain_recordings": GAIN_RECORDINGS}
+        name = f"numpy_{group}_{number:02d}_{k}"
+        plans["numpy"].append(Plan(name, group, seed + 600_000 + k, makers.numpy_finger, given))
+    for k, number in itertools.product(range(times_mujoco), in_mujoco):
+        own_seed = seed + 600_000 + 100 * number + k
+        joints = max(_joints(own_seed)[0], 2 if number in SECOND_JOINT else 1)
+        given = {"number": number, "joints": joints, "seconds": FOREIGN_SECONDS, "rate": FOREIGN_RATE}
+        name = f"mujoco_{group}_{number:02d}_{k}"
+        plans["mujoco"].append(Plan(name, group, own_seed, makers.mujoco_finger, given))
+    return [plan for pair in itertools.zip_longest(*plans.values()) for plan in pair if plan is not None]
 
 
 # --- one case ---------------------------------------------------------------------------------------------------------
 
 
-def run_case(case: Case) -> dict[str, Any]:
+def run_case(plan: Plan) -> dict[str, Any]:
     """Make the recordings, diagnose them without the truth, and judge the answer."""
-    with tempfile.TemporaryDirectory() as folder:
-        made = case.make(Path(folder))
-        diagnosis = diagnosed(case, made)
-        row = row_of(case, made) | judged(case.group, made, diagnosis)
-        if made.gain_recordings:
-            row["true_gain"] = true_gain(diagnosis, made)
-        if made.experiment is not None:
-            row["named_after_experiment"] = named_after_experiment(case, made, diagnosis)
+    case = plan.make()
+    diagnosis = case.diagnosed()
+    row = row_of(plan, case) | judged(plan.group, case, diagnosis)
+    if case.gain_recordings:
+        row["true_gain"] = true_gain(diagnosis, case)
+    if case.experiment is not None:
+        row["named_after_experiment"] = named_after_experiment(case, diagnosis)
     return row
 
 
-def row_of(case: Case, made: Made) -> dict[str, Any]:
+def row_of(plan: Plan, case: Case) -> dict[str, Any]:
     """What a row says of its case."""
-    effects = [truth.effects[0] for truth in made.truths]
-    return {"group": case.group, "rig": made.rig, "seed": case.seed, "true_effects": effects, **made.facts}
+    effects = [truth.effects[0] for truth in case.truths]
+    return {"group": plan.group, "rig": case.machine, "seed": case.seed, "true_effects": effects, **case.facts}
 
 
-def diagnosed(case: Case, made: Made, more: Sequence[Path] = ()) -> Diagnosis:
-    recordings = [*made.recordings, *more]
-    return diagnose(made.finger, recordings, list(made.test), kinematics=made.kinematics, seed=case.seed)
-
-
-def causes_of(diagnosis: Diagnosis) -> list[Cause]:
-    """The causes with a term in the extended model, as in diagnosis.json."""
-    return [
-        {
-            "effect": cause.effect,
-            "joint": cause.joint,
-            "tendon": cause.tendon,
-            "places": [{"joint": place.joint, "tendon": place.tendon} for place in cause.places],
-            "confusable_with": [vars(where) for where in cause.confusable_with],
-        }
-        for cause in diagnosis.causes
-    ]
-
-
-def judged(group: str, made: Made, diagnosis: Diagnosis) -> dict[str, Any]:
+def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     """Columns of a row; None for questions that do not arise."""
     causes = causes_of(diagnosis)
-    hidden = [effect for truth in made.truths for effect in truth.effects]
-    counted = [cause for cause in causes if cause["effect"] not in made.also or cause["effect"] in hidden]
-    alarm = diagnosis.verdict in ALARMS
-    unknown = alarm or any("unknown" in effects_of(cause) for cause in causes[:1])
+    hidden = [effect for truth in case.truths for effect in truth.effects]
+    counted = [cause for cause in causes if cause["effect"] not in case.also or cause["effect"] in hidden]
+    unknown = leaves_unnamed(diagnosis)
     row = {
         "verdict": diagnosis.verdict,
-        "causes": json.dumps(causes),
+        "causes": causes,
         "cause_count": len(counted),
         "named_count": len(causes),
-        "detected": bool(counted) or alarm,
+        "detected": bool(counted) or diagnosis.verdict in ALARMS,
         "unknown": unknown,
         "wrong_name": bool(counted) and not unknown,
         "gain": diagnosis.gain.value,
@@ -241,46 +201,38 @@ def judged(group: str, made: Made, diagnosis: Diagnosis) -> dict[str, Any]:
         "events": len(diagnosis.events),
     }
     if group == "single":
-        row |= _judged_single(made, counted)
+        (truth,) = case.truths
+        judgement = judge(counted, truth)
+        holding = [cause for cause in counted if holds(cause, truth)]
+        place = is_exactly_at_place(holding[0], truth) if holding and truth.has_place else None
+        row |= {"in_set": judgement.in_set, "first": judgement.first, "set_size": judgement.set_size, "place": place}
     if group == "double":
-        hits = [any(holds(cause, truth) for cause in counted) for truth in made.truths]
+        hits = [any(holds(cause, truth) for cause in counted) for truth in case.truths]
         row |= {"both": all(hits), "exactly": all(hits) and len(counted) == len(hits)}
     if group == "absorbed":
         listed = [entry for entry in diagnosis.invisible if entry.where.effect in hidden]
         named = any(cause["effect"] in hidden for cause in causes)
-        row |= {
-            "not_visible": bool(listed) and not named,
-            "experiment": any(bool(entry.experiment) for entry in listed),
-        }
+        row |= {"not_visible": bool(listed) and not named, "experiment": any(entry.experiment for entry in listed)}
     return row
 
 
-def _judged_single(made: Made, causes: Sequence[Cause]) -> dict[str, Any]:
-    (truth,) = made.truths
-    judgement = judge(causes, truth)
-    holder = next((cause for cause in causes if holds(cause, truth)), None)
-    place = is_exactly_at_place(holder, truth) if holder is not None and truth.has_place else None
-    return {"in_set": judgement.in_set, "first": judgement.first, "set_size": judgement.set_size, "place": place}
-
-
-def named_after_experiment(case: Case, made: Made, diagnosis: Diagnosis) -> bool:
+def named_after_experiment(case: Case, diagnosis: Diagnosis) -> bool:
     """Whether the hidden effect is named once the requested experiment has been recorded, too."""
-    assert made.experiment is not None
-    (truth,) = made.truths
+    assert case.experiment is not None
+    (truth,) = case.truths
     shown = [entry.motion for entry in diagnosis.invisible if entry.where.effect in truth.effects and entry.motion]
     motion = shown[0] if shown else diagnosis.experiment.motion
     if not motion:
         return False
-    causes = causes_of(diagnosed(case, made, [made.experiment(motion)]))
-    return any(holds(cause, truth) for cause in causes)
+    return any(holds(cause, truth) for cause in causes_of(case.diagnosed(case.experiment(motion))))
 
 
-def true_gain(diagnosis: Diagnosis, made: Made) -> float:
+def true_gain(diagnosis: Diagnosis, case: Case) -> float:
     """1 − rms of the extended / rms of the nominal model, over all joints of the gain recordings."""
-    finger = read_finger(made.finger)
+    finger = read_finger(case.finger)
     sums = np.zeros(2)
-    for path in made.gain_recordings:
-        recording = prepare(finger, read_recording(path), made.kinematics, Held())
+    for frame in case.gain_recordings:
+        recording = prepare(finger, read_recording(frame), case.kinematics, Held())
         for k, data in enumerate((diagnosis.nominal_data, diagnosis.extended_data)):
             sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
     return 1.0 - math.sqrt(sums[1] / sums[0])
@@ -416,7 +368,7 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--minutes", type=float, default=math.inf, help="begin no case after these")
     given = options.parse_args()
-    cases = {case.name: (case,) for case in planned(given.seed)}
+    cases = {plan.name: (plan,) for plan in planned(given.seed)}
     rows = run_cases(
         run_case, cases, given.output, given.workers, given.scheduler, keep_errors=True, stop_after=60 * given.minutes
     )

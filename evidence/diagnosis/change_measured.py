@@ -1,37 +1,30 @@
-"""The bed `hidden`: known changes put on measured recordings of EMPS and the da Vinci jaw.
+"""Changes of measured machines: known ones put on recordings of EMPS and the da Vinci jaw, and real ones of the jaw.
 
-`then` and `now` are different stretches of the recordings; `now` has a known effect on it (measured.py), or nothing.
-EMPS: two recordings of the same path, of which one has pulses of the drive's force on it; these may stand as motor
-force or as known load. da Vinci: 15 runs, ten loads at 0.1 Hz and five at 0.5 Hz.
-
-Strength: variance of the torque that the change adds over the variance of what the case's model leaves of the unaltered
-`now`, both in blocks of 10 ms and without a constant of each recording (the machines' biases are constants). The part
-that refitting the model's own numbers to `now` absorbs does not count. Where that is more than half of it, the change
-is one of numbers that the model has, `then` pins them, and the whole torque counts.
-
-Needs the recordings in ../shared/data or $TENDONFMU_DATA.
+What `then`, `now` and the strength of a change are: README.md. Needs ../shared/data or $TENDONFMU_DATA.
 """
 
 from __future__ import annotations
 
 import json
-import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy import io, signal
 
-from evidence.diagnosis.changes import BY_SPEED, UNCHANGED, Array, Change, Columns, Makers
+from evidence.diagnosis.case import Case
 from evidence.diagnosis.measured import (
-    CLOSE,
     EFFECTS,
     FORCE,
     LOAD,
+    Array,
+    Columns,
     Description,
     Effect,
     Machine,
@@ -39,16 +32,26 @@ from evidence.diagnosis.measured import (
     diagnosed_model,
     first_magnitude,
     largest_force,
+    less,
+    magnitude_of,
     put,
     residual,
     residuals,
 )
+from evidence.fingers.matched_strength import averaged
 from evidence.judge import Truth
 from evidence.runner import DATA, EXAMPLES
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
-from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.recordings.converters.emps import CUTOFF
+
+Makers = dict[int, Callable[[], Case]]  # by number; they raise ValueError where the case cannot be
+
+UNCHANGED = "nothing"
+# What a change of speed alone may show of a model that is not exact: not false where `now` is faster or slower.
+BY_SPEED = ("viscous_friction", "stribeck", "time_delay", "inertia")
+# A change of load that no sensor shows is a constant torque: these answers say so. Names of friction are wrong there.
+LOAD_NAMES = ("contact", "force_offset", "gravity")
 
 THINNED = 2  # samples of 1 kHz to one: the remainder of the EMPS model grows by 1 %
 PRETENSION = 13.0  # N, da Vinci: the closing cable never goes slack
@@ -59,7 +62,6 @@ KINEMATICS = {"emps": 3, "davinci": 1}
 PLAIN = {"emps": EXAMPLES / "emps" / "emps.json", "davinci": EXAMPLES / "davinci" / "jaw_nominal.json"}
 
 STRENGTHS = (0.1, 0.3, 1.0)
-ROUNDS = 20  # of the search for a strength
 ABSORBED = 0.5  # share of the variance that refitting to `now` leaves, below which numbers of the model have changed
 LOUDEST = 0.5  # of the machine's largest torque: a change that adds more is no longer the same machine
 HALF_EMPS, HALF_JAW = 12.48, 10.0  # s: two of the four cycles; one of the two at 0.1 Hz, five of the ten at 0.5 Hz
@@ -110,8 +112,7 @@ def part_of(columns: Columns, begin: float, end: float) -> Columns:
 
 def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
     """Means of so many samples each."""
-    rows = len(columns["time"]) // to_one * to_one
-    return {name: values[:rows].reshape(-1, to_one).mean(axis=1) for name, values in columns.items()}
+    return {name: averaged(values, to_one) for name, values in columns.items()}
 
 
 def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> dict[str, Columns]:
@@ -131,13 +132,10 @@ def plain_model(machine: str, stretches: tuple[Stretch, ...], known_load: bool) 
 
 
 def fitted(start: Mapping[str, Any], recordings: Sequence[Columns], kinematics: int = 1) -> Mapping[str, Any]:
-    with tempfile.TemporaryDirectory() as scratch, warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)
-        files = [Path(scratch) / f"{k}.parquet" for k in range(len(recordings))]
-        for file, columns in zip(files, recordings, strict=True):
-            write_table(file, dict(columns))
-        fit = FrictionFit(start, kinematics=kinematics, threads=1, uncertainty=False).fit(files)
-    data: Mapping[str, Any] = fit.description_.data
+        fit = FrictionFit(start, kinematics=kinematics, threads=1, uncertainty=False)
+        data: Mapping[str, Any] = fit.fit([pd.DataFrame(columns) for columns in recordings]).description_.data
     return data
 
 
@@ -257,11 +255,11 @@ def plans() -> list[Plan]:
     return [*unchanged, *changed_plans(last + last % 2)]
 
 
-def makers() -> Makers:
+def hidden_makers() -> Makers:
     return {plan.number: partial(make, plan) for plan in plans()}
 
 
-def make(plan: Plan) -> Change:
+def make(plan: Plan) -> Case:
     """Raises ValueError where no sound magnitude of the change has the strength, with any of its pairs."""
     for pair in plan.pairs:
         try:
@@ -271,7 +269,7 @@ def make(plan: Plan) -> Change:
     raise reason
 
 
-def made_of(plan: Plan, pair: Pair) -> Change:
+def made_of(plan: Plan, pair: Pair) -> Case:
     model = model_of(pair.machine, plan.model, pair.then)
     then, now = cut(pair.machine, pair.then), cut(pair.machine, pair.now)
     allowed = BY_SPEED if pair.conditions == "speed" else ()
@@ -282,18 +280,65 @@ def made_of(plan: Plan, pair: Pair) -> Change:
         now = dict(hide(seen, effect, plan.strength).now)
         signs = {name: effect.sign * sign for name, sign in effect.signs.items() if name in effect.names}
         truth = replace(truth, effects=effect.names, allowed=(*allowed, *effect.also), signs=signs)
-    return Change(
-        machine=pair.machine,
-        model=plan.model,
-        hidden=plan.hidden,
-        conditions=pair.conditions,
-        kinematics=KINEMATICS[pair.machine],
-        finger=model,
-        then=[thinned(columns) for columns in then.values()],
-        now=[thinned(columns) for columns in now.values()],
-        truth=truth,
-        strength=plan.strength,
+    return changed_case(
+        pair.machine, plan.model, plan.hidden, pair.conditions, model, then.values(), now.values(), truth, plan.strength
     )
+
+
+def changed_case(
+    machine: str,
+    model: str,  # diagnosed or plain
+    hidden: str,  # name of the change as its bed calls it
+    conditions: str,  # how `now` was recorded: part, load, speed, excitation
+    finger: Mapping[str, Any],
+    then: Iterable[Columns],
+    now: Iterable[Columns],
+    truth: Truth,
+    strength: float = 0.0,  # variance of the added torque over that of what the model leaves of the unaltered `now`
+) -> Case:
+    """The machine as it was (`then`) and with a change, or without one (`now`): no sample is in both."""
+    known = {"machine": machine, "model": model, "hidden": hidden, "conditions": conditions, "strength": strength}
+    reference, recordings = ([pd.DataFrame(thinned(columns)) for columns in part] for part in (then, now))
+    return Case(machine, finger, recordings, KINEMATICS[machine], truths=(truth,), reference=reference, facts=known)
+
+
+# --- the bed `real`: what really changed at the da Vinci instrument ---------------------------------------------------
+# Load: every pair of runs at one speed, `external_torque` taken out of both. What changed is a nearly constant torque
+# on the jaw: right answers are LOAD_NAMES. Friction did not change: it grows with the load by one law. To say nothing
+# is no error where the bias of each recording may take a constant; the table counts it apart.
+# Speed: 0.1 Hz and 0.5 Hz under one load, with the column: nothing but what speed explains (BY_SPEED).
+# Directions, models and halves alternate.
+
+SLOW = tuple(f"0{load}" for load in range(10))
+FAST = ("40", "42", "44", "46", "48")
+BY_LOAD = (*combinations(SLOW, 2), *combinations(FAST, 2))
+SPEEDS = tuple((f"0{fast[1]}", fast) for fast in FAST)
+
+
+def real_plans() -> Iterator[tuple[int, str, str, str, str]]:
+    """Number, conditions, model and the runs then and now. Load: each pair once, by one model; speed: each pair in both
+    directions by both."""
+    for k, pair in enumerate(BY_LOAD):
+        then, now = pair if k // 2 % 2 == 0 else pair[::-1]
+        # four in a row: both models and both halves in every combination
+        yield k + 1, "load", MODELS[(k // 2 + k) % 2], then, now
+    for m, model in enumerate(MODELS):
+        for k, pair in enumerate(SPEEDS):
+            for d, (then, now) in enumerate((pair, pair[::-1])):
+                yield 101 + 20 * m + 2 * k + (d + k + m) % 2, "speed", model, then, now
+
+
+def real_change(conditions: str, model: str, then: str, now: str) -> Case:
+    by_speed = conditions == "speed"
+    finger = model_of("davinci", model, (Stretch(then),), by_speed)
+    before, after = (cut("davinci", (Stretch(run),), by_speed).values() for run in (then, now))
+    truth = Truth(allowed=BY_SPEED) if by_speed else Truth(LOAD_NAMES)
+    hidden = UNCHANGED if by_speed else "other_load"
+    return changed_case("davinci", model, hidden, conditions, finger, before, after, truth)
+
+
+def real_makers() -> Makers:
+    return {number: partial(real_change, *plan) for number, *plan in real_plans()}
 
 
 # --- changes at a strength --------------------------------------------------------------------------------------------
@@ -347,32 +392,9 @@ def spans(lengths: Sequence[int]) -> Array:
     return np.asarray(total / np.sqrt(np.array(lengths, dtype=float)))
 
 
-def less(values: Array, columns: Array) -> Array:
-    return np.asarray(values - columns @ (columns.T @ values))
-
-
 def check_sound(torque: Array, machine: Machine) -> None:
     """Raises ValueError where the torque is too large for the machine to be the same still."""
     most = LOUDEST * largest_force(machine) * machine.arm
     swing = float(np.percentile(np.abs(torque - torque.mean()), 95))
     if swing > most:
         raise ValueError(f"it takes {swing:.3g} N.m, more than the {most:.3g} N.m that are sound")
-
-
-def magnitude_of(strength: float, strength_at: Callable[[float], float], first: float, most: float) -> float:
-    """The magnitude that has the strength: by proportion until it lies between two, then between them.
-
-    Raises ValueError where none up to `most` has it.
-    """
-    low, high, magnitude = 0.0, np.inf, min(first, most)
-    for _ in range(ROUNDS):
-        reached = strength_at(magnitude)
-        if abs(reached / strength - 1.0) < CLOSE:
-            return magnitude
-        low, high = (magnitude, high) if reached < strength else (low, magnitude)
-        if low >= most:
-            break
-        wanted = min(magnitude * float(np.sqrt(strength / reached)), most)
-        between = low < wanted < high and not (low > 0.0 and high < np.inf)
-        magnitude = wanted if between or high == np.inf else float(np.sqrt(max(low, 0.01 * high) * high))
-    raise ValueError(f"strength {strength:g}: no sound magnitude of this change has it; tried up to {magnitude:g}")

@@ -1,19 +1,12 @@
-"""The bed `simulated`: fingers whose truth is exact, from simulators that share no code with the product.
+"""Changes of simulated fingers whose truth is exact, from simulators that share no code with the product.
 
-`then` and `now` are the same finger with one number changed in between, or none. `now` repeats the motion exactly
-(other noise), is another motion, is shorter, or has another pretension: the random numbers of motion and of noise come
-from seeds of their own. The description is the simulator's, fitted to `then`.
-
-Strength: variance of the torque that the change adds (the same `now` simulated with and without it, less the slow bias)
-over that of what the description leaves of the unchanged `now`, at the joint where that is largest, rounded down to a
-step of STEPS. Below the first of them nobody is asked to see it.
+`then` and `now` are the same finger with one number changed in between, or none: README.md. Motion and noise have seeds
+of their own. The description is the simulator's, fitted to `then`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import json
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,9 +16,11 @@ from typing import Any, cast
 from unittest import mock
 
 import numpy as np
+import pandas as pd
 
-from evidence.diagnosis.change_measured import fitted, thinned
-from evidence.diagnosis.changes import UNCHANGED, Array, Change, Columns, Makers
+from evidence.diagnosis.case import Case
+from evidence.diagnosis.change_measured import UNCHANGED, Makers, fitted, thinned
+from evidence.diagnosis.measured import Array, Columns
 from evidence.fingers import (
     foreign,
     mujoco_cases,
@@ -37,8 +32,10 @@ from evidence.fingers import (
     numpy_maxwell,
     numpy_tanh,
 )
+from evidence.fingers.matched_strength import averaged
 from evidence.fingers.mujoco_model import Physics
 from evidence.judge import Truth
+from evidence.runner import write
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.view import look
@@ -122,9 +119,7 @@ def record(simulator: ModuleType | None, difference: Difference, how: How) -> Re
         columns[f"tendon_force[{tendon}]"] = columns[f"tendon_force[{tendon}]"] + force
         measured = measured + force * arms[tendon - 1]
     to_one = round(1.0 / (RATE * float(np.median(np.diff(columns["time"])))))
-    rows = len(measured) // to_one * to_one
-    means = measured[:rows].reshape(-1, to_one, measured.shape[1]).mean(axis=1)
-    return Recorded(thinned(columns, to_one), means)
+    return Recorded(thinned(columns, to_one), averaged(measured, to_one))
 
 
 def _numpy(simulator: ModuleType, difference: Difference, how: How) -> tuple[Any, Array, Array]:
@@ -261,39 +256,31 @@ def ways(number: int, conditions: str) -> tuple[How, How]:
     return then, now[conditions]
 
 
-def make(number: int) -> Change:
+def make(number: int) -> Case:
     """The case of a number (from 1)."""
     plan = PLANS[number - 1]
     simulator = SIMULATORS[plan.simulator]
     then_how, now_how = ways(number, plan.conditions)
     then, quiet = record(simulator, NONE, then_how), record(simulator, NONE, now_how)
     finger = fitted(described(simulator), [then.columns])
-    allowed = () if plan.conditions == "repeat" else ALSO.get(plan.simulator, ())
-    change = Change(
-        machine=plan.simulator,
-        model="fitted",
-        hidden=plan.effect,
-        conditions=plan.conditions,
-        kinematics=1,
-        finger=finger,
-        then=[then.columns],
-        now=[quiet.columns],
-        truth=Truth(allowed=allowed),
-    )
-    if plan.effect == UNCHANGED:
-        return change
-    now = record(simulator, plan.difference, now_how)
-    ratio = visible(finger, quiet.columns, now.measured - quiet.measured)
-    truth = Truth(
-        effects=(plan.effect, *plan.others),
-        joint=plan.joint,
-        tendon=plan.tendon,
-        allowed=allowed,
-        signs={plan.effect: int(np.sign(plan.size))},
-        visible=plan.nameable and ratio >= STEPS[0],
-    )
-    strength = max((step for step in STEPS if step <= ratio), default=0.0)
-    return replace(change, now=[now.columns], truth=truth, strength=strength)
+    now, strength = quiet, 0.0
+    truth = Truth(allowed=() if plan.conditions == "repeat" else ALSO.get(plan.simulator, ()))
+    if plan.effect != UNCHANGED:
+        now = record(simulator, plan.difference, now_how)
+        ratio = visible(finger, quiet.columns, now.measured - quiet.measured)
+        strength = max((step for step in STEPS if step <= ratio), default=0.0)
+        truth = replace(
+            truth,
+            effects=(plan.effect, *plan.others),
+            joint=plan.joint,
+            tendon=plan.tendon,
+            signs={plan.effect: int(np.sign(plan.size))},
+            visible=plan.nameable and ratio >= STEPS[0],
+        )
+    known = {"machine": plan.simulator, "model": "fitted", "hidden": plan.effect, "conditions": plan.conditions}
+    recordings, reference = [pd.DataFrame(now.columns)], [pd.DataFrame(then.columns)]
+    facts = known | {"strength": strength}
+    return Case(plan.simulator, finger, recordings, truths=(truth,), reference=reference, facts=facts)
 
 
 def makers() -> Makers:
@@ -303,12 +290,9 @@ def makers() -> Makers:
 def visible(finger: Mapping[str, Any], recording: Columns, added: Array) -> float:
     """Variance of an added torque [N, n], less the slow bias, over that of what the finger leaves of the recording, at
     the joint where it is largest. The judge's own computation, by the product's residual."""
-    with tempfile.TemporaryDirectory() as scratch:
-        description, file = Path(scratch) / "finger.json", Path(scratch) / "quiet.parquet"
-        description.write_text(json.dumps(finger), encoding="utf-8")
-        write_table(file, dict(recording))
-        given = read_finger(description)
-        chosen = choose(given, [prepare(given, read_recording(file), 1, Held())], FitSettings(threads=1))
+    given = read_finger(finger)
+    prepared = prepare(given, read_recording(pd.DataFrame(recording)), 1, Held())
+    chosen = choose(given, [prepared], FitSettings(threads=1))
     view = look(chosen.model.data, chosen.recordings, chosen.grid, chosen.least, candidates=())
     used = view.series.used
     # the recording may begin at another time after its signals are prepared, and has other samples then
@@ -317,3 +301,19 @@ def visible(finger: Mapping[str, Any], recording: Columns, added: Array) -> floa
     blocks = np.concatenate([segment.mean(there[segment.part]) for segment in chosen.grid.segments])
     torque = residual_of(replace(view.series, target=blocks), view.splines, view.columns.nominal[:, :, :0])
     return float(np.max(torque[used].var(axis=0) / view.residual[used].var(axis=0)))
+
+
+# --- a trend: dated recordings of a finger in numpy, the friction of one edge higher from each to the next ------------
+
+DAYS = ("2026-03-01", "2026-03-08", "2026-03-15", "2026-03-22", "2026-04-05", "2026-04-12")
+GROWTH = 0.06  # of the friction of tendon 5's edge at joint 1, from one recording to the next
+
+
+def write_history(folder: Path) -> None:
+    """The description fitted to the first recording, and all recordings."""
+    for k, day in enumerate(DAYS):
+        difference = scaled("SHARE", 1.0 + GROWTH * k, 4, 0) if k else NONE
+        columns = record(numpy_maxwell, difference, How(motion=100 + k, noise=200 + k, seconds=SECONDS)).columns
+        write_table(folder / f"{day}.parquet", dict(columns))
+        if not k:
+            write(folder / "finger.json", fitted(described(numpy_maxwell), [columns]))

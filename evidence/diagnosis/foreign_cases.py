@@ -5,21 +5,18 @@ Constants of the product are chosen on odd cases; figures that are published com
 
 from __future__ import annotations
 
-import importlib
-import tempfile
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from types import ModuleType
+from dataclasses import replace
 from typing import Any
 
-from evidence.diagnosis.command import HALVES, Run, run_diagnose
-from evidence.diagnosis.makers import foreign_files
+from evidence.diagnosis.case import Run, run_command
+from evidence.diagnosis.makers import foreign_finger
 from evidence.fingers import foreign
+from evidence.fingers.families import HALVES, cases_of, module_of
 from evidence.judge import SYNONYMS, Truth, judge
-from evidence.runner import parser, publish, run_cases, say
+from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, count, page, table
 
-FAMILIES = {"recorded": "recorded", "mujoco": "mujoco_cases", "numpy": "numpy_cases"}
 TERMLESS = ("unknown", "contact")  # causes without a term in the extended model have no gain of their own
 VISIBLE = 0.1  # of the residual's variance: README of the recorded cases
 
@@ -78,65 +75,38 @@ def truth_of(truth: foreign.Truth, neutral: tuple[str, ...] = ("presliding", "un
 
 
 def run_case(family: str, number: int) -> dict[str, Any]:
-    case = module_of(family).make(number)
-    with tempfile.TemporaryDirectory() as folder:
-        foreign_files(Path(folder), case)
-        run = run_diagnose(["finger.json", "train.parquet", "--test", "test.parquet"], Path(folder))
-    return row_of(case, run)
+    made = module_of(family).make(number)
+    case = replace(foreign_finger(made), kinematics=1)  # joint angles are left unused
+    return row_of(family, made.truth, run_command(case))
 
 
-def row_of(case: foreign.Case, run: Run) -> dict[str, Any]:
-    truth = case.truth
+def row_of(family: str, truth: foreign.Truth, run: Run) -> dict[str, Any]:
     row: dict[str, Any] = {
-        "family": case.family,
+        "family": family,
         "hidden": {"effect": truth.hidden, "joint": truth.joint, "tendon": truth.tendon, "rms": truth.rms},
         "asked": truth_of(truth).visible and truth.hidden != "none" and not is_outside(truth),
         "absorbed": is_absorbed(truth),
-        "exit": run.exit,
-        "message": run.message,
-        "seconds": run.seconds,
-        "peak_megabytes": run.peak_megabytes,
         "answered": run.report is not None,
     }
+    row |= {key: getattr(run, key) for key in ("exit", "message", "seconds", "peak_megabytes")}
     return row if run.report is None else row | judged(run.report, truth)
 
 
 def judged(report: Mapping[str, Any], truth: foreign.Truth) -> dict[str, Any]:
-    causes = report["causes"]
+    causes, errors = report["causes"], {model: report[model]["test_rms"] for model in ("nominal", "extended")}
     judgement = judge(causes, truth_of(truth))
-    extended, nominal = (sum(r * r for r in report[model]["test_rms"]) for model in ("extended", "nominal"))
+    nominal, extended = (sum(error * error for error in errors[model]) for model in errors)
     certain = [cause["effect"] in TERMLESS or cause["gain"]["interval"][0] > 0.0 for cause in causes]
     return {
         "verdict": report["verdict"],
         "causes": [{key: cause[key] for key in ("effect", "joint", "tendon", "gain")} for cause in causes],
-        "in_set": judgement.in_set,
-        "first": judgement.first,
-        "at_place": judgement.at_place,
-        "false": judgement.false,
+        **{key: getattr(judgement, key) for key in ("in_set", "first", "at_place", "false")},
         "unnamed": set(judgement.named) <= {"contact"} if is_outside(truth) else None,
         "gain_not_negative": report["gain"]["value"] >= 0.0,
         "intervals_positive": all(certain),
         "error_ratio": float((extended / nominal) ** 0.5) if nominal > 0.0 else 1.0,
-        "test_rms": {model: report[model]["test_rms"] for model in ("nominal", "extended")},
+        "test_rms": errors,
     }
-
-
-def module_of(family: str) -> ModuleType:
-    return importlib.import_module(f"evidence.fingers.{FAMILIES[family]}")
-
-
-def cases_of(half: str) -> dict[str, tuple[str, int]]:
-    """All cases of a half that can be made here."""
-    cases: dict[str, tuple[str, int]] = {}
-    for family in FAMILIES:
-        try:
-            module = module_of(family)
-        except ModuleNotFoundError as missing:
-            say(f"SKIPPED: the family {family}: {missing.name} is not installed")
-            continue
-        numbers = module.numbers() if family == "recorded" else module.NUMBERS
-        cases |= {f"{family}_{number:02d}": (family, number) for number in numbers if number % 2 in HALVES[half]}
-    return cases
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -188,6 +158,7 @@ def summary(rows: Sequence[Row]) -> dict[str, str]:
     asked = [row for row in rows if row["asked"]]
     nothing = [row for row in rows if row["hidden"]["effect"] == "none"]
     outside = [row for row in rows if row["hidden"]["effect"].startswith("unknown")]
+    seconds = sorted(row["seconds"] for row in rows)
     absorbed = [row for row in rows if row["absorbed"]]
     return {
         "runs that end with a report": count(row["answered"] for row in rows),
@@ -201,7 +172,7 @@ def summary(rows: Sequence[Row]) -> dict[str, str]:
         "absorbed by refitting, no false cause": count(row.get("false") == [] for row in absorbed),
         "gain ≥ 0": count(row.get("gain_not_negative") for row in rows),
         "intervals of all causes above 0": count(row.get("intervals_positive") for row in rows),
-        "CPU, median and most": median_and_most([row["seconds"] for row in rows]),
+        "CPU, median and most": f"{seconds[len(seconds) // 2]:.0f} s, {seconds[-1]:.0f} s" if seconds else NOTHING,
         "peak memory, most": f"{max((row['peak_megabytes'] for row in rows), default=0.0):.0f} MB",
     }
 
@@ -222,10 +193,6 @@ def error_table(rows: Sequence[Row]) -> str:
 def false_per_case(rows: Sequence[Row]) -> str:
     answered = [row for row in rows if row["answered"]]
     return f"{sum(len(row['false']) for row in answered) / len(answered):.2f}" if answered else NOTHING
-
-
-def median_and_most(values: Sequence[float]) -> str:
-    return f"{sorted(values)[len(values) // 2]:.0f} s, {max(values):.0f} s" if values else NOTHING
 
 
 def main() -> None:

@@ -1,9 +1,7 @@
 """What the matched rig can hide: every effect that `diagnose` may name, and three kinds it may not.
 
-Each builder takes a hand and a random generator, chooses a place, removes the effect from both descriptions where it
-stands there, and says how the true finger differs by one magnitude. `hide` scales the magnitude to a strength.
-All formulas are physics written here; nothing is taken from the candidates. Places count from 0 inside, from 1 in
-`Hidden`.
+Each builder takes the effect out of both descriptions at a random place and says how the true finger differs by one
+magnitude; `hide` scales it to a strength. Formulas are physics written here. Places count from 0, in `Hidden` from 1.
 """
 
 from __future__ import annotations
@@ -14,16 +12,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from evidence.diagnosis.hidden_sensors import SENSORS
-from evidence.fingers.matched_physics import Effect, Finger, Motion, last_true
-from evidence.fingers.matched_rig import Description, Hand, Hidden, Unreachable, record
+from evidence.diagnosis.hidden_sensors import SENSORS, Random
+from evidence.fingers.matched_physics import Array, Description, Effect, Finger, Motion, held_sign
+from evidence.fingers.matched_rig import Hand, Hidden, Unreachable, record
 from evidence.fingers.matched_strength import look, residual, surviving
 
-Array = NDArray[Any]
-Random = np.random.Generator
 Builder = Callable[[Hand, Random], tuple[Hand, Hidden]]
 CLOSE = 0.05  # in its logarithm, of the strength asked for
 STILL_CLOSE = 0.3  # the same where sticking and sliding make strength a rough function of the magnitude
@@ -56,14 +51,14 @@ def set_law(data: Description, kind: str, at: tuple[int, ...], law: Any) -> None
 def law_places(data: Description) -> list[tuple[str, tuple[int, ...]]]:
     """All places where the description has a law."""
     m, n = len(data["tendons"]), len(data["joints"])
-    every = [(kind, (i, j)) for kind in ("edge", "pulley") for i in range(m) for j in range(n)]
-    every += [(kind, (j,)) for kind in ("joint", "load") for j in range(n)]
+    at_tendons = [(kind, (i, j)) for kind in ("edge", "pulley") for i in range(m) for j in range(n)]
+    every = [*at_tendons, *((kind, (j,)) for kind in ("joint", "load") for j in range(n))]
     return [(kind, at) for kind, at in every if law_at(data, kind, at) is not None]
 
 
-def named(kind: str, at: tuple[int, ...]) -> dict[str, int | None]:
-    """joint and tendon of a place, from 1. A pulley belongs to its own joint."""
-    return {"joint": at[-1] + 1, "tendon": at[0] + 1 if kind in ("edge", "pulley") else None}
+def named(kind: str, at: tuple[int, ...]) -> tuple[int, int | None]:
+    """Joint and tendon of a place, from 1. A pulley belongs to its own joint."""
+    return at[-1] + 1, at[0] + 1 if kind in ("edge", "pulley") else None
 
 
 def chosen(rng: Random, items: list[Any]) -> Any:
@@ -89,7 +84,7 @@ def at_a_law(name: str, number: str, start: float, column: int) -> Builder:
 
         law = law_at(hand.truth, kind, at)
         size = start * law["coulomb"] / (law["stribeck_velocity"] if number == "viscous" else 1.0)
-        return edited(hand, absent), Hidden(name, **named(kind, at), magnitude=size, note=kind, finger=change)
+        return edited(hand, absent), Hidden(name, *named(kind, at), magnitude=size, note=kind, finger=change)
 
     return build
 
@@ -106,7 +101,7 @@ def asymmetric(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
             raise Unreachable("asymmetric_friction: one side would drive")
 
     size = 0.3 * law_at(hand.truth, kind, at)["coulomb"]
-    return hand, Hidden("asymmetric_friction", **named(kind, at), magnitude=size, note=kind, finger=change)
+    return hand, Hidden("asymmetric_friction", *named(kind, at), magnitude=size, note=kind, finger=change)
 
 
 def missing_law(name: str, kind: str, size: float, speed: float) -> Builder:
@@ -133,7 +128,7 @@ def missing_law(name: str, kind: str, size: float, speed: float) -> Builder:
             finger.effects.append(Effect(kind, at, sides, memory))
 
         bare = edited(hand, lambda data: set_law(data, kind, at, None))
-        return bare, Hidden(name, **named(kind, at), magnitude=size, finger=change)
+        return bare, Hidden(name, *named(kind, at), magnitude=size, finger=change)
 
     return build
 
@@ -173,12 +168,6 @@ def inner_joint(hand: Hand, rng: Random) -> dict[str, int]:
 
 def both(hand: Hand, rng: Random) -> dict[str, int]:
     return joint(hand, rng) | {"tendon": int(rng.integers(len(hand.truth["tendons"])))}
-
-
-def held_sign(velocity: Array, threshold: float) -> Array:
-    """Sign of the last velocity above the threshold, 0 before there was one."""
-    last = last_true(np.abs(velocity) > threshold)
-    return np.where(last >= 0, np.sign(velocity[last]), 0.0)
 
 
 def at_joints(motion: Motion, joints: int | slice, torque: Array) -> Array:
@@ -267,7 +256,9 @@ def presliding(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
             effect_of(finger, kind, at).memory = distance
 
     note = f"displacement {distance:.3g}"
-    hidden = Hidden("presliding", **place, magnitude=1.0, note=note, hand=weaker, finger=change)
+    hidden = Hidden(
+        "presliding", place.get("joint"), place.get("tendon"), magnitude=1.0, note=note, hand=weaker, finger=change
+    )
     return edited(hand, absent), hidden
 
 
@@ -284,7 +275,9 @@ def drift(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
             effect_of(finger, kind, at).factor = growth
 
     note = f"time constant {time_constant:.1f} s"
-    return hand, Hidden("friction_drift", **place, magnitude=0.3, note=note, finger=change)
+    return hand, Hidden(
+        "friction_drift", place.get("joint"), place.get("tendon"), magnitude=0.3, note=note, finger=change
+    )
 
 
 # --- not on the list of effects: the right answer is `unknown` --------------------------------------------------------

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evidence.fingers.matched_physics import Finger, Motion
+from evidence.fingers.matched_physics import Array, Finger, Motion
 from evidence.fingers.matched_rig import Hand, Hidden
 
-Array = NDArray[Any]
 Random = np.random.Generator
 CROSSING = 0.03  # s in which the drive crosses the play at a reversal
 
@@ -115,9 +113,9 @@ def play(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
         x[:, place] = before_play(x[:, place], signals["time"], magnitude)
 
     def joint(angle: Array, magnitude: float) -> Array:
-        true = angle.copy()
-        true[:, place] = after_play(angle[:, place], magnitude)
-        return true
+        turned: Array = angle.copy()
+        turned[:, place] = after_play(angle[:, place], magnitude)
+        return turned
 
     if at_tendon:
         return hand, Hidden("backlash", tendon=place + 1, magnitude=2e-4, sensors=motor)

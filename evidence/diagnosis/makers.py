@@ -1,18 +1,17 @@
-"""What makes the recordings of a case by its seed: matched rigs that hide something, and the foreign fingers."""
+"""What makes the cases of a campaign by their seed: matched rigs that hide something, and the foreign fingers."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pandas as pd
 
+from evidence.diagnosis.case import Case
 from evidence.diagnosis.hidden_effects import UNKNOWN, placed, scaled
 from evidence.fingers import foreign, numpy_cases
 from evidence.fingers.foreign import Nominal, rough
@@ -29,38 +28,22 @@ PUSH = (0.08, 0.2)  # N·m, unlabelled contacts
 
 
 @dataclass(frozen=True)
-class Made:
-    """The files of a case, and what is hidden in them."""
-
-    rig: str
-    finger: Path
-    recordings: tuple[Path, ...]
-    kinematics: int
-    truths: tuple[Truth, ...] = ()  # one for each hidden effect that the list has
-    also: tuple[str, ...] = ()  # effects that the rig has although the description lacks them: neither right nor false
-    test: tuple[Path, ...] = ()
-    gain_recordings: tuple[Path, ...] = ()  # of other motions, for the true gain of the extended model
-    facts: Mapping[str, Any] = field(default_factory=dict)  # numbers and words for the row
-    experiment: Callable[[Mapping[str, Any]], Path] | None = None  # carries out the motion that a diagnosis asks for
-
-
-@dataclass(frozen=True)
-class Case:
-    """A diagnosis to make and to judge."""
+class Plan:
+    """A case to be made."""
 
     name: str
     group: str  # null, single, double, absorbed (one effect that refitting hides), unknown (not on the list), contact
     seed: int
-    maker: Callable[..., Made]  # a function of this module, called where the case runs
+    maker: Callable[..., Case]  # a function of this module, called where the case runs
     arguments: Mapping[str, Any]
 
-    def make(self, folder: Path) -> Made:
-        return self.maker(folder, self.seed, **self.arguments)
+    def make(self) -> Case:
+        return replace(self.maker(self.seed, **self.arguments), seed=self.seed)
 
 
-def in_turn(kinds: Sequence[Sequence[Case]]) -> list[Case]:
+def in_turn(kinds: Sequence[Sequence[Plan]]) -> list[Plan]:
     """Each kind spread evenly over the whole, so that a run that is cut has some of each."""
-    order = [(rank / len(cases), number, rank) for number, cases in enumerate(kinds) for rank in range(len(cases))]
+    order = [(rank / len(plans), number, rank) for number, plans in enumerate(kinds) for rank in range(len(plans))]
     return [kinds[number][rank] for _, number, rank in sorted(order)]
 
 
@@ -80,30 +63,31 @@ class Options:
 # --- matched rigs -----------------------------------------------------------------------------------------------------
 
 
-def null(folder: Path, seed: int, options: Options) -> Made:
+def null(seed: int, options: Options) -> Case:
     """Nothing hidden."""
-    return _files(folder, _fitting_hand((), seed, 0, options), seed, options)
+    return _case(_fitting_hand((), seed, 0, options), seed, options)
 
 
-def single(folder: Path, seed: int, options: Options, effect: str, strength: float) -> Made:
+def single(seed: int, options: Options, effect: str, strength: float) -> Case:
     """One effect, of the list or not, at a strength."""
     hand, label = _suitable(effect, strength, seed, options, absorbed=False)
     truths = () if effect in UNKNOWN else (_truth_of(label),)
-    return _files(folder, hand, seed, options, truths, _facts_of(label) | {"hidden": effect})
+    return _case(hand, seed, options, truths, _facts_of(label) | {"hidden": effect})
 
 
-def absorbed(folder: Path, seed: int, options: Options, effect: str) -> Made:
+def absorbed(seed: int, options: Options, effect: str) -> Case:
     """One effect that refitting absorbs, at its usual size; and how strong it is where a motion shows it best."""
     hand, label = _suitable(effect, None, seed, options, absorbed=True)
 
-    def experiment(motion: Mapping[str, Any]) -> Path:
-        return _write(folder / "experiment.parquet", perform(hand, motion, seed).columns)
+    def experiment(motion: Mapping[str, Any]) -> pd.DataFrame:
+        frame: pd.DataFrame = pd.DataFrame(perform(hand, motion, seed).columns)
+        return frame
 
     facts = _facts_of(label) | {"shown_strength": shown_strength(hand, seed, options.seconds)}
-    return replace(_files(folder, hand, seed, options, (_truth_of(label),), facts), experiment=experiment)
+    return replace(_case(hand, seed, options, (_truth_of(label),), facts), experiment=experiment)
 
 
-def double(folder: Path, seed: int, options: Options, effects: Sequence[str], strength: float) -> Made:
+def double(seed: int, options: Options, effects: Sequence[str], strength: float) -> Case:
     """Two effects, each of the strength by itself."""
     for attempt in range(ATTEMPTS):
         hand = _fitting_hand(effects, seed, attempt, options)
@@ -126,11 +110,11 @@ def double(folder: Path, seed: int, options: Options, effects: Sequence[str], st
         base = scaled_hands[1] if hidden[0].hand is None else scaled_hands[0]
         both = replace(base, hidden=tuple(scaled_hand.hidden[0] for scaled_hand in scaled_hands))
         facts = {"strength": labels[0]["strength"], "second": labels[1]["strength"]}
-        return _files(folder, both, seed, options, tuple(map(_truth_of, labels)), facts)
+        return _case(both, seed, options, tuple(map(_truth_of, labels)), facts)
     raise Unreachable(f"{effects}: no finger of {ATTEMPTS} with both; expected another seed")
 
 
-def contact(folder: Path, seed: int, options: Options) -> Made:
+def contact(seed: int, options: Options) -> Case:
     """Nothing hidden, but somebody touches the finger a few times and no label says so."""
     hand = _fitting_hand((), seed, 0, options)
     rng = np.random.default_rng([seed, 64])
@@ -140,7 +124,7 @@ def contact(folder: Path, seed: int, options: Options) -> Made:
         length, joint = rng.uniform(0.3, 1.0), int(rng.integers(options.joints))
         phase = np.clip((time - begin) / length, 0.0, 1.0)
         load[:, joint] += rng.uniform(*PUSH) * rng.choice([-1.0, 1.0]) * np.sin(np.pi * phase)
-    return _files(folder, hand, seed, options, external=load)
+    return _case(hand, seed, options, external=load)
 
 
 def _fitting_hand(effects: Collection[str], seed: int, attempt: int, options: Options) -> Hand:
@@ -179,38 +163,29 @@ def _suitable(effect: str, strength: float | None, seed: int, options: Options, 
     raise Unreachable(f"{effect}: no finger of {ATTEMPTS} where it has strength {strength}; expected another seed")
 
 
-def _files(
-    folder: Path,
+def _case(
     hand: Hand,
     seed: int,
     options: Options,
     truths: tuple[Truth, ...] = (),
     facts: Mapping[str, Any] | None = None,
     external: Any = None,
-) -> Made:
-    """Write recording and nominal, and recordings of other motions where they are asked for."""
-    recording, nominal = record(hand, seed, options.seconds, external=external).write(folder)
-    names = ["test"] * (options.test > 0) + [f"gain_{k + 1}" for k in range(options.gain_recordings)]
-    others = [
-        _write(folder / f"{name}.parquet", record(hand, seed + number * OTHER_MOTION, options.test).columns)
-        for number, name in enumerate(names, start=1)
-    ]
+) -> Case:
+    """The recording, and those of other motions that are asked for."""
+    motions = (options.test > 0) + options.gain_recordings
+    others = [record(hand, seed + number * OTHER_MOTION, options.test) for number in range(1, motions + 1)]
+    frames = [pd.DataFrame(made.columns) for made in others]
     known = {"joints": len(hand.truth["joints"]), "wander": options.wander, "presliding": options.presliding}
-    return Made(
-        rig="matched",
-        finger=nominal,
-        recordings=(recording,),
+    return Case(
+        machine="matched",
+        finger=hand.nominal,
+        recordings=[pd.DataFrame(record(hand, seed, options.seconds, external=external).columns)],
         kinematics=hand.source,
         truths=truths,
-        test=tuple(others[:1]),
-        gain_recordings=tuple(others[1:]),
+        test=frames[:1],
+        gain_recordings=frames[1:],
         facts=known | dict(facts or {}),
     )
-
-
-def _write(file: Path, columns: Mapping[str, Any]) -> Path:
-    pq.write_table(pa.table(dict(columns)), file)
-    return file
 
 
 def _truth_of(label: Mapping[str, Any]) -> Truth:
@@ -224,43 +199,37 @@ def _facts_of(label: Mapping[str, Any]) -> dict[str, Any]:
 # --- foreign fingers: in MuJoCo all is the seed's; the five numpy fingers are what they are, and the rest is the seed's
 
 
-def numpy_finger(folder: Path, seed: int, number: int, seconds: float, gain_recordings: int) -> Made:
+def numpy_finger(seed: int, number: int, seconds: float, gain_recordings: int) -> Case:
     """A case of numpy_cases.py. The test and the recordings for the true gain are as long as the first one."""
-    case = numpy_cases.make(number, seconds, seconds, seed)
+    made = numpy_cases.make(number, seconds, seconds, seed)
     simulator = numpy_cases.PLANS[number - 1].simulator
     random = np.random.default_rng((seed, number, 3))
-    made = foreign_files(folder, dataclasses.replace(case, nominal=_rougher(case.nominal, random)))
-    gains = [folder / f"gain_{k + 1}.parquet" for k in range(gain_recordings)]
-    for file in gains:
-        numpy_cases.recording(simulator.simulate(case.truth.hidden, seconds, random)).to_parquet(file, index=False)
-    return replace(made, gain_recordings=tuple(gains))
+    case = foreign_finger(dataclasses.replace(made, nominal=_rougher(made.nominal, random)))
+    gains = [simulator.simulate(made.truth.hidden, seconds, random) for _ in range(gain_recordings)]
+    return replace(case, gain_recordings=[numpy_cases.recording(gain) for gain in gains])
 
 
-def mujoco_finger(folder: Path, seed: int, number: int, joints: int, seconds: float, rate: float) -> Made:
+def mujoco_finger(seed: int, number: int, joints: int, seconds: float, rate: float) -> Case:
     """A case of mujoco_cases.py with as many joints. rate: Hz, at most. Nobody looks at its test."""
     from evidence.fingers import mujoco_cases  # mujoco need not be there for the other family
 
     plan = mujoco_cases.PLANS[number - 1]
     plan = dataclasses.replace(plan, joints=joints, rate=min(plan.rate, rate))
-    return replace(foreign_files(folder, mujoco_cases.of_plan(plan, number, seed, seconds, 1.0)), test=())
+    return replace(foreign_finger(mujoco_cases.of_plan(plan, number, seed, seconds, 1.0)), test=())
 
 
-def foreign_files(folder: Path, case: foreign.Case) -> Made:
-    """Write the files of a foreign case."""
-    finger, train, test = folder / "finger.json", folder / "train.parquet", folder / "test.parquet"
-    finger.write_text(json.dumps(case.nominal), encoding="utf-8")
-    case.train.to_parquet(train, index=False)
-    case.test.to_parquet(test, index=False)
-    truth = case.truth
+def foreign_finger(made: foreign.Case) -> Case:
+    """The case of a foreign finger, by its joint angles where it has any."""
+    truth = made.truth
     listed = truth.hidden not in ("none", "contact") and not truth.hidden.startswith("unknown")
-    return Made(
-        rig=case.family,
-        finger=finger,
-        recordings=(train,),
-        kinematics=2 if any(name.startswith("joint_position") for name in case.train.columns) else 1,
+    return Case(
+        machine=made.family,
+        finger=made.nominal,
+        recordings=[made.train],
+        kinematics=2 if "joint_position[1]" in made.train else 1,
         truths=(Truth((truth.hidden,), truth.joint, truth.tendon),) if listed else (),
         also=("presliding", *truth.also),
-        test=(test,),
+        test=[made.test],
         facts={"joints": truth.joints, "hidden": truth.hidden, "hidden_rms": truth.rms or 0.0},
     )
 

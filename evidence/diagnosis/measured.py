@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evidence.fingers.matched_strength import averaged, orthonormal
 from tendonfmu.model.native import run_recording
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ Description = dict[str, Any]
 BLOCK = 0.01  # s
 STEP = 1e-4  # relative, of numeric derivatives
 CLOSE = 0.03  # how near to a strength, relative
+ROUNDS = 20  # of the search for a strength
 LEANING = 0.8  # rad
 SLOW_SHARE = 0.15  # of the usual speed: what is near standstill
 
@@ -286,8 +288,7 @@ def residual(machine: Machine, columns: Columns) -> Array:
     arrays = {key.removesuffix("[1]"): value if key == "time" else value[:, None] for key, value in columns.items()}
     outputs = run_recording(machine.model, arrays, machine.kinematics)
     left = (outputs["compensated_torque"][:, 0] - columns[LOAD]).astype(float)
-    size = max(1, round(BLOCK / float(np.median(np.diff(columns["time"])))))
-    return np.asarray(left[: len(left) // size * size].reshape(-1, size).mean(axis=1))
+    return averaged(left, max(1, round(BLOCK / float(np.median(np.diff(columns["time"]))))))
 
 
 def residuals(machine: Machine) -> Array:
@@ -322,9 +323,29 @@ def bent(machine: Machine) -> Array:
         if key == "coulomb" and "static" in at:
             at["static"] += change
         columns.append((residuals(replace(machine, model=moved)) - start) / STEP)
-    lengths = [len(residual(machine, each)) for each in machine.recordings.values()]
+    lengths = [len(residual(machine, recording)) for recording in machine.recordings.values()]
     columns += list(np.repeat(np.eye(len(lengths)), lengths, axis=1))
-    matrix = np.column_stack(columns)
-    matrix = matrix[:, np.linalg.norm(matrix, axis=0) > 0.0]
-    left, size, _ = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), full_matrices=False)
-    return np.asarray(left[:, size > 1e-9 * size[0]])
+    return orthonormal(np.column_stack(columns))
+
+
+def less(values: Array, columns: Array) -> Array:
+    return np.asarray(values - columns @ (columns.T @ values))
+
+
+def magnitude_of(strength: float, strength_at: Callable[[float], float], first: float, most: float) -> float:
+    """The magnitude that has the strength: by proportion until it lies between two, then between them.
+
+    Raises ValueError where none up to `most` has it.
+    """
+    low, high, magnitude = 0.0, np.inf, min(first, most)
+    for _ in range(ROUNDS):
+        reached = strength_at(magnitude)
+        if abs(reached / strength - 1.0) < CLOSE:
+            return magnitude
+        low, high = (magnitude, high) if reached < strength else (low, magnitude)
+        if low >= most:
+            break
+        wanted = min(magnitude * float(np.sqrt(strength / reached)), most)
+        between = low < wanted < high and not (low > 0.0 and high < np.inf)
+        magnitude = wanted if between or high == np.inf else float(np.sqrt(max(low, 0.01 * high) * high))
+    raise ValueError(f"strength {strength:g}: no sound magnitude of this change has it; tried up to {magnitude:g}")

@@ -1,29 +1,25 @@
 """How often effects hidden in the EMPS and da Vinci recordings are found: python -m evidence.diagnosis.measured_cases
 
-What is to be hidden is first taken off recording and model where they have it already, so that on the unaltered
-recording there is nothing to name: that is the null. Strength: variance of the torque that the effect adds and that
-refitting the model's own numbers cannot absorb, over the variance of what the model leaves of the unaltered recording,
-both in blocks of 10 ms. Needs the recordings in ../shared/data or $TENDONFMU_DATA. Writes FOLDER/measured.md.
+What is to be hidden is first taken off recording and model where they have it already. Strength: variance of the torque
+that the effect adds and that refitting the model's own numbers cannot absorb, over that of what the model leaves of the
+unaltered recording, both in blocks of 10 ms. Needs ../shared/data or $TENDONFMU_DATA. Writes FOLDER/measured.md.
 """
 
 from __future__ import annotations
 
 import copy
-import json
 import math
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from evidence.diagnosis.campaign import causes_of
-from evidence.diagnosis.change_measured import KINEMATICS, less, recording
+from evidence.diagnosis.case import Case, causes_of
+from evidence.diagnosis.change_measured import KINEMATICS, recording
 from evidence.diagnosis.measured import (
-    CLOSE,
     EFFECTS,
     FORCE,
     Array,
@@ -37,6 +33,8 @@ from evidence.diagnosis.measured import (
     built_up,
     diagnosed_model,
     first_magnitude,
+    less,
+    magnitude_of,
     put,
     residuals,
     rows_of,
@@ -46,8 +44,6 @@ from evidence.diagnosis.measured import (
 from evidence.judge import Truth, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import Row, by, count, table
-from tendonfmu.diagnosis import diagnose
-from tendonfmu.files.tables import write_table
 
 MACHINES = ("emps", "davinci")
 STRENGTHS = (0.03, 0.1, 0.3, 1.0)
@@ -55,16 +51,20 @@ NOTHING = "nothing"  # the unaltered recording
 SECONDS = 16.5  # da Vinci: before run 07 jams
 RUNS, CHOSEN = ("00", "02", "04", "06", "08"), 3  # da Vinci: even loads, which the model was diagnosed with; of a case
 WINDOWS = ((0.0, 24.9), (0.0, 18.7), (6.2, 24.9), (3.1, 21.8))  # s, EMPS: cycles of 6.24 s
-ROUNDS = 8  # of scaling to a strength
 
 
 # --- machines without an effect: recordings less what the model says of it, and the model without it ------------------
 
+Taken = Callable[[Columns], Columns]
 
-def without_rows(model: Description, *effects: str) -> Description:
-    model = copy.deepcopy(model)
+
+def without(machine: Machine, taken: Taken, *effects: str, **joint: None) -> Machine:
+    """Recordings changed by `taken`; the model without the rows of these effects, and with these keys of its joint."""
+    model = copy.deepcopy(machine.model)
     model["extensions"] = [row for row in model.get("extensions") or [] if row["effect"] not in effects]
-    return model
+    model["joints"][0] |= joint
+    recordings = {name: taken(columns) for name, columns in machine.recordings.items()}
+    return replace(machine, model=model, recordings=recordings)
 
 
 def law_torque(law: Description, speed: Array, side: Array) -> Array:
@@ -72,7 +72,8 @@ def law_torque(law: Description, speed: Array, side: Array) -> Array:
 
     def one(half: Description) -> Array:
         drop, slow = half["static"] - half["coulomb"], half["stribeck_velocity"]
-        return half["coulomb"] + drop * np.exp(-np.abs(speed) / slow) + half.get("viscous", 0.0) * np.abs(speed)
+        fading = drop * np.exp(-np.abs(speed) / slow)
+        return np.asarray(half["coulomb"] + fading + half.get("viscous", 0.0) * np.abs(speed))
 
     forward, back = law.get("positive", law), law.get("negative", law)
     return np.where(side > 0, one(forward), -one(back))
@@ -80,16 +81,14 @@ def law_torque(law: Description, speed: Array, side: Array) -> Array:
 
 def free_of_friction(machine: Machine) -> Machine:
     """Recordings less the joint's own friction by the model, which then has none."""
-    law = machine.model["joints"][0]["friction"]
-    near = rows_of(machine.model, "stribeck")
-    sliding = rows_of(machine.model, "presliding")
+    joint, sliding = machine.model["joints"][0], rows_of(machine.model, "presliding")
     constant = sum(row["coulomb"] for row in rows_of(machine.model, "preload_friction")) * machine.arm
 
     def taken(columns: Columns) -> Columns:
         speed = speed_of(machine, columns)
         side = np.where(speed < 0, -1.0, 1.0)
-        torque = law_torque(law, speed, side)
-        for row in near:
+        torque = law_torque(joint["friction"], speed, side)
+        for row in rows_of(machine.model, "stribeck"):
             torque = torque * (1.0 + row["amplitude"] * np.exp(-np.abs(speed) / row["stribeck_velocity"]))
         for row in sliding:
             step = np.diff(angle_of(machine, columns), prepend=angle_of(machine, columns)[0])
@@ -97,10 +96,8 @@ def free_of_friction(machine: Machine) -> Machine:
         return add_torque(machine, columns, -torque - constant * side)
 
     # presliding stays where the joint has friction that grows with the load, which it acts on too
-    kept = machine.model["joints"][0].get("load_friction") is not None
-    model = without_rows(machine.model, "stribeck", "preload_friction", *([] if kept else ["presliding"]))
-    model["joints"][0]["friction"] = None
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
+    gone = () if joint.get("load_friction") is not None else ("presliding",)
+    return without(machine, taken, "stribeck", "preload_friction", *gone, friction=None)
 
 
 def free_of_delay(machine: Machine) -> Machine:
@@ -110,31 +107,27 @@ def free_of_delay(machine: Machine) -> Machine:
         return machine
     late = rows[0]["delay"]  # negative: the force of t answers to the motion of t − late
 
-    def moved(columns: Columns) -> Columns:
+    def taken(columns: Columns) -> Columns:
         return columns | {FORCE: np.interp(columns["time"] + late, columns["time"], columns[FORCE])}
 
-    model = without_rows(machine.model, "time_delay")
-    return replace(machine, model=model, recordings={k: moved(v) for k, v in machine.recordings.items()})
+    return without(machine, taken, "time_delay")
 
 
 def free_of_spring(machine: Machine) -> Machine:
     """Recordings less all torques that follow the angle alone, as the model has them: cover and weight."""
     cover = machine.model["joints"][0].get("cover") or {"stiffness": 0.0, "rest_angle": 0.0}
-    weights, cubes = rows_of(machine.model, "gravity"), rows_of(machine.model, "cover_hardening")
 
     def taken(columns: Columns) -> Columns:
         angle = angle_of(machine, columns)
         bent = angle - cover.get("rest_angle", 0.0)
         torque = cover["stiffness"] * bent
-        for row in weights:
+        for row in rows_of(machine.model, "gravity"):
             torque = torque + row.get("sine", 0.0) * np.sin(angle) + row.get("cosine", 0.0) * np.cos(angle)
-        for row in cubes:
+        for row in rows_of(machine.model, "cover_hardening"):
             torque = torque + row["stiffness"] * bent**3
         return add_torque(machine, columns, -torque)
 
-    model = without_rows(machine.model, "gravity", "cover_hardening")
-    model["joints"][0].pop("cover", None)
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
+    return without(machine, taken, "gravity", "cover_hardening", cover=None)
 
 
 def free_of_growth(machine: Machine) -> Machine:
@@ -148,17 +141,12 @@ def free_of_growth(machine: Machine) -> Machine:
     def taken(columns: Columns) -> Columns:
         return add_torque(machine, columns, -lost * np.abs(columns[FORCE]) * side_of(machine, columns))
 
-    model = without_rows(machine.model, "load_friction")
-    return replace(machine, model=model, recordings={k: taken(v) for k, v in machine.recordings.items()})
-
-
-def free_of_coulomb(machine: Machine) -> Machine:
-    """Friction is taken off at the time at which it acts, so the forces are moved there first."""
-    return free_of_friction(free_of_delay(machine))
+    return without(machine, taken, "load_friction")
 
 
 FREE: Mapping[str, Callable[[Machine], Machine]] = {
-    "coulomb": free_of_coulomb,
+    # friction is taken off at the time at which it acts, so the forces are moved there first
+    "coulomb": lambda machine: free_of_friction(free_of_delay(machine)),
     "gain": lambda machine: machine,
     "delay": free_of_delay,
     "spring": free_of_spring,
@@ -173,17 +161,13 @@ def hide(machine: Machine, effect: Effect, strength: float, sign: float = 1.0) -
     """The effect at a strength. machine: freed of it. Raises ValueError where no magnitude has the strength."""
     before, nuisance = residuals(machine), bent(machine)
     noise = less(before, nuisance)
-    magnitude = first_magnitude(effect, machine)
-    for _ in range(ROUNDS):
-        if not magnitude <= effect.most:
-            break
-        changed = put(machine, effect, sign * magnitude)
-        left = less(residuals(changed) - before, nuisance)
-        reached = float(left @ left) / float(noise @ noise)
-        if abs(reached / strength - 1.0) < CLOSE:
-            return changed
-        magnitude *= float(np.sqrt(strength / reached))
-    raise ValueError(f"strength {strength}: no sound magnitude of this effect has it; tried up to {magnitude:g}")
+
+    def strength_at(magnitude: float) -> float:
+        left = less(residuals(put(machine, effect, sign * magnitude)) - before, nuisance)
+        return float(left @ left) / float(noise @ noise)
+
+    magnitude = magnitude_of(strength, strength_at, first_magnitude(effect, machine), effect.most)
+    return put(machine, effect, sign * magnitude)
 
 
 def window(columns: Mapping[str, Array], begin: float, end: float) -> Columns:
@@ -215,13 +199,8 @@ def run_case(name: str, effect: str, strength: float, part: int) -> dict[str, An
             machine = hide(FREE[effect](machine), EFFECTS[effect], strength, sign)
         except ValueError as impossible:
             return row | {"impossible": str(impossible)}
-    with tempfile.TemporaryDirectory() as scratch:
-        finger = Path(scratch) / "nominal.json"
-        finger.write_text(json.dumps(machine.model), encoding="utf-8")
-        files = [Path(scratch) / f"{run}.parquet" for run in machine.recordings]
-        for file, columns in zip(files, machine.recordings.values(), strict=True):
-            write_table(file, columns)
-        diagnosis = diagnose(finger, files, [], kinematics=machine.kinematics, seed=part)
+    recordings = [pd.DataFrame(columns) for columns in machine.recordings.values()]
+    diagnosis = Case(name, machine.model, recordings, machine.kinematics, seed=part).diagnosed()
     judgement = judge(causes_of(diagnosis), Truth(EFFECTS[effect].names if effect != NOTHING else ()))
     return row | {
         "verdict": diagnosis.verdict,

@@ -70,9 +70,8 @@ def plain(view: View) -> Plain:
     nominal, columns = bare(view.columns.nominal), bare(view.columns.values)
     span = basis(nominal.reshape(-1, nominal.shape[2]))
     trials = tuple(
-        Trial(Where(proposal.candidate.name, proposal.place.joint, proposal.place.tendon), shape.columns)
+        Trial(Where(proposal.candidate.name, proposal.place.joint, proposal.place.tendon), proposal.columns)
         for proposal in view.columns.proposals
-        for shape in proposal.shapes
     )
     return Plain(view.residual[used].reshape(-1), without(columns.reshape(-1, columns.shape[2]), span), trials)
 
@@ -128,7 +127,7 @@ def by_bic(data: Plain, power: Numbers) -> Trial | None:
 
     def fall(trial: Trial) -> float:
         explained = float(np.sum((basis(data.of(trial)).T @ data.target) ** 2)) if shows(trial, power) else 0.0
-        return -rows * np.log(max(1.0 - explained / total, 1e-12)) - len(trial.numbers) * np.log(rows)
+        return float(-rows * np.log(max(1.0 - explained / total, 1e-12)) - len(trial.numbers) * np.log(rows))
 
     best = max(data.trials, key=fall, default=None)
     return best if best is not None and fall(best) > 0.0 else None

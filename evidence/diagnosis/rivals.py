@@ -1,29 +1,27 @@
-"""`diagnose` and its rivals on the same cases, in one table: python -m evidence.diagnosis.rivals -o FOLDER
+"""`diagnose` and its rivals (rival_methods.py) on the same cases: python -m evidence.diagnosis.rivals -o FOLDER
 
-Every case has a training recording of 30 s and a test recording of 15 s. Matched: 12 with nothing hidden, each effect
-of the list once at a strength of 0.3, each effect that is not on it at 0.3 and at 1. Foreign: the even cases in numpy
-and MuJoCo, without what refitting absorbs; their sizes are their own. Writes FOLDER/rivals.md. The rivals (see
-rival_methods.py) work on the very residual and columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without
-them sindy and knockoffs are left out) and requirements-foreign.lock.
+Foreign: the even cases in numpy and MuJoCo, without what refitting absorbs. The rivals work on the very residual and
+columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without them sindy and knockoffs are left out) and
+requirements-foreign.lock. Writes FOLDER/rivals.md.
 """
 
 from __future__ import annotations
 
 import contextlib
 import statistics
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from evidence.diagnosis import makers, rival_methods
-from evidence.diagnosis.campaign import ALARMS, causes_of, diagnosed, row_of
-from evidence.diagnosis.foreign_cases import is_absorbed, is_outside, module_of
+from evidence.diagnosis.campaign import row_of
+from evidence.diagnosis.case import Case, causes_of, leaves_unnamed
+from evidence.diagnosis.foreign_cases import is_absorbed, is_outside
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
-from evidence.diagnosis.makers import Case, Made, Options
+from evidence.diagnosis.makers import Options, Plan
 from evidence.fingers import foreign
-from evidence.judge import SYNONYMS, Cause, Truth, effects_of, judge
+from evidence.fingers.families import module_of
+from evidence.judge import SYNONYMS, Cause, Truth, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import NOTHING, Row, count, table
 from tendonfmu.diagnosis.cause import Where
@@ -31,7 +29,7 @@ from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.model import read_finger
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.recordings import Held, prepare, read_recording
 
 TRAIN, TEST = 30.0, 15.0  # s
@@ -44,52 +42,51 @@ OWN = "diagnose"
 # --- cases ------------------------------------------------------------------------------------------------------------
 
 
-def all_cases(seed: int) -> list[Case]:
+def all_plans(seed: int) -> list[Plan]:
     """Both kinds alternate, so that an interrupted run has some of each. seed: of the matched rigs."""
     matched = makers.in_turn([list(_nulls(seed)), list(_singles(seed)), list(_unlisted(seed))])
     return makers.in_turn([matched, list(_foreign())])
 
 
-def _matched(name: str, group: str, maker: Callable[..., Made], seed: int, options: Options, **given: Any) -> Case:
-    options = replace(options, seconds=TRAIN, test=TEST)
-    return Case(name, group, seed, maker, {"options": options, **given})
+def _matched(name: str, group: str, seed: int, options: Options, **given: Any) -> Plan:
+    maker = makers.single if given else makers.null
+    return Plan(name, group, seed, maker, {"options": replace(options, seconds=TRAIN, test=TEST), **given})
 
 
-def _nulls(seed: int) -> Iterator[Case]:
+def _nulls(seed: int) -> Iterator[Plan]:
     """Half with presliding, half with a bias that wanders three times as much, two thirds of one joint."""
     for k in range(NULLS):
         options = Options(wander=3.0 if k % 4 >= 2 else 1.0, joints=2 if k % 3 == 0 else 1, presliding=k % 2 == 1)
-        yield _matched(f"null_{k}", "null", makers.null, seed + k, options)
+        yield _matched(f"null_{k}", "null", seed + k, options)
 
 
-def _singles(seed: int) -> Iterator[Case]:
+def _singles(seed: int) -> Iterator[Plan]:
     for number, effect in enumerate(BUILDERS):
         if effect != "force_offset":  # refitting always absorbs it
-            name, options = f"{effect}_{STRENGTH:g}_0", Options(presliding=number % 2 == 1)
-            given = {"effect": effect, "strength": STRENGTH}
-            yield _matched(name, "single", makers.single, seed + 1000 + number, options, **given)
+            options, given = Options(presliding=number % 2 == 1), {"effect": effect, "strength": STRENGTH}
+            yield _matched(f"{effect}_{STRENGTH:g}_0", "single", seed + 1000 + number, options, **given)
 
 
-def _unlisted(seed: int) -> Iterator[Case]:
+def _unlisted(seed: int) -> Iterator[Plan]:
     for effect in UNKNOWN:
         for strength in (STRENGTH, 1.0):
             given = {"effect": effect, "strength": strength}
-            yield _matched(f"{effect}_{strength:g}_0", "unknown", makers.single, seed + 400_000, Options(), **given)
+            yield _matched(f"{effect}_{strength:g}_0", "unknown", seed + 400_000, Options(), **given)
 
 
-def _foreign() -> Iterator[Case]:
+def _foreign() -> Iterator[Plan]:
     for family in ("numpy", "mujoco"):
         for number, plan in enumerate(module_of(family).PLANS, 1):
             truth = foreign.Truth(plan.hidden, joints=0, survives=getattr(plan, "survives", None))
             if number % 2 or is_absorbed(truth) or truth.hidden == "contact":
                 continue
             group = "null" if truth.hidden == "none" else "unknown" if is_outside(truth) else "single"
-            yield Case(f"{family}_{number:02d}", group, 0, foreign_case, {"family": family, "number": number})
+            yield Plan(f"{family}_{number:02d}", group, 0, foreign_case, {"family": family, "number": number})
 
 
-def foreign_case(folder: Path, seed: int, family: str, number: int) -> Made:
+def foreign_case(seed: int, family: str, number: int) -> Case:
     """The case of that number, whose seed is its own; joint angles are left unused."""
-    return replace(makers.foreign_files(folder, module_of(family).make(number, TRAIN, TEST)), kinematics=1)
+    return replace(makers.foreign_finger(module_of(family).make(number, TRAIN, TEST)), kinematics=1)
 
 
 # --- one case ---------------------------------------------------------------------------------------------------------
@@ -106,22 +103,20 @@ class Answer:
     names: bool = True  # whether it names anything at all
 
 
-def run_case(case: Case) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as folder:
-        made = case.make(Path(folder))
-        diagnosis = diagnosed(case, made)
-        causes = causes_of(diagnosis)
-        unnamed = diagnosis.verdict in ALARMS or any("unknown" in effects_of(cause) for cause in causes[:1])
-        answers = {OWN: Answer(causes, unnamed=unnamed, gain=diagnosis.gain.value), **rival_answers(made)}
-    return row_of(case, made) | {"answers": {who: judged(made, answer) for who, answer in answers.items()}}
+def run_case(plan: Plan) -> dict[str, Any]:
+    case = plan.make()
+    diagnosis = case.diagnosed()
+    diagnosed = Answer(causes_of(diagnosis), unnamed=leaves_unnamed(diagnosis), gain=diagnosis.gain.value)
+    answers = {OWN: diagnosed, **rival_answers(case)}
+    return row_of(plan, case) | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
 
 
-def rival_answers(made: Made) -> dict[str, Answer]:
+def rival_answers(case: Case) -> dict[str, Answer]:
     """The rivals on a case, from the signals that `diagnose` chooses."""
-    finger = read_finger(made.finger)
+    finger = read_finger(case.finger)
     recordings, tests = (
-        [prepare(finger, read_recording(path), made.kinematics, Held()) for path in paths]
-        for paths in (made.recordings, made.test)
+        [prepare(finger, read_recording(frame), case.kinematics, Held()) for frame in frames]
+        for frames in (case.recordings, case.test)
     )
     chosen = choose(finger, recordings, FitSettings(threads=1))
     answers = answers_of(look(chosen.nominal.data, chosen.recordings, chosen.grid, chosen.least))
@@ -147,12 +142,12 @@ def _causes(places: Iterator[Where] | Sequence[Where]) -> list[Cause]:
     return [{"effect": where.effect, "joint": where.joint, "tendon": where.tendon} for where in places]
 
 
-def judged(made: Made, answer: Answer) -> dict[str, Any]:
+def judged(case: Case, answer: Answer) -> dict[str, Any]:
     """The same questions for everybody; on foreign fingers presliding is never false. None: it does not arise."""
     truth = replace(
-        made.truths[0] if made.truths else Truth(),
-        allowed=made.also,
-        neutral=("unknown",) if made.rig == "matched" else ("presliding", "unknown"),
+        case.truths[0] if case.truths else Truth(),
+        allowed=case.also,
+        neutral=("unknown",) if case.machine == "matched" else ("presliding", "unknown"),
         synonyms=SYNONYMS,
     )
     causes = [cause for cause in answer.causes if cause["effect"] not in truth.neutral]
@@ -162,7 +157,7 @@ def judged(made: Made, answer: Answer) -> dict[str, Any]:
     alone = not answer.one_of or judgement.set_size == 1
     return {
         "names": answer.names,
-        "false": len(judgement.false if made.truths else judgement.named),
+        "false": len(judgement.false if case.truths else judgement.named),
         "in_set": judgement.in_set,
         "first": judgement.first and alone,
         "at_place": judgement.at_place if judgement.in_set else None,
@@ -236,7 +231,7 @@ def markdown(rows: Sequence[Row]) -> str:
 
 def main() -> None:
     given = parser(__doc__).parse_args()
-    cases = {case.name: (case,) for case in all_cases(SEED)}
+    cases = {plan.name: (plan,) for plan in all_plans(SEED)}
     rows = run_cases(run_case, cases, given.output, given.workers, given.scheduler, keep_errors=True)
     publish(given.output / "rivals.md", markdown(rows))
 

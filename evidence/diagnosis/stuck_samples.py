@@ -7,10 +7,9 @@ mujoco_cases.py (1, 2 and 20, of one and two joints), with nothing hidden. Write
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 from unittest import mock
 
@@ -30,17 +29,16 @@ WAYS = ("always count", "may be left out")
 @contextmanager
 def searching(way: str) -> Iterator[None]:
     """A search for which stuck samples count in this way."""
-    alone: Callable[..., object] = search.sliding_alone if way == WAYS[1] else lambda *given: None
+    alone = vars(search)["sliding_alone"] if way == WAYS[1] else lambda *given: None
     with mock.patch.object(search, "sliding_alone", alone):
         yield
 
 
 def of_sticking_finger(hidden: str, way: str, seed: int) -> dict[str, Any]:
     """Names, and errors of the friction as shares."""
-    with tempfile.TemporaryDirectory() as folder, searching(way):
-        weight = WEIGHT if hidden == "gravity" else 0.0
-        finger, recording = sticking_finger.write(Path(folder), SECONDS, seed, weight)
-        diagnosis = diagnose(finger, [recording], kinematics=2)
+    recording = sticking_finger.simulate(SECONDS, seed, WEIGHT if hidden == "gravity" else 0.0)
+    with searching(way):
+        diagnosis = diagnose(sticking_finger.description(), recording, kinematics=2)
     true = sticking_finger.friction_at(PULL)
     nominal, extended = (
         sticking_finger.described_friction_at(data, PULL) / true - 1.0
@@ -59,9 +57,8 @@ def of_sticking_finger(hidden: str, way: str, seed: int) -> dict[str, Any]:
 
 
 def of_mujoco(way: str, number: int, seed: int, joints: int) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as folder, searching(way):
-        made = mujoco_finger(Path(folder), seed, number, joints, 45.0, 500.0)
-        diagnosis = diagnose(made.finger, list(made.recordings), kinematics=2, seed=seed)
+    with searching(way):
+        diagnosis = replace(mujoco_finger(seed, number, joints, 45.0, 500.0), seed=seed).diagnosed()
     return {"way": way, "false": bool({cause.effect for cause in diagnosis.causes} - PHYSICS)}
 
 
@@ -94,13 +91,13 @@ def main() -> None:
         lines = by(rows, ["way"], lambda some: [count(row["false"] for row in some)])
         publish(given.output / "stuck_mujoco.md", table(("stuck samples", "a false name"), lines) + "\n")
         return
-    cases = {
+    by_hidden = {
         f"{hidden}_{seed}_{way.replace(' ', '_')}": (hidden, way, 100 + seed)
         for hidden in ("nothing", "gravity")
         for way in WAYS
         for seed in range(given.seeds)
     }
-    rows = run_cases(of_sticking_finger, cases, given.output, given.workers, given.scheduler)
+    rows = run_cases(of_sticking_finger, by_hidden, given.output, given.workers, given.scheduler)
     head = ("hidden", "stuck samples", "named", "a false name", "friction, nominal", "friction, extended", "gain")
     publish(given.output / "stuck.md", table(head, by(rows, ["hidden", "way"], cells), 2) + "\n")
 

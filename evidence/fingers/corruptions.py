@@ -29,7 +29,7 @@ class Corruption:
 
 
 def columns_of(frame: pd.DataFrame, group: str) -> list[str]:
-    return [column for column in frame if column == group or column.startswith(f"{group}[")]
+    return [str(column) for column in frame if str(column).split("[")[0] == group]
 
 
 def applicable(frame: pd.DataFrame, corruption: Corruption) -> bool:
@@ -82,7 +82,7 @@ def held(begin: float, end: float, frame: pd.DataFrame, columns: list[str]) -> p
     """A value held between two shares of the recording."""
     rows = slice(int(begin * len(frame)), int(end * len(frame)))
     for column in columns:
-        frame.iloc[rows, frame.columns.get_loc(column)] = frame[column].iloc[rows.start]
+        frame.loc[frame.index[rows], column] = frame[column].iloc[rows.start]
     return frame
 
 
@@ -102,13 +102,15 @@ def shifted_to_zero(frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
 
 def without(share: float, frame: pd.DataFrame, _: list[str]) -> pd.DataFrame:
     lost = np.random.default_rng(len(frame)).random(len(frame)) < share
-    return frame[~lost].reset_index(drop=True)
+    kept: pd.DataFrame = frame[~lost].reset_index(drop=True)
+    return kept
 
 
 def interrupted(frame: pd.DataFrame, _: list[str]) -> pd.DataFrame:
     """A second and a half missing in the middle."""
     middle = frame.time.iloc[len(frame) // 2]
-    return frame[(frame.time < middle) | (frame.time > middle + 1.5)].reset_index(drop=True)
+    kept: pd.DataFrame = frame[(frame.time < middle) | (frame.time > middle + 1.5)].reset_index(drop=True)
+    return kept
 
 
 def jittered(share: float, frame: pd.DataFrame, _: list[str]) -> pd.DataFrame:

@@ -68,12 +68,13 @@ def rms(values: Array) -> float:
 
 def frame(time: Array, force: Array, position: Array, angle: Array | None) -> pd.DataFrame:
     """The recording's columns from arrays (samples, tendons) [N], [m] and (samples, joints) [rad]."""
-    columns: dict[str, Array] = {"time": time}
+    columns = {"time": time}
     columns |= {f"tendon_force[{i + 1}]": force[:, i] for i in range(force.shape[1])}
     columns |= {f"tendon_position[{i + 1}]": position[:, i] for i in range(position.shape[1])}
     if angle is not None:
         columns |= {f"joint_position[{j + 1}]": angle[:, j] for j in range(angle.shape[1])}
-    return pd.DataFrame(columns)
+    made: pd.DataFrame = pd.DataFrame(columns)
+    return made
 
 
 def noisy(values: Array, std: float, rng: np.random.Generator) -> Array:

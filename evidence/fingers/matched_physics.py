@@ -1,10 +1,8 @@
 """Friction of a tendon finger in numpy, over all samples at once: what the matched rig is made of.
 
-Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with
-the runtime, the package or the oracle. Indices start at 0 here. A description is read as plain JSON data.
-
-Where the oracle walks from sample to sample, this file works on whole series: what moves and what sticks follows from
-the velocities alone, so that every bias jump can be placed at once.
+Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with the runtime,
+the package or the oracle. What moves and what sticks follows from the velocities alone, so that every bias jump can be
+placed at once. Indices start at 0 here.
 """
 
 from __future__ import annotations
@@ -51,6 +49,12 @@ def last_true(flags: Array) -> Array:
     return np.maximum.accumulate(np.where(flags, np.arange(len(flags)), -1))
 
 
+def held_sign(velocity: Array, threshold: float) -> Array:
+    """[N] sign of the last velocity above the threshold, 0 before there was one."""
+    last = last_true(np.abs(velocity) > threshold)
+    return np.where(last >= 0, np.sign(velocity[last]), 0.0)
+
+
 @dataclass
 class Effect:
     """One friction effect and what the series of its velocity made of it.
@@ -80,9 +84,7 @@ class Contacts:
 
 
 def contacts_of(velocity: Array, threshold: float) -> Contacts:
-    moving = np.abs(velocity) > threshold
-    last = last_true(moving)
-    side = np.where(last >= 0, np.sign(velocity[last]), 0.0)
+    moving, side = np.abs(velocity) > threshold, held_sign(velocity, threshold)
     enters = np.flatnonzero(moving[:-1] & ~moving[1:]) + 1
     leaves = np.flatnonzero(~moving[:-1] & moving[1:]) + 1
     position = np.searchsorted(enters, leaves) - 1
@@ -239,7 +241,7 @@ def friction_torque(finger: Finger, motion: Motion, values: Sequence[Values], fo
     """[N, n] T of eq. (10) and the jumps of the bias so far, for tendon forces [N, m]."""
     samples, joints = motion.angle.shape
     lost = np.zeros((samples, *finger.arms.shape))  # by tendon i at joint j: what eqs. (6), (7) sum up
-    torque = finger.cover * (motion.angle - finger.rest)
+    torque: Array = finger.cover * (motion.angle - finger.rest)
     by_place = {(effect.kind, effect.at): value for effect, value in zip(finger.effects, values, strict=True)}
     f, between = np.maximum(force, 0.0), np.zeros_like(lost)
     for j in range(joints):

@@ -1,18 +1,10 @@
-"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect.
+"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect (diagnosis/README.md).
 
     hand = random_hand(seed=1, joints=2)                       # the truth, and the tool's nominal description
     hidden = hide(hand, "load_friction", strength=0.1, seed=3) # hidden_effects.py; strength after refitting, over noise
-    made = record(hidden, seed=5, seconds=60.0)                # made.columns: a recording; made.nominal: for the tool
-    made.write(folder)                                         # recording.parquet, nominal.json
+    made = record(hidden, seed=5, seconds=60.0)                # made.columns: a recording; hand.nominal: for the tool
 
-The torque balance is Rᵀ f = T(q, q̇, f) + bias + noise (+ what is hidden); friction depends on the forces, so the
-forces are found by fixed-point iteration over the whole series at once. Bias wander and coloured noise are torques
-that act on the finger; encoders are quantised, force sensors have a little white noise of their own.
-
-"Matched": friction follows the velocity of the true angle (the nominal has no velocity filter, whose lag would be a
-delay of every recording), at rest the torque stays what it was (`entry_load`, forget_rate 0), or
-every effect has presliding in the form of its extension. What remains to the tool is noise, wander, quantisation
-and what was hidden.
+Friction depends on the forces: they are found by fixed-point iteration over the whole series at once.
 """
 
 from __future__ import annotations
@@ -27,15 +19,21 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import Finger, Motion, filtered_velocity, motion_of, read_finger, torque_of
+from evidence.fingers.matched_physics import (
+    Array,
+    Description,
+    Finger,
+    Motion,
+    filtered_velocity,
+    motion_of,
+    read_finger,
+    torque_of,
+)
 
-Array = NDArray[Any]
-Description = dict[str, Any]
 ITERATIONS = 60  # of the balance, at most: it contracts by some tenths of the friction coefficients
 BALANCED = 1e-9  # N
 
@@ -261,7 +259,7 @@ def wandering(rng: np.random.Generator, time: Array, knots: float) -> Array:
     """[N] smooth random signal between -1 and 1: a cubic through random values some `knots` seconds apart."""
     count = max(4, int((time[-1] - time[0]) / knots) + 2)
     places = np.linspace(time[0], time[-1], count)
-    return np.clip(CubicSpline(places, rng.uniform(-1.0, 1.0, count))(time), -1.0, 1.0)
+    return np.asarray(np.clip(CubicSpline(places, rng.uniform(-1.0, 1.0, count))(time), -1.0, 1.0))
 
 
 def pulling_null_vector(arms: Array) -> Array | None:
@@ -311,7 +309,7 @@ def coloured(rng: np.random.Generator, samples: int, width: int, step: float, no
 def balanced_forces(finger: Finger, motion: Motion, pretensions: Array, load: Array) -> Array:
     """[N, m] N with Rᵀ f = G(f) + load, by iteration; pretensions [N, m] make no torque. load [N, n]."""
     spread = np.linalg.pinv(finger.arms.T)
-    force = pretensions + load @ spread.T
+    force: Array = pretensions + load @ spread.T
     for _ in range(ITERATIONS):
         last = force
         force = pretensions + (torque_of(finger, motion, force) + load) @ spread.T

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from evidence.fingers.matched_physics import (
+    Array,
     Finger,
     Motion,
     filtered_velocity,
@@ -27,7 +26,6 @@ from evidence.fingers.matched_physics import (
 )
 from evidence.fingers.matched_rig import Hand, Made, record
 
-Array = NDArray[Any]
 BLOCK = 0.01  # s, over which series are averaged
 KNOTS = 2.0  # s, of the slow bias, which looks like a slow effect
 STEP = 1e-4  # relative, of the numeric derivative
@@ -44,7 +42,6 @@ class Seen:
 
     effect: Array
     nuisance: Array
-    blocks: int
 
 
 def group(columns: dict[str, Array], name: str) -> Array:
@@ -113,7 +110,7 @@ def splines(time: Array) -> Array:
 def look(hand: Hand, made: Made) -> Seen:
     """What the nominal model at its true numbers leaves of a quiet recording, and all that refitting can bend."""
     columns = np.hstack([number_columns(hand, made), bias_columns(hand, made)])
-    return Seen(residual(hand, made), orthonormal(columns), len(columns) // len(hand.truth["joints"]))
+    return Seen(residual(hand, made), orthonormal(columns))
 
 
 def number_columns(hand: Hand, made: Made) -> Array:
@@ -156,13 +153,6 @@ def surviving(seen: Seen, effect: Array, hand: Hand) -> tuple[float, float]:
     by_joint = np.mean(left.reshape(joints, -1) ** 2, axis=1)
     whole = float(flat @ flat)
     return float(by_joint.max() / hand.noise.std**2), float(left @ left) / whole if whole > 0.0 else 0.0
-
-
-def strength_of(hand: Hand, seed: int, seconds: float) -> tuple[float, float]:
-    """(strength, share) of what this hand hides in the recording of this seed."""
-    made = record(hand, seed, seconds, quiet=True)
-    seen = look(hand, made)
-    return surviving(seen, seen.effect, hand)
 
 
 # --- what another motion shows ----------------------------------------------------------------------------------------

@@ -187,7 +187,7 @@ def take_out(nominal: Nominal, plan: Plan) -> Nominal:
 
 def measured_force(trace: Trace, plan: Plan) -> Array:
     """Forces as the sensors give them, but for noise [N]: late, or off by a constant, where that is hidden."""
-    force = trace.force.copy()
+    force: Array = trace.force.copy()
     if plan.hidden == "time_delay":
         late = round(DELAY * plan.rate)
         force[late:] = trace.force[:-late]

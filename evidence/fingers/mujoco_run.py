@@ -183,7 +183,7 @@ def run(physics: Physics, truth: Truth, motion: Motion, seconds: float, rate: fl
     """Simulates and samples; the first SETTLE seconds are left out."""
     runner = Runner(physics, truth)
     data = runner.data
-    times = STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP))
+    times = np.asarray(STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP)), dtype=float)
     motors = motion.motors(times, physics)
     data.qpos[runner.hinges] = motion.angles(times[:1])[0]
     data.qpos[runner.motors] = motors[0]

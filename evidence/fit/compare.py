@@ -3,11 +3,8 @@
     pip install --require-hashes -r requirements-fit-peers.lock    # filterpy; left out where it is not there
     python -m evidence.fit.compare --output fit.json
 
-The index finger (472 numbers) over 400 s of an `excite` motion at 1 kHz; forces made by the model itself, with other
-numbers than the fit starts from, white noise and a wandering bias. Each way runs in a process of its own, one after the
-other, whose peak memory is the kernel's. The product uses all cores, the peers (peers.py) one. They take as many
-samples as they can finish, and their times are scaled by the samples; the iterations of least squares are its own, on
-the samples that it took. Before any time is worth anything they must agree with the product on those samples.
+Each way runs in a process of its own. The peers (peers.py) take as many samples as they can finish, and their times are
+scaled by the samples. Before any time is worth anything they must agree with the product on those samples.
 """
 
 from __future__ import annotations
@@ -112,7 +109,7 @@ def make_data(folder: Path, duration: float) -> None:
         for k, column in enumerate(array.T, start=1)
     }
     write_table(folder / f"{FILE}.parquet", {"time": motion.time} | columns)
-    np.savez(folder / f"{FILE}.npz", **arrays)
+    np.savez(folder / f"{FILE}.npz", allow_pickle=False, **arrays)
 
 
 def load(folder: Path, samples: int) -> dict[str, Array]:
@@ -268,7 +265,7 @@ def line_of(name: str, folder: Path, scale: float) -> dict[str, Any]:
     """One line of the table, as JSON: seconds as measured and as scaled to all samples, memory, agreement."""
     way = WAYS[name]
     figures = apart_from(name, folder, max(100, min(way.samples, round(FULL * scale))))
-    line = {"way": name, "what": way.what}
+    line: dict[str, Any] = {"way": name, "what": way.what}
     kept = ("missing", "samples", "seconds", "cpu_seconds", "peak_memory", "iterations", "passes", "converged", "cost")
     line |= {key: figures[key] for key in kept if key in figures}
     if "missing" in figures:

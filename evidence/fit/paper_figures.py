@@ -2,9 +2,7 @@
 
     python -m evidence.fit.paper_figures [-o docs/figures]        # 2 min of one core
 
-2b and 5: a finger with one joint, by the C core, beside the formula. 6 and 7: the friction of the simulated index
-finger, fitted at 10 N of pretension and predicted at 10 and 40 N. 8: pushes on that finger. The simulated finger knows
-its true friction and external torques, which the paper's hand could not measure. Writes paper_2b.png ... paper_8.png.
+The simulated finger knows its true friction and external torques. Writes paper_2b.png ... paper_8.png.
 """
 
 from __future__ import annotations
@@ -138,7 +136,7 @@ def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
 
 def joints_of(truth: pd.DataFrame, name: str) -> Numbers:
     """[N, n] of a signal of the truth."""
-    return truth[[column for column in truth.columns if column.startswith(f"{name}[")]].to_numpy()
+    return np.asarray(truth[[column for column in truth.columns if column.startswith(f"{name}[")]])
 
 
 def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:

@@ -1,9 +1,5 @@
 """The da Vinci jaw recalibrated on one recording of 20 s, judged on all others.
 
-The jaw with its diagnosed structure (examples/davinci/jaw_extended.json) is fitted on the even loads. It is then fitted
-again on each single run in turn, from the numbers as they were and with the joint's Coulomb friction changed by 30 %
-beforehand, and judged by compensated minus external torque on all other runs.
-
     python -m evidence.fit.recalibration [--change X ...]
 
 Needs the recordings in ../shared/data or $TENDONFMU_DATA. Prints the tables of docs/evidence/recalibration.md.
@@ -24,6 +20,7 @@ import numpy as np
 
 from evidence import tables
 from evidence.runner import EXAMPLES, parser
+from evidence.tables import Row
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import report_text, write_table
 from tendonfmu.model.native import run_recording
@@ -32,8 +29,6 @@ from tendonfmu.recordings import Recording, convert_file, read_recording
 
 sys.path.insert(0, str(EXAMPLES / "davinci"))
 from jaw_recordings import FAST, FAULT, SLOW, data_folder, rms, torque_error
-
-Row = dict[str, Any]
 
 STRUCTURE = EXAMPLES / "davinci" / "jaw_extended.json"
 EVEN = ("00", "02", "04", "06", "08")
@@ -90,7 +85,7 @@ def judged(finger: Mapping[str, Any], runs: Mapping[str, Recording], left_out: s
     """Rms in N·m of compensated minus external torque over all samples of all runs but one."""
     others = [recording for name, recording in runs.items() if name != left_out]
     errors = [torque_error(recording, run_recording(finger, recording.arrays())) for recording in others]
-    return rms(np.concatenate(errors))
+    return float(rms(np.concatenate(errors)))
 
 
 def fitted(finger: Any, recordings: Sequence[Recording], options: Mapping[str, Any]) -> FrictionFit:
@@ -157,16 +152,16 @@ def sample_counts() -> list[list[str]]:
 def report(rows: Sequence[Row]) -> str:
     """A line for each way and planted factor; the ratio of each run without a planted change; samples."""
 
-    def cells(own: Sequence[Row]) -> list[str]:
-        before, after = (1e3 * tables.column(own, name) for name in ("before", "after"))
-        worst = [max(row["ratio"] for row in own if belongs(row["run"])) for belongs in GROUPS.values()]
-        above = sum(row["ratio"] > LIMIT for row in own)
+    def cells(group: Sequence[Row]) -> list[str]:
+        before, after = (1e3 * tables.column(group, name) for name in ("before", "after"))
+        worst = [max(row["ratio"] for row in group if belongs(row["run"])) for belongs in GROUPS.values()]
+        above = sum(row["ratio"] > LIMIT for row in group)
         errors = [f"{value:.1f}" for value in (np.median(before), np.median(after), after.max())]
-        return [*errors, *(f"{value:.2f}" for value in worst), f"{above} of {len(own)}"]
+        return [*errors, *(f"{value:.2f}" for value in worst), f"{above} of {len(group)}"]
 
     unchanged = tables.where(rows, planted=1.0)
     runs = tables.values_of(rows, "run")
-    by_run = tables.by(unchanged, ["way"], lambda own: [f"{row['ratio']:.2f}" for row in own])
+    by_run = tables.by(unchanged, ["way"], lambda group: [f"{row['ratio']:.2f}" for row in group])
     lines = [[way, f"× {factor}", *rest] for way, factor, *rest in tables.by(rows, ["way", "planted"], cells)]
     head = ["Fitted again", "Coulomb friction", "before, mN·m", "after, mN·m: median", "worst"]
     ratios = ["worst after/before: even", "odd", "0.5 Hz", f"above {LIMIT}"]

@@ -1,11 +1,7 @@
-"""How well a fit finds numbers that are known (docs/evidence/fit.md).
-
-A finger makes recordings of its own (recovery_case.py): 472 numbers, 400 s at 1 kHz, noise and a wandering bias. Which
-numbers can be told is decided from the Fisher information at the truth before anything is fitted. Every number then
-starts 25 % off, and the batch method and the extended Kalman filter fit all of them.
+"""How well a fit finds numbers that are known, and which numbers another motion and noise would tell.
 
     python -m evidence.fit.recovery -o FOLDER --seeds 20
-    python -m evidence.fit.recovery -o FOLDER --levers      # which numbers another motion and noise would tell
+    python -m evidence.fit.recovery -o FOLDER --levers
 
 Seeds and levers that are there already are not run again.
 """
@@ -21,11 +17,11 @@ from evidence import tables
 from evidence.fit import recovery_case as case
 from evidence.fit.recovery_case import DURATION, RATE, Case, Scale, identifiable, image, make_case
 from evidence.runner import parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.estimate import Estimator
 from tendonfmu.estimate.estimation import Learner
 
-Row = dict[str, Any]
 KINDS = ("static", "coulomb", "stribeck_velocity", "viscous", "stiffness", "initial_torque")
 FAR = 3.0  # standard errors
 PRIOR = 0.3  # of a number's size: about as far as the starts are off
@@ -131,8 +127,7 @@ def lever(name: str) -> Row:
     made = case.training_motion(truth, 0, DURATION, LEVER_RATE, **motion)
     recording = case.carried(truth, made)
     recording["external_torque"] = np.zeros_like(made.joint_position)  # what is measured does not matter here
-    least = float(recording["tendon_force"].min())
-    known = identifiable(Case(truth, truth, recording, least), Scale(truth))
+    known = identifiable(Case(truth, truth, recording), Scale(truth))
     return {"numbers": len(known), "identifiable": int(known.sum())}
 
 

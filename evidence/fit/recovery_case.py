@@ -1,18 +1,7 @@
-"""One case of the recovery campaign: a finger whose numbers are known, a recording that it made itself, what of the
-numbers that recording can tell, and how far a fit is from them.
+"""A finger with 472 known numbers that makes its own recording, and which of the numbers that recording can tell.
 
-The finger is examples/fingers/index_finger.json: 4 joints, 8 tendons, 468 numbers of friction and covers, and the bias
-of each joint at the start, 472 in all. Its noise is replaced, since its own stands for errors of the model too:
-
-- 0.5 mN·m of white noise in each joint torque at 1 kHz. With the finger's moment arms (root of their squares 14, 24, 13
-  and 7 mm by joint) that is 20 to 75 mN in each tendon force, as strain gauges for 100 N have.
-- a bias that wanders by 0.1 mN·m in 1 s, 2 mN·m in 400 s: 0.1 N of drift in each force sensor.
-
-The motion is `tendonfmu excite --vary-tension 15:60 --max-speed 3 --max-acceleration 20 --rate 1000`, another seed in
-each case. The recording holds time, tendon forces and positions, as a robot does, from which the fit takes angles and
-velocities (kinematics source 1), and `external_torque`: a reference sensor, whose noise and wander these are. Tendons
-carry what the model makes of friction and covers alone. If they carried the bias too, it would pull them slack: what
-fig. 5's jumps leave in it, where a load or an angle changes while something rests, adds up to 1 N·m in 400 s.
+The motion and the noise are described in docs/evidence/fit.md. Tendons carry the model's friction and covers alone:
+the wander of the bias adds up to 1 N·m in 400 s, which would pull them slack. It comes as `external_torque`.
 """
 
 from __future__ import annotations
@@ -61,7 +50,6 @@ class Case:
     truth: Description  # with the true numbers
     start: Description  # with those that a fit starts from
     recording: dict[str, Numbers]  # as a fit takes it
-    least_force: float  # N, of any tendon
 
 
 def true_finger() -> Description:
@@ -101,7 +89,7 @@ def make_case(seed: int, duration: float = DURATION, rate: float = RATE) -> Case
     first = random.standard_normal(len(START_BIAS)) * np.sqrt(BIAS["initial_variance"])
     bias = np.array(START_BIAS) + first + wander + jumps
     recording["external_torque"] = force @ moment_arms(truth) - (friction + bias + noise)
-    return Case(truth, _start(truth, seed), recording, float(force.min()))
+    return Case(truth, _start(truth, seed), recording)
 
 
 def _start(truth: Description, seed: int) -> Description:
@@ -153,11 +141,11 @@ class Scale:
 
     def _numbers(self, known: Estimator, z: Numbers) -> Numbers:
         values = known.values(z)[self._moved]
-        return np.where(self.kinds == "stribeck_velocity", 1.0 / values, values)
+        return np.asarray(np.where(self.kinds == "stribeck_velocity", 1.0 / values, values))
 
     def standard_errors(self, covariance: Numbers) -> Numbers:
         """[q] from the covariance of the unknowns."""
-        return np.sqrt(np.einsum("ij,jk,ik->i", self._slopes, covariance, self._slopes))
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", self._slopes, covariance, self._slopes)))
 
     def difference(self, z: Numbers, other: Numbers) -> Numbers:
         """[q] numbers of the unknowns z minus those of others."""
@@ -169,5 +157,5 @@ def identifiable(case: Case, scale: Scale) -> Flags:
     known = Estimator(image(case.truth))
     known.add_recording(case.recording, external_torque=case.recording["external_torque"])
     _, _, information = known.evaluate(known.start)
-    covariance = np.linalg.inv(information + np.diag((NEARLY_NOTHING * known.scale) ** -2.0))
+    covariance = np.asarray(np.linalg.inv(information + np.diag((NEARLY_NOTHING * known.scale) ** -2.0)), dtype=float)
     return np.asarray(scale.standard_errors(covariance) < LIMIT * np.abs(scale.value))

@@ -1,22 +1,19 @@
-"""How often `tendonfmu check` finds what is wrong with a recording.
+"""How often `tendonfmu check` finds what is wrong with a recording (fingers/corruptions.py).
 
     python -m evidence.recordings.check -o FOLDER --half even
 
-Each sound test recording of the foreign cases is corrupted in every way of evidence/fingers/corruptions.py and checked;
-sound ones are checked as they are, without their joint angles, and against descriptions with rough numbers. Constants
-of the product are chosen on odd cases; figures that are published come from even ones. rows/CASE.json in the folder has
-what was said of each recording.
+Constants of the product are chosen on odd cases; figures that are published come from even ones. rows/CASE.json in the
+folder has what was said of each recording.
 """
 
 from __future__ import annotations
 
 import copy
-import importlib
 import json
 import tempfile
 import zlib
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +22,14 @@ import pandas as pd
 
 from evidence import tables
 from evidence.fingers.corruptions import Corruption, applicable, columns_of, corrupt, corruptions
+from evidence.fingers.families import cases_of, module_of
 from evidence.fingers.foreign import Nominal
-from evidence.runner import parser, publish, run_cases, say
+from evidence.runner import parser, publish, run_cases
+from evidence.tables import Row
 from tendonfmu.model import Finding, Finger, read_finger
 from tendonfmu.recordings import Recording, belongs
 from tendonfmu.recordings.recording import GROUPS
 
-Row = dict[str, Any]
-
-FAMILIES = {"recorded": "recorded", "mujoco": "mujoco_cases", "numpy": "numpy_cases"}
 ROUGH = (0.05, 0.15)  # relative errors of moment arms and stiffness, standard deviation
 PARTS = ("train", "test")
 
@@ -63,26 +59,13 @@ def roughened(nominal: Nominal, std: float, rng: np.random.Generator) -> Nominal
 # --- cases ------------------------------------------------------------------------------------------------------------
 
 
-def cases(half: str) -> Iterator[tuple[str, str, int]]:
-    """(name, module, number) of the fingers of a half whose packages are there."""
-    for family, name in FAMILIES.items():
-        try:
-            module = importlib.import_module(f"evidence.fingers.{name}")
-        except ModuleNotFoundError as missing:
-            say(f"SKIPPED: the family {family}: {missing.name} is not installed")
-            continue
-        for number in module.numbers() if family == "recorded" else module.NUMBERS:
-            if number % 2 == {"odd": 1, "even": 0}[half]:
-                yield f"{family}_{number:02d}", module.__name__, number
-
-
-def checked(module: str, number: int) -> Row:
+def checked(family: str, number: int) -> Row:
     """All that is checked of a finger: its sound recordings, and its test recording with every corruption."""
-    case = importlib.import_module(module).make(number)
+    case = module_of(family).make(number)
     rows = [row for part in PARTS for row in check_clean(f"{case.name}_{part}", case.nominal, getattr(case, part))]
     finger = described(case.nominal)
     suited = (corruption for corruption in corruptions() if applicable(case.test, corruption))
-    return {"rows": rows + [check_corrupted(case.name, finger, case.test, each) for each in suited]}
+    return {"rows": rows + [check_corrupted(case.name, finger, case.test, corruption) for corruption in suited]}
 
 
 # --- judgement --------------------------------------------------------------------------------------------------------
@@ -183,7 +166,7 @@ def report(rows: Sequence[Row]) -> str:
     """Two tables: of sound recordings, and of corrupted ones."""
 
     def sums(*keys: str) -> Any:
-        return lambda own: [str(len(own)), *(str(sum(row[key] for row in own)) for key in keys)]
+        return lambda group: [str(len(group)), *(str(sum(row[key] for row in group)) for key in keys)]
 
     sound, broken = tables.where(rows, family="sound"), [row for row in rows if row["family"] != "sound"]
     cells = sums("found", "explained", "false")
@@ -198,8 +181,7 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("--half", choices=("odd", "even"), default="even", help="cases of odd or even number")
     given = options.parse_args()
-    named = {name: (module, number) for name, module, number in cases(given.half)}
-    rows = run_cases(checked, named, given.output, given.workers, given.scheduler)
+    rows = run_cases(checked, cases_of(given.half), given.output, given.workers, given.scheduler)
     publish(given.output / f"{given.half}.md", report([row for case in rows for row in case["rows"]]))
 
 

@@ -97,7 +97,8 @@ def main() -> int:
         write(given.output, table(work, names))
     else:
         print(table(work, names), end="")
-    return 0 if all(outcome["sound"] for name in names if (outcome := kept(name, work))) else 1
+    outcomes = [kept(name, work) for name in names]
+    return 0 if all(outcome["sound"] for outcome in outcomes if outcome) else 1
 
 
 if __name__ == "__main__":

@@ -190,16 +190,16 @@ def limited(kind: int, size: int) -> Callable[[], None]:
 def trials(name: str, words: list[str]) -> list[tuple[str, list[str], Callable[[], None] | None]]:
     """What a command is tried with: title, command, limit."""
     plain = [*COMMAND, *words, "--quiet"]
-    found: list[tuple[str, list[str], Callable[[], None] | None]] = [
+    listed: list[tuple[str, list[str], Callable[[], None] | None]] = [
         (f"{name}, files of at most {size} bytes", plain, limited(resource.RLIMIT_FSIZE, size))
         for size in (0, 1, 4096, 65536)
     ]
     if can_mount():
         sizes = ("4k", "16k", "64k")
-        found += [(f"{name}, disk of {size}", on_a_small_disk(f"size={size}", "", words), None) for size in sizes]
+        listed += [(f"{name}, disk of {size}", on_a_small_disk(f"size={size}", "", words), None) for size in sizes]
         read_only = on_a_small_disk("size=1m", "mount -o remount,ro out &&", words)
-        found.append((f"{name}, read-only disk", read_only, None))
-    return found + [
+        listed.append((f"{name}, read-only disk", read_only, None))
+    return listed + [
         (f"{name}, {size} MiB of memory", plain, limited(resource.RLIMIT_AS, size << 20))
         for size in (250, 350, 500, 700)
     ]

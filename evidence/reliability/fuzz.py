@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evidence.recordings.log_cases import FORMATS, sound, write
+from evidence.recordings.log_faults import FORMATS, sound, write
 from evidence.reliability.programs import CALIBRATED
 from evidence.reliability.row import Measure, Outcome, Run, Unavailable, called, spoken
 from evidence.runner import ROOT
@@ -63,9 +63,9 @@ def fuzzed(run: Run, name: str, full: int, minutes: float, *options: str) -> tup
 def calls(run: Run) -> Outcome:
     tried, findings = [], []
     for name, full in (("fuzz_fmi2", 5_000_000), ("fuzz_fmi3", 5_000_000), ("fuzz_plant_fmi2", 1_000_000)):
-        count, found = fuzzed(run, name, full, run.minutes / 3, "-max_len=150")
+        count, finding = fuzzed(run, name, full, run.minutes / 3, "-max_len=150")
         tried.append(spoken(count))
-        findings += [found] if found else []
+        findings += [finding] if finding else []
     number = (
         f"{tried[0]} sequences of FMI 2.0 calls, {tried[1]} of FMI 3.0 calls, and {tried[2]} on simulated fingers, up "
         "to 150 bytes (some 25 calls, 6 of them steps) (libFuzzer, ASan, UBSan, leaks)"
@@ -76,9 +76,9 @@ def calls(run: Run) -> Outcome:
 
 # --- parsers ----------------------------------------------------------------------------------------------------------
 
-WORDS = (b"nan", b"-inf", b"1e999", b'"', b"{", b"]", b",", b"\n", b"\r", b"\0", b"\xff\xfe", b"null", b"-0", b"1e-400")
-WORDS += (b";", b"\t", b"[0]", b"\xc3")
-BAD_NUMBERS = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
+WORDS: tuple[bytes, ...] = (b"nan", b"-inf", b"1e999", b'"', b"{", b"]", b",", b"\n", b"\r", b"\0", b"\xff\xfe")
+WORDS += (b"null", b"-0", b"1e-400", b";", b"\t", b"[0]", b"\xc3")
+BAD_NUMBERS: tuple[Any, ...] = ("text", True, [], {}, 1e300, -1e300, math.nan, math.inf)
 
 
 def spoilt(chance: random.Random, content: bytes) -> bytes:
@@ -130,7 +130,7 @@ def spoil_and_read(run: Run) -> tuple[str, list[str]]:
 
 def numbers_of(tree: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Path, container and key of each number in a description."""
-    pairs = tree.items() if isinstance(tree, dict) else enumerate(tree, start=1)
+    pairs: Any = tree.items() if isinstance(tree, dict) else enumerate(tree, start=1)
     for key, value in pairs:
         here = (f"{path}.{key}" if path else key) if isinstance(tree, dict) else f"{path}[{key}]"
         if isinstance(value, dict | list):

@@ -28,10 +28,10 @@ BASE = ("-std=c11", "-ffp-contract=off")
 
 def compilers() -> dict[str, list[str]]:
     """By name: those that are here."""
-    found = {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
+    installed = {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
     if importlib.util.find_spec("ziglang"):
-        found["zig"] = [sys.executable, "-m", "ziglang", "cc"]
-    return found
+        installed["zig"] = [sys.executable, "-m", "ziglang", "cc"]
+    return installed
 
 
 def compiler(*names: str) -> list[str]:

@@ -3,10 +3,8 @@
     pip install --require-hashes -r requirements-peers.lock
     python -m evidence.speed.peers --model python_tests/support/oracle.py
 
-1. the C interface, one call for the whole recording; 2. the product's FMU through fmpy; 3. the naive numpy model of
-the tests, loaded from its file; 4. an FMU that PythonFMU makes of that numpy model, through fmpy with the same loop as
-2. All four must agree before their times are worth anything. Each time is the median of `ROUNDS` rounds in which the
-four take turns; the slow ones take fewer samples of the same recording.
+All four must agree before their times are worth anything. Each time is the median of `ROUNDS` rounds in which the four
+take turns; the slow ones take fewer samples of the same recording.
 """
 
 from __future__ import annotations

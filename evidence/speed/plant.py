@@ -1,14 +1,11 @@
-"""The simulated index finger (4 joints, 8 tendons) by its own integrators and by scipy's, side by side in one run:
+"""The simulated index finger by its own integrators and by scipy's, side by side in one run:
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 taskset -c 0 python -m evidence.speed.plant
     taskset -c 0 python -m evidence.speed.plant --fmu
 
-scipy's solvers are given the library's own right-hand side, which they difference for their Jacobian; CVODE and the
-fixed step have theirs analytic. Times are CPU times on one core.
-
---fmu: TendonFinger.fmu instead, simulated seconds per CPU second at communication steps of 1 and 10 ms, inputs held or
-new each step. The FMU's own functions are called (fmi2SetReal of one motor command, fmi2DoStep), from Python by ctypes,
-whose share is measured with fmi2GetVersion and taken off.
+scipy's solvers are given the library's own right-hand side; CVODE and the fixed step have their Jacobians analytic.
+--fmu: TendonFinger.fmu instead, its functions called by ctypes, whose share is measured with fmi2GetVersion and taken
+off. Times are CPU times on one core.
 """
 
 from __future__ import annotations

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from command import Call, DemoRun
 from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
-from tendonfmu.calibrate.files import write_calibration
 from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of
-from tendonfmu.calibrate.text import size_rows, verdict
+from tendonfmu.calibrate.text import size_rows, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
@@ -32,6 +31,8 @@ from tendonfmu.recordings.recording import Recording, read_recording
 from tendonfmu.recordings.smoothing import Signals
 from tendonfmu.report.numbers import together
 from tendonfmu.tasks.steps import Steps
+
+pytestmark = pytest.mark.xdist_group("calibrate")  # one worker makes what they share
 
 Numbers = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from repository_paths import ROOT
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.model.native import run_recording
 
 Numbers = NDArray[np.float64]

@@ -29,8 +29,8 @@ from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import own_copy
 from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces, moment_arms
 from tendonfmu.model.description import Finger
+from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.statistics.blocks import BlockSums, SampleBlocks, regular_blocks

@@ -19,9 +19,7 @@ import pytest
 
 import diagnosis_examples as examples
 from command import Call
-from diagnose_pairs import COUNT, make_pair
-from diagnose_quirks import QUIRKS
-from odd_finger import Columns, Pair
+from odd_pairs import QUIRKS, Columns, Pair, make_pair
 from repetitions import repeated
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.errors import InputError
@@ -31,12 +29,13 @@ from tendonfmu.report.diagnosis_files import write_diagnosis
 
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "diagnosis.schema.json").read_text(encoding="utf-8"))
 NAMES = list(QUIRKS)
+COUNT = len(NAMES)  # each quirk once, with another one beside it in a third of the pairs
 USUAL = [
     NAMES.index(name)
     for name in (
         "other_tendon_count",
         "hardly_free",
-        "own_presliding",
+        "presliding_is_there",
         "viscous_alone",
         "few_samples",
     )
@@ -120,9 +119,6 @@ def test_a_pair_gets_a_diagnosis_or_a_refusal(seed: int, tmp_path: Path) -> None
     except Exception as fault:
         raise AssertionError(f"seed {seed}, {', '.join(pair.quirks)}: {type(fault).__name__}: {fault}") from fault
     assert faults == [], f"seed {seed}, {', '.join(pair.quirks)}"
-
-
-# --- the pairs themselves ---------------------------------------------------------------------------------------------
 
 
 # --- the options ------------------------------------------------------------------------------------------------------

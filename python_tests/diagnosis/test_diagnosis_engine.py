@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
-from tendonfmu.diagnosis.cause import Cause, Direction, Where, with_error
+from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, by_name
@@ -30,8 +30,8 @@ from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid,
 from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
-from tendonfmu.model.balance import moment_arms
 from tendonfmu.model.description import Finger
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.model.native import Instance, image_from_json
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
@@ -284,17 +284,6 @@ class Fitted(ExtensionSearch):
         return Trial(cause, model, np.array([np.inf]) if error is None else error * noise)
 
 
-def decided(rounds: Fitted, first: str, *alike: str) -> tuple[str, list[str]]:
-    """The cause that is taken, and its rivals, where columns cannot tell the first from the others."""
-
-    def of(effect: str) -> Cause:
-        return Cause(Where(effect, 1), direction=Direction(*np.zeros((3, 1))))
-
-    columns: Any = SimpleNamespace(refined=of)
-    cause = rounds._best_fitted(columns, replace(of(first), alike=tuple(map(of, alike)))).cause
-    return cause.effect, [each.effect for each in cause.alike]
-
-
 @pytest.mark.parametrize(
     ("error", "taken"), [(np.tile([0.88, 0.92], 10), True), (np.tile([0.4, 1.4], 10), False)], ids=["even", "scattered"]
 )
@@ -307,28 +296,6 @@ def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, take
     rounds._look = lambda model, candidates: rounds.view  # type: ignore[method-assign]
     assert rounds._take(Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
     assert len(rounds.causes) == len(rounds.models) == int(taken)
-
-
-def test_fitted_models_decide_between_what_columns_cannot_tell_apart() -> None:
-    rounds = Fitted({"preload_friction": 3.0, "cover_stiffness": 1.0, "gravity": 1.001, "moment_arm": 0.1})
-    found = decided(rounds, "preload_friction", "cover_stiffness", "moment_arm", "gravity", "stribeck")
-    # the worse fit is no rival any more; what was not fitted still is, and a correction of the torque may not stand in
-    assert found == ("cover_stiffness", ["gravity", "moment_arm", "stribeck"])
-    assert rounds.tried == ["preload_friction", "cover_stiffness", "gravity"]
-
-
-def test_a_fit_that_bears_nothing_out_is_no_rival() -> None:
-    assert decided(Fitted({"gravity": 2.0, "backlash": None}), "gravity", "backlash") == ("gravity", [])
-    assert decided(Fitted({"gravity": None, "backlash": None}), "gravity", "backlash")[0] == "gravity"
-
-
-def test_presliding_that_is_there_goes_before_a_new_name() -> None:
-    errors = {"load_friction": 1.0, "presliding": 1.002}
-    assert decided(Fitted(errors), "load_friction", "presliding") == ("load_friction", ["presliding"])
-    known = decided(Fitted(errors, ["presliding"]), "load_friction", "presliding")
-    assert known == ("presliding", ["load_friction"])
-    better = Fitted({**errors, "presliding": 1.5}, ["presliding"])
-    assert decided(better, "load_friction", "presliding") == ("load_friction", [])
 
 
 def test_presliding_as_long_as_the_motion_is_a_spring(hidden: FitRecording) -> None:

@@ -7,27 +7,21 @@ runs online, where a bias follows what is slow, and certain on unseen data: its 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from evidence.diagnosis import makers
-from evidence.diagnosis.makers import Made, Options
-from tendonfmu.diagnosis.diagnosis import diagnose
+from evidence.diagnosis.makers import Options
 from tendonfmu.diagnosis.result import Diagnosis
 
 SHORT = Options(joints=1, seconds=40.0, rate=250.0)
 
 
-def diagnosed(made: Made) -> Diagnosis:
-    return diagnose(made.finger, list(made.recordings), list(made.test), kinematics=made.kinematics)
-
-
-def sets_of(found: Diagnosis) -> list[set[str]]:
+def sets_of(diagnosis: Diagnosis) -> list[set[str]]:
     """Effects of each cause and of those that it may be confused with."""
-    return [{cause.where.effect, *(each.effect for each in cause.confusable_with)} for cause in found.causes]
+    return [{cause.where.effect, *(where.effect for where in cause.confusable_with)} for cause in diagnosis.causes]
 
 
 # effect: strength, on the presliding rig
@@ -66,14 +60,14 @@ def of_long(effect: str) -> Any:
 
 @pytest.mark.long
 @pytest.mark.parametrize("effect", [*DEFAULT, *map(of_long, LONG)])
-def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -> None:
+def test_one_hidden_effect_is_in_the_reported_set(effect: str) -> None:
     strength, presliding = (DEFAULT | LONG)[effect]
-    made = makers.single(tmp_path, 1, replace(SHORT, presliding=presliding), effect, strength)
-    assert made.facts["surviving_share"] >= makers.VISIBLE
-    found = diagnosed(made)
-    assert any(effect in names for names in sets_of(found))
-    assert all(cause.gain.low > 0.0 and cause.gain.value >= found.least_gain for cause in found.causes)
-    assert found.gain.value >= 0.0
+    case = makers.single(1, replace(SHORT, presliding=presliding), effect, strength)
+    assert case.facts["surviving_share"] >= makers.VISIBLE
+    diagnosis = case.diagnosed()
+    assert any(effect in names for names in sets_of(diagnosis))
+    assert all(cause.gain.low > 0.0 and cause.gain.value >= diagnosis.least_gain for cause in diagnosis.causes)
+    assert diagnosis.gain.value >= 0.0
 
 
 @pytest.mark.parametrize(
@@ -85,23 +79,25 @@ def test_one_hidden_effect_is_in_the_reported_set(effect: str, tmp_path: Path) -
         pytest.param(4, True, 1.0, marks=pytest.mark.long),
     ],
 )
-def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, wander: float, tmp_path: Path) -> None:
-    found = diagnosed(makers.null(tmp_path, seed, replace(SHORT, presliding=presliding, wander=wander)))
-    assert found.causes == () and found.verdict == "adequate"
-    assert {each.where.effect for each in found.invisible} >= {"force_offset"}
-    assert "cover_hardening" not in {each.where.effect for each in found.invisible}  # one of ordinary size would show
-    assert found.gain.value == 0.0 and found.extended == found.nominal
-    assert 1e-3 < found.nominal.test_rms[0] < 4e-3  # N·m: the noise that the rig put in, 1.5 to 3 mN·m
+def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, wander: float) -> None:
+    diagnosis = makers.null(seed, replace(SHORT, presliding=presliding, wander=wander)).diagnosed()
+    assert diagnosis.causes == () and diagnosis.verdict == "adequate"
+    assert {entry.where.effect for entry in diagnosis.invisible} >= {"force_offset"}
+    assert "cover_hardening" not in {
+        entry.where.effect for entry in diagnosis.invisible
+    }  # one of ordinary size would show
+    assert diagnosis.gain.value == 0.0 and diagnosis.extended == diagnosis.nominal
+    assert 1e-3 < diagnosis.nominal.test_rms[0] < 4e-3  # N·m: the noise that the rig put in, 1.5 to 3 mN·m
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("effects", "strength"), [(("preload_friction", "inertia"), 1.0), (("gravity", "load_friction"), 3.0)]
 )
-def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: float, tmp_path: Path) -> None:
-    made = makers.double(tmp_path, 1, replace(SHORT, presliding=True), effects, strength)
-    found = sets_of(diagnosed(made))
-    assert all(any(effect in names for names in found) for effect in effects)
+def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: float) -> None:
+    case = makers.double(1, replace(SHORT, presliding=True), effects, strength)
+    sets = sets_of(case.diagnosed())
+    assert all(any(effect in names for names in sets) for effect in effects)
 
 
 @pytest.mark.long
@@ -116,32 +112,34 @@ def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: f
         ),
     ],
 )
-def test_what_the_list_lacks_is_called_unexplained(kind: str, strength: float, tmp_path: Path) -> None:
-    found = diagnosed(makers.single(tmp_path, 1, replace(SHORT, presliding=True, seconds=60.0), kind, strength))
-    assert found.verdict in ("unexplained", "partly explained")
-    assert found.unexplained.share > 0.05
+def test_what_the_list_lacks_is_called_unexplained(kind: str, strength: float) -> None:
+    diagnosis = makers.single(1, replace(SHORT, presliding=True, seconds=60.0), kind, strength).diagnosed()
+    assert diagnosis.verdict in ("unexplained", "partly explained")
+    assert diagnosis.unexplained.share > 0.05
 
 
-def test_a_diagnosis_names_measures_and_extends(tmp_path: Path) -> None:
+def test_a_diagnosis_names_measures_and_extends() -> None:
     """The whole of it: place, size and gain of friction that grows with a tendon's force."""
-    made = makers.single(tmp_path, 5, replace(SHORT, presliding=True, test=40.0), "load_friction", 1.0)
-    (truth,), size = made.truths, made.facts["magnitude"]
-    found = diagnosed(made)
-    first = found.causes[0]
+    case = makers.single(5, replace(SHORT, presliding=True, test=40.0), "load_friction", 1.0)
+    (truth,), size = case.truths, case.facts["magnitude"]
+    diagnosis = case.diagnosed()
+    first = diagnosis.causes[0]
     assert (first.where.effect,) == truth.effects
     own = next(place for place in first.places if (place.joint, place.tendon) == (truth.joint, truth.tendon))
     value = next(value for path, (value, _) in own.parameters.items() if path.endswith(".coulomb"))
     assert value == pytest.approx(size, rel=0.3)
-    assert not found.held_out
-    assert found.gain.low > 0.0 and np.all(np.array(found.extended.test_rms) < np.array(found.nominal.test_rms))
+    assert not diagnosis.held_out
+    assert diagnosis.gain.low > 0.0 and np.all(
+        np.array(diagnosis.extended.test_rms) < np.array(diagnosis.nominal.test_rms)
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("effect", ["force_offset", "gravity", "moment_arm"])
-def test_absorbed_is_told_to_be_invisible(effect: str, tmp_path: Path) -> None:
+def test_absorbed_is_told_to_be_invisible(effect: str) -> None:
     """A constant or slow torque goes into the bias. What is left of an arm that is off goes down in the noise."""
-    found = diagnosed(makers.absorbed(tmp_path, 1, replace(SHORT, presliding=True), effect))
-    listed = [each for each in found.invisible if each.where.effect == effect]
-    assert listed and all(each.experiment for each in listed)
-    assert all(each.absorbed or (each.ordinary_gain or 0.0) < found.least_gain for each in found.invisible)
-    assert not any(cause.where.effect == effect for cause in found.causes)
+    diagnosis = makers.absorbed(1, replace(SHORT, presliding=True), effect).diagnosed()
+    listed = [entry for entry in diagnosis.invisible if entry.where.effect == effect]
+    assert listed and all(entry.experiment for entry in listed)
+    assert all(entry.absorbed or (entry.ordinary_gain or 0.0) < diagnosis.least_gain for entry in diagnosis.invisible)
+    assert not any(cause.where.effect == effect for cause in diagnosis.causes)

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN, hide, placed, scaled
-from evidence.fingers.matched_physics import contacts_of, motion_of, read_finger, torque_of, values_of, velocity_seen
-from evidence.fingers.matched_rig import Hand, Made, Noise, coloured, random_hand, record
-from evidence.fingers.matched_strength import group, kinematics, residual, shown_strength, strength_of
-from repetitions import repeated
+from evidence.diagnosis.hidden_effects import hide
+from evidence.fingers.matched_rig import Hand, Made, random_hand, record
+from evidence.fingers.matched_strength import group
 from tendonfmu.model import native
 
 Array = NDArray[Any]
@@ -85,90 +83,3 @@ def test_the_row_of_the_extension_explains_the_effect(effect: str) -> None:
         power.append(np.sum(left_by_the_core(data | {"extensions": [row]}, hand, made) ** 2))
     assert np.abs(before).max() > 1e-4
     assert min(power) < rest**2 * np.sum(before**2)
-
-
-@pytest.mark.parametrize("presliding", [False, True])
-def test_friction_takes_energy(presliding: bool) -> None:
-    hand = random_hand(8, 2, presliding=presliding, rate=500.0)
-    made = record(hand, seed=3, seconds=20.0, quiet=True)
-    finger = read_finger(hand.truth)
-    for effect in finger.effects:
-        v = velocity_seen(effect, made.motion)
-        power = values_of(effect, made.motion, finger).F * v
-        assert presliding or power.min() >= 0.0, effect
-        assert power.sum() > 0.0, effect  # hysteresis gives some back, never more than it took
-        assert np.all(np.minimum.accumulate(np.cumsum(power)[::-1])[::-1] >= -1e-12), effect
-
-
-def test_the_torque_stands_still_while_everything_rests() -> None:
-    hand = random_hand(4, 1, rate=500.0, source=3)
-    made = record(hand, seed=6, seconds=20.0, quiet=True)
-    finger = read_finger(hand.truth)
-    rests = np.all(np.abs(made.motion.velocity) < 1e-12, axis=1)
-    torque = torque_of(finger, made.motion, made.force)
-    steps = np.abs(np.diff(torque, axis=0)).max(axis=1)
-    assert rests.mean() > 0.05
-    assert steps[rests[1:] & rests[:-1]].max() < 1e-12
-    found = contacts_of(made.motion.velocity[:, 0], finger.joint_threshold)
-    assert len(found.enters) > 3 and len(found.leaves) > 3
-
-
-@pytest.mark.parametrize(
-    "effect", repeated(["gravity", "edge_friction", "inertia", "time_delay", "backlash", "rubbing"], 0, 5)
-)
-def test_strength_is_what_was_asked_for(effect: str) -> None:
-    """Asked of the finished hand, and against a refit: least squares of the whole effect leaves that variance."""
-    hand, label = hide(
-        random_hand(31, 2, presliding=True, rate=250.0), effect, 0.1, seed=1, motion=2, seconds=20.0
-    )  # fmt: skip
-    found, share = strength_of(hand, 2, 20.0)
-    assert found == pytest.approx(0.1, rel=0.06)
-    assert (found, share) == pytest.approx((label["strength"], label["surviving_share"]), rel=0.15)
-    assert 0.0 < share <= 1.0
-    whole = residual(replace(hand, hidden=hand.hidden), record(hand, 2, 20.0, quiet=True)).var(axis=0).max()
-    assert whole > 0.9 * found * hand.noise.std**2  # what survives is a part of what was there
-
-
-def test_nothing_hidden_has_no_strength() -> None:
-    hand = random_hand(3, 2, rate=250.0)
-    assert strength_of(hand, 5, 10.0)[0] < 1e-12
-
-
-@pytest.mark.parametrize("effect", [*BUILDERS, *UNKNOWN])
-def test_every_effect_can_be_hidden(effect: str) -> None:
-    source = 1 if effect == "tendon_nonlinearity" else 2
-    hand, label = hide(random_hand(1, 2, source=source, rate=250.0), effect, None, seed=2, motion=3, seconds=6.0)
-    made = record(hand, seed=3, seconds=6.0, quiet=True)
-    finger = read_finger(hand.truth)
-    motion, force = kinematics(hand, finger, made.columns)
-    assert label["effect"] == effect and label["magnitude"] > 0.0
-    assert np.abs(force @ finger.arms - torque_of(finger, motion, force)).max() > 1e-6  # N·m
-    assert "extensions" in hand.nominal and not any(row["effect"] == effect for row in hand.nominal["extensions"])
-
-
-def test_noise_has_the_colour_that_it_says() -> None:
-    noise = Noise(std=0.002, time=0.02)
-    found = coloured(np.random.default_rng(1), 200_000, 1, 0.002, noise)[:, 0]
-    correlation = np.mean(found[1:] * found[:-1]) / np.mean(found**2)
-    assert found.std() == pytest.approx(0.002, rel=0.03)
-    assert correlation == pytest.approx(np.exp(-0.1), abs=0.01)
-
-
-def test_relative_tendon_velocity_is_that_of_the_joints_beyond() -> None:
-    arms = np.array([[0.01, 0.02], [-0.01, 0.005]])
-    motion = motion_of(np.arange(2.0), np.zeros((2, 2)), np.array([[1.0, 2.0], [0.0, 1.0]]), arms)
-    assert motion.tendon[0].tolist() == [
-        [pytest.approx(0.05), pytest.approx(0.04), 0.0],
-        [0.0, pytest.approx(0.01), 0.0],
-    ]
-
-
-def test_what_a_force_sensor_adds_stays_absorbed_and_what_it_scales_shows_at_other_tensions() -> None:
-    """An offset is a constant torque at every pretension; a gain grows with it."""
-    bare = replace(random_hand(4, 1, rate=250.0), tension_time=8.0)
-    strengths = {}
-    for effect in ("force_offset", "force_gain"):
-        hand, hidden = placed(bare, effect, 1)
-        hand, _ = scaled(hand, hidden, None, motion=2, seconds=20.0)
-        strengths[effect] = shown_strength(hand, 2, 20.0)
-    assert strengths["force_offset"] < 0.01 and strengths["force_gain"] > 1.0

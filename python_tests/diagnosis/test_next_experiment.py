@@ -29,7 +29,7 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description,
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.balance import moment_arms, pretension_vector
+from tendonfmu.model.friction_places import moment_arms, pretension_vector
 from tendonfmu.model.native import NativeError
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.simulate.motion_plan import Joints, expand_motion

@@ -62,7 +62,7 @@ def test_plotly_knows_all_names_and_values(panel: Panel) -> None:
 
 @pytest.mark.parametrize("panel", KINDS)
 def test_a_png_has_ink_at_its_size_and_the_same_bytes_again(panel: Panel) -> None:
-    sheet = Sheet("", "name", "heading", "", (("before", "a key"),), (panel, panel))
+    sheet = Sheet("", "name", "heading", (("before", "a key"),), (panel, panel))
     made = []
     for _ in range(2):
         file = io.BytesIO()
@@ -78,7 +78,7 @@ def test_a_png_shows_what_the_figure_holds() -> None:
     """A curve at the middle of the axes is there in its colour, and nowhere else."""
     file = io.BytesIO()
     flat = replace(PANEL, curves=(Curve("before", X, np.full(5, 0.5)),), y_limits=(0.0, 1.0))
-    write_sheet(Sheet("", "name", "heading", "", (), (flat,)), [figure_of(flat, NAMES)], file)
+    write_sheet(Sheet("", "name", "heading", (), (flat,)), [figure_of(flat, NAMES)], file)
     image = (255 * imread(io.BytesIO(file.getvalue()))).astype(int)
     colour = np.array([int(STYLES["before"].colour[k : k + 2], 16) for k in (1, 3, 5)])
     rows = np.flatnonzero((np.abs(image[:, image.shape[1] // 2, :3] - colour).sum(axis=1)) < 60)
@@ -167,7 +167,7 @@ def test_names_are_text() -> None:
     figures = json.dumps(json.loads(text)["figures"])
     assert "<script>" not in figures and "&lt;script&gt;" in figures
     file = io.BytesIO()  # a PNG takes it as well, and names without a glyph
-    write_sheet(Sheet("", "", hostile, "", (("before", hostile),), (named,)), [drawn[0][1]], file)
+    write_sheet(Sheet("", "", hostile, (("before", hostile),), (named,)), [drawn[0][1]], file)
     assert file.getvalue()
 
 

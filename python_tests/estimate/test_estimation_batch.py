@@ -274,15 +274,3 @@ def test_innovations_with_samples_left_out(seed: int) -> None:
         rows = likelihood.rows()
         np.testing.assert_allclose(S[rows], expected_S[rows, 0], rtol=1e-9)
         assert np.isnan(np.delete(S, rows)).all()
-
-
-def test_innovations_make_up_the_cost() -> None:
-    description, parts = random_parts(5, 100, 2)
-    estimator, likelihoods = both(description, groups(description), parts)
-    z = off_start(estimator.unknowns, 5)
-    total = 0.0
-    for number, likelihood in enumerate(likelihoods):
-        e, S, _ = estimator.innovations(number, z)
-        rows = likelihood.rows()
-        total += 0.5 * float(np.sum(e[rows] ** 2 / S[rows, None]))
-    assert estimator.evaluate(z)[0] == pytest.approx(total, rel=1e-10)

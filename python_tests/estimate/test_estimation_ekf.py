@@ -176,17 +176,6 @@ def test_further_passes_leave_nothing_to_blocks() -> None:
         np.testing.assert_allclose(np.sqrt(np.diag(each.covariance)) / std, 1.0, atol=1e-3)
 
 
-def test_blocks_of_one_linearisation_are_the_same_filter() -> None:
-    """With Coulomb friction known to a thousandth nothing is left to linearise: any block gives one result."""
-    description = lasting_finger()
-    group = groups(description, few_unknowns)
-    recording = recorded(description, 8, 20.0, 50.0)
-    results = [learner_over(description, group, recording, block=block, prior_std=1e-4) for block in (1, 3, 8, 64)]
-    for each in results[1:]:
-        np.testing.assert_allclose(each.z, results[0].z, rtol=1e-6)
-        np.testing.assert_allclose(each.covariance, results[0].covariance, rtol=0.0, atol=1e-4 * each.covariance.max())
-
-
 def test_covariance_stays_symmetric_and_positive_definite() -> None:
     """20,000 samples with a noise far below what the start leaves open: where P − K H P would lose its digits."""
     description = lasting_finger(noise_std=1e-4, drift_variance=1e-9)
@@ -216,20 +205,6 @@ def test_agrees_with_the_batch(prior_std: float) -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(learner.covariance)) / std, 1.0, atol=0.01)
 
 
-def test_one_pass_is_near_the_batch() -> None:
-    """With a start known to 30 %; standard errors within a half."""
-    description = lasting_finger(noise_std=0.003)
-    group = groups(description, few_unknowns)
-    recording = recorded(description, 10, 60.0, 50.0)
-    learner = learner_over(description, group, recording, prior_std=0.3)
-    estimator = estimation.Estimator(image_of(description), group)
-    estimator.add_recording(recording, 3, recording["external_torque"])
-    result = estimator.fit(prior_std=0.3)
-    std = np.sqrt(np.diag(result.covariance))
-    np.testing.assert_allclose((learner.z - result.z) / std, 0.0, atol=2.0)
-    np.testing.assert_allclose(np.sqrt(np.diag(learner.covariance)) / std, 1.0, atol=0.5)
-
-
 def test_innovations_are_white_and_of_the_size_foretold() -> None:
     description = lasting_finger()
     recording = recorded(description, 11, 60.0, 50.0)
@@ -248,21 +223,3 @@ def test_slack_is_counted() -> None:
     recording["tendon_force"][100:107, 2] = -0.5
     learner = learner_over(description, groups(description, few_unknowns), recording)
     assert learner.slack_samples == 7
-
-
-def test_progress_may_stop_it() -> None:
-    description = lasting_finger()
-    recording = recorded(description, 13, 60.0, 1000.0)
-    group = groups(description, few_unknowns)
-    seen: list[tuple[Any, ...]] = []
-
-    def stop(*arguments: Any) -> bool:
-        seen.append(arguments)
-        return False
-
-    stopped = estimation.Learner(image_of(description), group)
-    stopped.run(recording, 3, recording["external_torque"], progress=stop)
-    assert len(seen) == 1
-    assert np.isfinite(stopped.z).all()
-    whole = learner_over(description, group, recording)
-    assert np.trace(stopped.covariance) > np.trace(whole.covariance)

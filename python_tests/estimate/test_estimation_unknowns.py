@@ -8,12 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import oracle_fit
 from fit_cases import (
-    few_unknowns,
     groups,
     image_of,
-    law,
     off_start,
     parameters_of,
     plain,
@@ -131,47 +128,6 @@ def test_fixed_static_bounds_the_coulomb_friction() -> None:
     assert unknown.upper == VALUES[INDEX[static]]
 
 
-def test_shared_laws_are_one() -> None:
-    """All tendons alike: 4 numbers of each law and 3 of the one without viscous friction, 2 covers, 2 joints."""
-    group = groups(SMALL, few_unknowns)
-    estimator = estimation.Estimator(image_of(SMALL), group)
-    assert len(estimator.unknowns) == 2 + 4 + 4 + 4 + 4 + 3 + 4
-    twin = twin_of(SMALL, group, estimator.unknowns)
-    z = off_start(estimator.unknowns, 4)
-    values = estimator.values(z)
-    np.testing.assert_allclose(values, twin.parameters(z), rtol=1e-14)
-    for path in (path for path in PATHS if path.startswith("tendons[1].") and few_unknowns(path)):
-        alike = [values[INDEX[path.replace("[1]", f"[{i}]", 1)]] for i in range(1, 5)]
-        assert len(set(alike)) == 1
-    for number, unknown in zip(twin.numbers, estimator.unknowns, strict=True):
-        assert tuple(unknown.parameters) == number.parameters
-
-
-def test_both_directions_tied() -> None:
-    """An asymmetric law whose sides share their groups stays symmetric."""
-    description = copy.deepcopy(SMALL)
-    description["joints"][0]["friction"] = {side: law(0.006, 0.08, 0.2) for side in ("positive", "negative")}
-    group = groups(description, lambda path: path.replace(".negative.", ".positive."))
-    estimator = estimation.Estimator(image_of(description), group)
-    values = estimator.values(off_start(estimator.unknowns, 5))
-    at = {path: k for k, path in enumerate(parameters_of(description)[0])}
-    for name in ("static", "coulomb", "stribeck_velocity", "viscous"):
-        prefix = "joints[1].friction"
-        assert values[at[f"{prefix}.positive.{name}"]] == values[at[f"{prefix}.negative.{name}"]]
-        assert values[at[f"{prefix}.positive.{name}"]] != VALUES[INDEX[f"{prefix}.{name}"]]
-
-
-def test_what_is_fixed_stays_to_the_last_bit() -> None:
-    group = groups(SMALL, shared_key(3))
-    estimator = estimation.Estimator(image_of(SMALL), group)
-    twin = twin_of(SMALL, group, estimator.unknowns)
-    values = estimator.values(off_start(estimator.unknowns, 8))
-    moved = set(twin.moved(twin.start))
-    still = np.array([path not in moved for path in PATHS])
-    assert still.sum() > 20
-    np.testing.assert_array_equal(values[still], VALUES[still])
-
-
 def test_scale_in_the_numbers_of_the_description() -> None:
     static, coulomb, velocity, viscous = law_paths("tendons[2].edge_friction[1]")
     scale = {static: 0.09, coulomb: 0.05, velocity: 0.01, viscous: 2.0}
@@ -225,15 +181,3 @@ def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
         estimation.Estimator(image_of(SMALL), group, scale)
     assert str(len(PATHS)) in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-def test_free_groups_are_the_numbers_that_a_fit_counts() -> None:
-    """The twin's choice of what is present is the description's own count (`tendonfmu check`)."""
-    from tendonfmu.model.description import estimated_numbers
-
-    for seed in range(10):
-        description = random_fit_case(seed, 60)[0]
-        counted = sum(estimated_numbers(description).values()) - len(description["joints"])
-        torques = len((description.get("bias") or {}).get("initial_torque") or [])
-        paths, values = parameters_of(description)
-        assert max(oracle_fit.free_groups(paths, values)) + 1 - torques == counted

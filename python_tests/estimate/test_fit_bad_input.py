@@ -203,19 +203,6 @@ def test_a_short_part_between_gaps_is_left_out() -> None:
     assert fit.report_["recordings"][0]["used"] == len(recording) - 10
 
 
-def test_time_that_runs_back_is_refused() -> None:
-    recording = made_recording()
-    recording.time[2200:] -= 3.0
-    assert re.search(r"column time, row 2201: .*expected increasing times", refusal(recording))
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_numbers_that_are_none_are_refused(value: float) -> None:
-    recording = made_recording()
-    recording.groups["tendon_force"][17, 2] = value
-    assert re.search(r"tendon_force\[3\], row 18: .*expected a finite number", refusal(recording))
-
-
 # --- sensors ----------------------------------------------------------------------------------------------------------
 
 
@@ -256,18 +243,6 @@ def test_a_rest_is_no_stuck_sensor() -> None:
 
 
 # --- what does not fit ------------------------------------------------------------------------------------------------
-
-
-def test_a_recording_of_another_finger_is_refused() -> None:
-    recording = made_recording()
-    for name in ("joint_position", "joint_velocity", "external_torque"):
-        recording.groups[name] = np.column_stack([recording.groups[name]] * 2)[:, :3]
-    assert "3 columns joint_position[...], expected 2" in refusal(recording)
-
-
-def test_missing_columns_are_named() -> None:
-    recording = made_recording(keep=("tendon_force", "tendon_position"))
-    assert "no column joint_position[1]" in refusal(recording, kinematics=2)
 
 
 @pytest.mark.parametrize("per_force", [None, 0.0])

@@ -14,8 +14,8 @@ import pytest
 from fit_data import wavy_motion
 from repository_paths import ROOT
 from tendonfmu.estimate import estimation
-from tendonfmu.model.balance import balanced_forces
 from tendonfmu.model.description import Finger, read_finger
+from tendonfmu.model.friction_places import balanced_forces
 
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 PASS, FILTER = 15_000, 2_000  # samples per second of CPU time, 468 unknowns

@@ -19,7 +19,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import Unfinished, read_unfinished, write_unfinished
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.estimate.structure import get_number, set_number, with_sides
-from tendonfmu.model import description_text, native
+from tendonfmu.model import native
 from tendonfmu.recordings.recording import Recording
 
 
@@ -278,15 +278,6 @@ def test_fixed_numbers_stay_and_the_others_move() -> None:
     assert all(value != get_number(start, path) for path, value in fit.parameters_.items())
 
 
-def test_only_and_fix_go_together() -> None:
-    fit = shared(only=["joints[*]"], fix=["*.viscous"], share=[]).fit(made_recording())
-    assert sorted(fit.parameters_) == sorted(
-        [f"joints[{j}].{kind}.{key}" for j, kind in ((1, "friction"), (2, "load_friction"))
-         for key in ("static", "coulomb", "stribeck_velocity")] + ["joints[1].cover.stiffness",
-         "joints[2].cover.stiffness"]
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("share", "unknowns"),
     [(["tendons"], 19 + 6), (["tendons[*].pulley_friction[*]"], 10 + 4 + 4 * 11 + 0), (["pulleys"], 70), ([], 70)],
@@ -478,10 +469,3 @@ def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path) -> None:
     assert resumed.z_ == pytest.approx(whole.z_, rel=0.05)
     with pytest.raises(InputError, match="the interrupted fit has 25 unknowns, this fit has 70"):
         shared(moved_start(), start=file, share=[]).fit(recording)
-
-
-def test_descriptions_are_laid_out_for_people() -> None:
-    text = description_text(small_finger())
-    assert json.loads(text) == small_finger()
-    assert '"friction": {"static": 0.009000000000000001, "coulomb": 0.006, ' in text
-    assert max(len(line) for line in text.splitlines()) <= 170

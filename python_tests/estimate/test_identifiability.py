@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_fingers import INDEX, SMALL, SMALL_RANGES
+from excite_fingers import SMALL, SMALL_RANGES
 from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities, unknowns
-from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.excite.excitation import Plan, Variation, plan_excitation
+from tendonfmu.excite.excitation import Plan, plan_excitation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.friction_places import balanced_forces
 
 
 @pytest.fixture
@@ -86,49 +85,6 @@ def test_standard_errors_are_those_of_estimates() -> None:
         for _ in range(400)
     ]
     np.testing.assert_allclose(np.std(estimates, axis=0), np.sqrt(np.diag(np.linalg.inv(known))), rtol=0.12)
-
-
-@pytest.fixture(scope="module")
-def index_report() -> dict[str, Any]:
-    subject = read_subject(INDEX)
-    ranges = find_ranges(subject, [])
-    return report(excite(subject, ranges, Plan(as_array(ranges))), "tendonfmu excite")
-
-
-@pytest.mark.long
-def test_index_finger_counts(index_report: dict[str, Any]) -> None:
-    """Antagonists and effects in a row share their velocity, so most numbers show in combinations only."""
-    assert index_report["numbers"] == 468
-    assert index_report["identifiable"] >= 60
-    assert index_report["identifiable_alone"] >= 240
-    assert index_report["known_combinations"] >= 150
-    for entry in index_report["parameters"]:
-        assert entry["identifiable"] == (entry["relative_standard_error"] <= LIMIT) == (entry["reason"] is None)
-        assert entry["relative_standard_error_alone"] <= entry["relative_standard_error"] * (1 + 1e-6)
-        assert bool(entry["in_combination_with"]) == (entry["cause"] == "combination")
-
-
-@pytest.mark.long
-def test_antagonists_are_named_together(index_report: dict[str, Any]) -> None:
-    entry = next(e for e in index_report["parameters"] if e["path"] == "tendons[5].pulley_friction[2].coulomb")
-    assert entry["cause"] == "combination"
-    assert any("tendons[6].pulley_friction[2]" in path for path in entry["in_combination_with"])
-    assert index_report["least_known_combinations"][0]["relative_standard_error"] > LIMIT
-
-
-@pytest.mark.long
-def test_varied_tensions_tell_more_apart(index_report: dict[str, Any]) -> None:
-    """At the same mean force, the same strokes and the same number of them."""
-    subject = read_subject(INDEX)
-    ranges = as_array(find_ranges(subject, []))
-    varied, even = (
-        report(excite(subject, find_ranges(subject, []), Plan(ranges, **plan)), "tendonfmu excite")
-        for plan in ({"vary": Variation(5.0, 20.0)}, {"pretensions": (12.0,)})
-    )
-    assert varied["blocks"][0]["pretension"] == pytest.approx(12.0, rel=0.1)
-    assert varied["identifiable"] >= 1.25 * even["identifiable"]
-    assert varied["known_combinations"] > even["known_combinations"]
-    assert even["identifiable"] >= index_report["identifiable"]
 
 
 def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
-from optional_parts import needs
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import read_previous_fit
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
@@ -221,24 +220,3 @@ def test_a_previous_fit_of_another_finger_is_refused(previous: tuple[FrictionFit
     file.write_text(json.dumps(report), encoding="utf-8")
     with pytest.raises(InputError, match=r"other.json: none of its \d+ numbers"):
         fitted(TRUTH, made_recording(), previous=file)
-
-
-# --- measured ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-@needs("davinci data")
-def test_one_light_load_leaves_a_jaw_fit_for_the_others() -> None:
-    """The bench on the lightest and the heaviest load; docs/evidence/recalibration.md has all of them."""
-    from evidence.fit import recalibration
-
-    rows = recalibration.campaign(
-        [way for way in recalibration.ways([0.02]) if "description" not in way.name and "0.1" not in way.name],
-        planted=(1.0, 1.3),
-        only=("00", "09"),
-    )
-    ratio = {(row["way"].split(",")[0], row["planted"], row["run"]): row["ratio"] for row in rows}
-    assert ratio["each sample counts", 1.0, "00"] > 2.0
-    for run in ("00", "09"):
-        assert ratio["from the report", 1.0, run] <= 1.06
-        assert ratio["from the report", 1.3, run] < 1.0

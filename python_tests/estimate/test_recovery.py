@@ -1,14 +1,12 @@
 """A fit finds the 472 numbers of a finger that made its recording itself (evidence/fit/recovery.py).
 
-Here one seed, 400 s at 25 Hz: as much noise per second as in the campaign at 1 kHz, so nearly the same errors, at a
-fortieth of the time. The campaign itself, 20 seeds at 1 kHz, takes an hour on two cores: `./test -m campaign
-python_tests/estimate/test_recovery.py`. docs/evidence/fit.md has its figures.
+Here one seed, 400 s at 25 Hz: as much noise per second as at 1 kHz, so nearly the same errors, at a fortieth of the
+time. docs/evidence/fit.md has the figures of 20 seeds at 1 kHz.
 """
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +43,7 @@ def test_the_recording_is_the_models_own(case: Any) -> None:
     assert abs(2 * cost - count) < 5 * np.sqrt(2 * count)
     pull = gradient @ np.linalg.solve(information + np.diag((10 * known.scale) ** -2.0), gradient)
     assert abs(pull - len(gradient)) < 5 * np.sqrt(2 * len(gradient))
-    assert case.least_force > 1.0
+    assert case.recording["tendon_force"].min() > 1.0
 
 
 @pytest.mark.long
@@ -69,7 +67,7 @@ def test_an_excite_motion_tells_most_of_the_numbers(row: dict[str, float]) -> No
 @pytest.mark.long
 @pytest.mark.parametrize("method", ["batch", "ekf"])
 def test_they_are_found_within_their_errors(row: dict[str, float], method: str) -> None:
-    """One seed; the errors of neighbours go along with one another, so the campaign's limits are too narrow here."""
+    """One seed; the errors of neighbours go along with one another, so the limits of 20 seeds are too narrow here."""
     assert row[f"{method}_far"] <= 0.03 * row["identifiable"]
     assert 0.6 < row[f"{method}_variance"] < 1.6
 
@@ -78,18 +76,3 @@ def test_they_are_found_within_their_errors(row: dict[str, float], method: str) 
 def test_both_methods_agree(row: dict[str, float]) -> None:
     assert row["converged"] == 1
     assert row["apart_rms"] < 1.0
-
-
-@pytest.mark.campaign
-def test_campaign(tmp_path: Path) -> None:
-    """20 seeds of 400 s at 1 kHz."""
-    from evidence.fit.recovery import run_seed, summary
-    from evidence.runner import run_cases
-
-    found = summary(run_cases(run_seed, {f"seed_{seed}": (seed,) for seed in range(20)}, tmp_path))
-    assert found["least identifiable"] >= 0.7
-    assert found["not converged"] == 0
-    for method in ("batch", "ekf"):
-        assert found[f"{method}: within 3 standard errors"] >= 0.99
-        assert 0.8 <= found[f"{method}: variance"] <= 1.25
-    assert found["ekf − batch, rms in standard errors"] < 1.0

@@ -37,8 +37,3 @@ def test_a_corruption_changes_its_columns_alone(sound: pd.DataFrame, corruption:
         differing = {column for column in sound if not np.array_equal(sound[column], changed[column])}
         elements = {column.split("[")[-1] for column in chosen}
         assert differing and {column.split("[")[-1] for column in differing} <= elements
-
-
-def test_names_are_unique() -> None:
-    names = [(each.family, each.name) for each in CORRUPTIONS]
-    assert len(set(names)) == len(names) > 60

@@ -1,4 +1,4 @@
-"""Every table of docs/evidence/ has a command that makes it, and one command runs them all."""
+"""One command runs the commands of docs/evidence/."""
 
 from __future__ import annotations
 
@@ -11,53 +11,17 @@ from pathlib import Path
 import pytest
 
 from evidence import __main__ as every_table
-from evidence.pages import Block, blocks_of, pages, tables_of
+from evidence.__main__ import Block, blocks_of, pages
 from repository_paths import ROOT
 from tendonfmu.cli.program import app
 
-BLOCKS = every_table.every_block()
-
-PAGE = """# Evidence
-
-## First
-
-| before | its block |
-| --- | --- |
-
-```sh
-# 2 min of one core; needs ../shared/data, requirements-foreign.lock
-python -m evidence.first
-```
-
-| after | it |
-| --- | ---: |
-
-## Second
-
-| nobody | makes it |
-| --- | --- |
-
-## Third, of the first
-
-By the commands of [First](#first): figures.
-
-| of | another |
-| --- | --- |
-"""
+BLOCKS = [block for page in pages() for block in blocks_of(page)]
 
 
-def test_every_table_names_a_command() -> None:
-    tables = [table for page in pages() for table in tables_of(page)]
-    assert len(tables) > 25
-    orphans = [f"{table.page.relative_to(ROOT)}:{table.line}" for table in tables if table.maker is None]
-    assert orphans == [], "a table needs a block of ```sh in its section, or 'By the commands of [Heading](#heading)'"
-
-
-def test_the_command_of_every_table_is_run_by_the_tool() -> None:
-    run = {(block.page, block.line) for block in BLOCKS}
-    makers = [table.maker for page in pages() for table in tables_of(page) if table.maker is not None]
-    assert {(maker.page, maker.line) for maker in makers} <= run
-    assert len({block.name for block in BLOCKS}) == len(BLOCKS)
+def test_each_page_with_a_table_has_a_command() -> None:
+    for page in pages():
+        assert "\n| ---" not in page.read_text(encoding="utf-8") or blocks_of(page), page.name
+    assert len(BLOCKS) > 25 and len({block.name for block in BLOCKS}) == len(BLOCKS)
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
@@ -74,18 +38,6 @@ def test_a_block_says_its_time_and_calls_what_is_there(block: Block) -> None:
             assert (ROOT / what).is_file() or (what == "-m" and importlib.util.find_spec(module))
         else:
             assert program == "cmake" or what in commands
-
-
-def test_a_table_belongs_to_the_block_of_its_section(tmp_path: Path) -> None:
-    page = tmp_path / "made.md"
-    page.write_text(PAGE, encoding="utf-8")
-    (block,) = blocks_of(page)
-    assert (block.name, block.minutes, block.needs) == (
-        "made_first",
-        2.0,
-        ("../shared/data", "requirements-foreign.lock"),
-    )
-    assert [table.maker for table in tables_of(page)] == [block, block, None, block]
 
 
 # --- running ----------------------------------------------------------------------------------------------------------
@@ -128,13 +80,8 @@ def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "partly: SKIPPED: half of it" in capsys.readouterr().err
 
 
-def test_the_programs_are_those_of_this_python(tmp_path: Path) -> None:
+def test_the_programs_are_those_of_this_python_and_the_list_has_the_whole_time(tmp_path: Path) -> None:
     here = block("here", "python -c 'import sys; print(sys.prefix)'; tendonfmu --version")
     assert every_table.make([here], tmp_path, False) == 0
     assert sys.prefix in (tmp_path / "here.md").read_text(encoding="utf-8")
-
-
-def test_the_list_has_every_table_and_the_whole_time() -> None:
-    text = every_table.listing(BLOCKS)
-    assert all(f"{block.name} " in text for block in BLOCKS)
-    assert text.splitlines()[-1].startswith("all: ")
+    assert every_table.listing(BLOCKS).splitlines()[-1].startswith("all: ")

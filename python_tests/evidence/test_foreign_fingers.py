@@ -7,17 +7,18 @@ import json
 import re
 import sys
 from importlib import import_module
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from evidence.diagnosis import command
-from evidence.diagnosis.command import run_diagnose
-from evidence.diagnosis.foreign_cases import cases_of, markdown, row_of
+from evidence.diagnosis import case as diagnosis_case
+from evidence.diagnosis.case import run_command
+from evidence.diagnosis.foreign_cases import markdown, row_of
+from evidence.diagnosis.makers import foreign_finger
 from evidence.fingers import numpy_cases, recorded
+from evidence.fingers.families import cases_of
 from evidence.fingers.foreign import Array, Truth
 from optional_parts import is_there, needs
 from repetitions import repeated
@@ -167,9 +168,10 @@ REPORT = {
     "gain": {"value": 0.5, "interval": [0.4, 0.6]},
     "causes": [{"effect": "gravity", "joint": 1, "tendon": None, "gain": {"value": 0.5, "interval": [0.4, 0.6]}}],
 }
+ARGUMENTS = "diagnose finger.json recording_1.parquet --test test_1.parquet --kinematics 1 -o report --no-progress"
 WRITES = f"""
 import os, sys
-assert sys.argv[1:] == "diagnose finger.json -o report --no-progress".split()
+assert sys.argv[1:] == {ARGUMENTS!r}.split()
 spent = sum(k * k for k in range(2_000_000))
 os.mkdir("report")
 open("report/diagnosis.json", "w").write({json.dumps(REPORT)!r})
@@ -178,14 +180,13 @@ FAILS = "import sys\nprint('some words', file=sys.stderr)\nsys.exit('internal er
 SLEEPS = "import time\ntime.sleep(60)"
 
 
-def test_the_table_has_a_row_for_each_end_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    case = numpy_cases.make(6, 1.0, 0.5)
+def test_the_table_has_a_row_for_each_end_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = numpy_cases.make(6, 1.0, 0.5)
     rows = []
     for k, (program, limit) in enumerate(((WRITES, 60.0), (FAILS, 60.0), (SLEEPS, 0.5))):
-        monkeypatch.setattr(command, "PROGRAM", (sys.executable, "-c", program))
-        (tmp_path / str(k)).mkdir()
-        run = run_diagnose(["finger.json"], tmp_path / str(k), limit)
-        rows.append(json.loads(json.dumps(row_of(case, run) | {"name": f"made_0{k}"})))
+        monkeypatch.setattr(diagnosis_case, "PROGRAM", (sys.executable, "-c", program))
+        row = row_of("numpy", made.truth, run_command(foreign_finger(made), limit=limit))
+        rows.append(json.loads(json.dumps(row | {"name": f"made_0{k}"})))
     assert [row["exit"] for row in rows] == [0, 1, None] and rows[2]["message"] == "ended after 0.5 s"
     assert rows[0]["seconds"] > 0.02 and rows[0]["peak_megabytes"] > 3.0
     assert rows[0]["first"] and rows[0]["false"] == [] and rows[0]["error_ratio"] == pytest.approx(0.5)

@@ -128,8 +128,3 @@ def test_what_refitting_absorbs_need_not_be_named(hidden: str) -> None:
     truth = truth_of(foreign.Truth(hidden, 2, tendon=2))
     for causes in ([], [cause(hidden, tendon=2)]):
         assert judge(causes, truth).in_set is None and judge(causes, truth).false == ()
-
-
-def test_what_survives_refitting_by_less_than_a_tenth_of_the_residual_need_not_be_named() -> None:
-    shares = (None, 0.2, 0.05)
-    assert [truth_of(foreign.Truth("gravity", 2, survives=share)).visible for share in shares] == [True, True, False]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from evidence.reliability import __main__ as reliability
-from evidence.reliability.row import Outcome, Run, Unavailable, spoken
+from evidence.reliability.row import Outcome, Run, Unavailable
 
 
 def use(monkeypatch: pytest.MonkeyPatch, measure: Callable[[Run], Outcome], work: Path, *words: str) -> int:
@@ -57,7 +57,3 @@ def test_a_finding_an_error_and_what_is_missing_are_said(
     assert use(monkeypatch, measure, tmp_path, "-o", str(tmp_path / "table.md")) == status
     assert text in (tmp_path / "table.md").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "R2.json").read_text(encoding="utf-8"))["sound"] == (status == 0)
-
-
-def test_large_counts_are_spoken() -> None:
-    assert [spoken(x) for x in (7, 20_000, 86_400_000, 1e7)] == ["7", "20,000", "8.64e7", "1e7"]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from evidence import tables
-from evidence.runner import ROOT, digest, run_cases
+from evidence.runner import ROOT, run_cases
 
 
 def measured(number: int, log: str) -> dict[str, Any]:
@@ -36,11 +36,6 @@ def test_a_case_with_a_row_is_not_run_again_and_a_failed_one_is(tmp_path: Path) 
     assert files == [f"case_{number}.json" for number in (1, 2, 3, 4)]
 
 
-def test_errors_are_rows_where_they_count(tmp_path: Path) -> None:
-    rows = run_cases(measured, {"case_2": (2, str(tmp_path / "log"))}, tmp_path, keep_errors=True)
-    assert "not yet" in rows[0]["error"]
-
-
 @pytest.mark.slow
 def test_the_same_rows_come_from_workers(tmp_path: Path) -> None:
     cases = {f"case_{number}": (number, 10) for number in (20, 30)}
@@ -51,10 +46,6 @@ def test_the_same_rows_come_from_workers(tmp_path: Path) -> None:
 def divmod_row(number: int, by: int) -> dict[str, int]:
     quotient, rest = divmod(number, by)
     return {"quotient": quotient, "rest": rest}
-
-
-def test_settings_that_differ_have_other_names() -> None:
-    assert digest({"a": np.array([1.0])}) == digest({"a": [1.0]}) != digest({"a": [1.5]})
 
 
 def test_cells_have_their_intervals() -> None:

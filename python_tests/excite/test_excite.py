@@ -20,9 +20,14 @@ from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, Variatio
 from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, joint_coverage, read_subject
 from tendonfmu.files.tables import read_table
 from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces, moment_arms, pretension_vector
 from tendonfmu.model.description import estimated_numbers
-from tendonfmu.model.friction_places import effects, working_point_weights
+from tendonfmu.model.friction_places import (
+    balanced_forces,
+    effects,
+    moment_arms,
+    pretension_vector,
+    working_point_weights,
+)
 from tendonfmu.statistics.quintic import evaluate
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable
-from ctypes import c_double, c_int, c_uint
+from ctypes import c_double, c_uint
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -214,7 +214,7 @@ class Calls(RuleBasedStateMachine):
             assert set(flags) <= {0, 1}
 
 
-@pytest.mark.parametrize("examples", [pytest.param(60), pytest.param(3000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [pytest.param(60), pytest.param(300, marks=pytest.mark.long)])
 def test_random_calls(small_fmu: UnpackedFmu, examples: int) -> None:
     machine = type("CallsOfTheSmallFmu", (Calls,), {"fmu": small_fmu})
     run_state_machine_as_test(  # type: ignore[no-untyped-call]
@@ -223,28 +223,3 @@ def test_random_calls(small_fmu: UnpackedFmu, examples: int) -> None:
             max_examples=examples, stateful_step_count=60, deadline=None, suppress_health_check=list(HealthCheck)
         ),
     )
-
-
-def test_wild_numbers_of_everything(small_fmu: UnpackedFmu) -> None:
-    """Steps and experiments of any double, written straight into an instance that is reset whenever it refuses."""
-    import random
-
-    clock = random.Random(7)
-    wild = [0.0, 1.0, -1.0, 5e-324, 1e-9, 1e12, 1e15, 1e300, math.inf, -math.inf, math.nan]
-    with Instance(small_fmu) as instance:
-        for _ in range(3000):
-            first, second = clock.choice(wild), clock.choice(wild)
-            status = clock.choice(
-                [
-                    lambda a, b: instance.setup(a, b),
-                    lambda a, b: instance.step(a, b),
-                    lambda a, b: instance.set_real({INPUTS[0]: a, INPUTS[2]: b}),
-                    lambda a, b: instance.set_real({STATIC: a, TUNABLE[0]: b}),
-                    lambda a, b: instance.call("EnterInitializationMode"),
-                    lambda a, b: instance.call("ExitInitializationMode"),
-                    lambda a, b: instance.call("SetDebugLogging", c_int(1), 0, None),
-                ]
-            )(first, second)
-            assert status in (OK, ERROR)
-            if status == ERROR and clock.random() < 0.5:
-                assert instance.call("Reset") == OK

@@ -317,9 +317,3 @@ def test_instances_in_threads(kind: Kind) -> None:
     expected = [run(k) for k in range(4)]
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(run, range(4))) == expected
-
-
-def test_free_without_terminate_from_every_state(kind: Kind) -> None:
-    for state in STATES:
-        with kind.brought_to(state):
-            pass

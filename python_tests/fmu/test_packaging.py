@@ -15,7 +15,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import fmpy
-import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
@@ -284,13 +283,6 @@ def test_other_versions_are_refused(call: Call, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_binary_of_the_other_version_does_not_do(tmp_path: Path) -> None:
-    (tmp_path / "binaries" / "linux64").mkdir(parents=True)
-    (tmp_path / "binaries" / "linux64" / "tendonfmu.so").write_bytes(b"of FMI 2.0")
-    with pytest.raises(InputError, match=r"no binary; expected <FMI platform>/tendonfmu_fmi3\.so, \.dll or \.dylib"):
-        build(FINGER, tmp_path / "out.fmu", binaries=tmp_path / "binaries", fmi=3)
-
-
 @pytest.mark.parametrize("problem", ["finger", "folder", "binaries", "directory"])
 def test_a_failure_is_one_line_and_leaves_nothing(problem: str, tmp_path: Path) -> None:
     (tmp_path / "finger.json").write_text(json.dumps(FINGER | ({"tendons": []} if problem == "finger" else {})))
@@ -316,15 +308,6 @@ def test_a_failure_keeps_the_file_that_was_there(tmp_path: Path) -> None:
 # --- before fmpy ------------------------------------------------------------------------------------------------------
 
 
-def test_the_texts_of_variables_stand_alone() -> None:
-    """A user of the FMU has no paper at hand whose equations the texts could number."""
-    for file in ("variables.json", "plant_variables.json"):
-        table = json.loads((ROOT / "modelDescription" / file).read_text("utf-8"))
-        texts = [group["description"] for group in table["groups"]]
-        texts += [text for _, text in table["parameters"].get("descriptions", [])]
-        assert len(texts) > 10 and not [text for text in texts if re.search(r"\b(eqs?|fig)\. ", text)]
-
-
 def findings(fmu: Path, version: int) -> list[str]:
     """What FMI's schemas and fmpy's rules of names, units, start values and structure find."""
     description = fmpy.read_model_description(str(fmu), validate=True)
@@ -345,12 +328,6 @@ def test_fmpy_finds_nothing(description: dict[str, Any], fmi: int, tmp_path: Pat
 @pytest.mark.parametrize(("finger", "fmi"), [(INDEX_FINGER, 2), (INDEX_FINGER, 3), (CALIBRATED, 3)])
 def test_fmpy_finds_nothing_in_large_fingers(finger: Path, fmi: int, tmp_path: Path) -> None:
     assert findings(build(finger, tmp_path / "finger.fmu", fmi=fmi), fmi) == []
-
-
-def test_fmpy_simulates(packed: Pack) -> None:
-    fmu = packed(TINY)
-    result = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.01)
-    assert np.all(np.isfinite(result["compensated_torque[1]"]))
 
 
 def test_another_guid_is_refused(packed: Pack, tmp_path: Path) -> None:

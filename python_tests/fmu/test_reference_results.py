@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 import re
 import subprocess
 import sys
@@ -40,6 +39,7 @@ RESULT_ALONE = """<?xml version="1.0" encoding="UTF-8"?>
     <Related type="text/csv" source="SOURCE" role="result" description="Output of the default experiment"/>
 </fmiReferences>
 """
+LARGEST = np.abs(np.genfromtxt(INPUTS.with_name("cable_loop_ref.csv"), delimiter=",", skip_header=1, usecols=1)).max()
 Edit = Callable[[dict[str, bytes]], None]
 
 
@@ -56,6 +56,11 @@ def check(fmu: Path, *more: Path | str) -> Answer:
 def members(fmu: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(fmu) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
+
+
+def tolerance_in(done: Answer) -> float:
+    """Of the first row, that of compensated_torque[1], which LARGEST is of."""
+    return float(done.out.splitlines()[1].split()[2])
 
 
 def table(text: bytes) -> Any:
@@ -143,7 +148,7 @@ def test_the_experiment_and_the_options_say_the_same(fmu: Path) -> None:
     options = dict(line.split(",") for line in files[OPTIONS].decode().splitlines())
     assert options == {
         "StartTime": "0.0",
-        "StopTime": "4.9921875",
+        "StopTime": "1.9921875",
         "StepSize": "0.0078125",
         "RelTol": "1e-09",
         "AbsTol": "1e-12",
@@ -275,21 +280,6 @@ def test_fmpy_finds_no_outlier(fmu: Path, tmp_path: Path) -> None:
     assert validate_result(result, moved, options["StopTime"]) > 0.0
 
 
-def test_a_changed_parameter_or_finger_differs(fmu: Path, edited: Callable[[Edit], Path], tmp_path: Path) -> None:
-    assert check(fmu, "--set", "bias.forget_rate=7").status == 1
-    description = json.loads(DESCRIPTION.read_text(encoding="utf-8"))
-    description["tendons"][0]["stiffness"] *= 1.001
-    other = members(tf.build(description, tmp_path / "other.fmu"))
-    extra = {name: content for name, content in members(fmu).items() if name.startswith("extra/")}
-
-    def with_another_finger(files: dict[str, bytes]) -> None:
-        files.clear()
-        files.update(other | extra)
-
-    done = check(edited(with_another_finger))
-    assert done.status == 1 and "joint_angle[1]" in done.out
-
-
 def alone(source: str) -> Edit:
     """Only the result is left in the manifest, as in the Reference FMUs."""
 
@@ -303,7 +293,7 @@ def alone(source: str) -> Edit:
 def test_a_result_alone_takes_inputs_and_options_that_lie_beside_it(edited: Callable[[Edit], Path]) -> None:
     done = check(edited(alone("cable_loop_ref.csv")))
     assert done.status == 0, done.err
-    assert " 7.583e-11 " in done.out  # the tolerance of the options
+    assert tolerance_in(done) == pytest.approx(1e-9 * LARGEST + 1e-12, rel=1e-3)  # of the options
 
 
 def test_an_experiment_without_a_tolerance_gets_a_stated_one(edited: Callable[[Edit], Path]) -> None:
@@ -314,8 +304,8 @@ def test_an_experiment_without_a_tolerance_gets_a_stated_one(edited: Callable[[E
     fmu = edited(without_options)
     done = check(fmu)
     assert done.status == 0, done.err
-    assert " 7.483e-05 " in done.out  # 1e-3 of the largest
-    assert " 7.483e-11 " in check(fmu, "--tolerance", "1e-9").out
+    assert tolerance_in(done) == pytest.approx(1e-3 * LARGEST, rel=1e-3)
+    assert tolerance_in(check(fmu, "--tolerance", "1e-9")) == pytest.approx(1e-9 * LARGEST, rel=1e-3)
 
 
 def test_an_experiment_in_the_newer_form_sets_parameters(edited: Callable[[Edit], Path]) -> None:
@@ -323,7 +313,7 @@ def test_an_experiment_in_the_newer_form_sets_parameters(edited: Callable[[Edit]
 
     def edit(files: dict[str, bytes]) -> None:
         files[EXPERIMENT] = b"""<Experiments name="two"><Experiment name="first"><TransientSimulation startTime="0"
-            stopTime="4.9921875" stepSize="0.0078125"/><Parameters source="set.ssv"/>
+            stopTime="1.9921875" stepSize="0.0078125"/><Parameters source="set.ssv"/>
             <Stimuli source="cable_loop_in.csv"/><References source="cable_loop_ref.csv"/></Experiment></Experiments>"""
         files[f"{FOLDER}/set.ssv"] = b"""<ssv:ParameterSet version="1.0" name="set"
             xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"><ssv:Parameters>

@@ -78,12 +78,6 @@ def test_all_files_are_listed_and_none_is_of_fmi(fingers: list[UnpackedFmu]) -> 
         assert set(re.findall(r'#include "([^"]+)"', text)) <= present | set(NAMES), name
 
 
-def test_the_documentation_says_how_to_build(fingers: list[UnpackedFmu]) -> None:
-    page = (fingers[0].folder / "documentation" / "index.html").read_text()
-    for word in ("cmake -S sources", "FMI_HEADERS", "BUILD_SHARED_LIBS=OFF", "FMI2_FUNCTION_PREFIX", "fmpy compile"):
-        assert word in page
-
-
 @needs_tools
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_caller_of_the_documentation_compiles(tmp_path: Path, fmi: int) -> None:
@@ -204,21 +198,6 @@ def arguments_of(fmu: UnpackedFmu, samples: Path) -> list[str | Path]:
 
 @pytest.mark.long
 @needs_tools
-@pytest.mark.slow
-def test_a_prefix_is_before_every_name(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
-    parts = compile_with_prefix(fingers[1], "main", tmp_path)
-    (tmp_path / "main.c").write_text(
-        "int main_main(int, char**);\nint main(int count, char** words) { return main_main(count, words); }"
-    )
-    run("cc", tmp_path / "main.c", *parts, "-o", tmp_path / "program", "-lm")
-    printed = run(tmp_path / "program", *arguments_of(fingers[1], tmp_path / "samples.txt")).splitlines()
-    expected = bits_of_binary(fingers[1])
-    assert [line.strip() for line in printed] == expected
-    assert len(set(expected)) > SAMPLES / 2  # it moves
-
-
-@pytest.mark.long
-@needs_tools
 def test_two_fingers_in_one_program(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
     parts: list[str | Path] = []
     arguments: list[str | Path] = []
@@ -241,18 +220,6 @@ def moves_like(fmu: UnpackedFmu, library: Path, folder: Path) -> bool:
     place.mkdir(parents=True)
     shutil.copy(library, place)
     return bits_of_binary(UnpackedFmu(folder)) == bits_of_binary(fmu)
-
-
-@pytest.mark.long
-@needs_tools
-@pytest.mark.slow
-def test_without_a_prefix_all_but_fmi_is_hidden(fingers: list[UnpackedFmu], tmp_path: Path) -> None:
-    fmu = fingers[1]
-    objects = compile_sources(fmu, tmp_path / "objects", "-fPIC", f"-I{write_headers(tmp_path / 'headers')}")
-    library = tmp_path / fmu.binary.name
-    run("cc", "-shared", *objects, "-o", library, "-lm")
-    assert exports_fmi_alone(library)
-    assert moves_like(fmu, library, tmp_path / "fmu")
 
 
 def built_by_cmake(fmu: UnpackedFmu, folder: Path, *options: str) -> Path:

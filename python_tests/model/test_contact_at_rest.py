@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 import json
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -268,25 +267,6 @@ def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
 
 
 # --- the FMU and the saved state
-
-
-def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
-    import fmpy
-
-    description, _recording = resting_case(300)
-    plain = description | {"contact": {k: v for k, v in description["contact"].items() if k != "rest"}}
-    names = {}
-    for name, data in (("rest", description), ("plain", plain)):
-        (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu", illustrated=False)
-        variables = fmpy.read_model_description(str(fmu)).modelVariables
-        names[name] = {variable.name: variable for variable in variables}
-    added = set(names["rest"]) - set(names["plain"])
-    n = len(description["joints"])
-    assert {"contact_at_rest", *(f"contact_change[{j + 1}]" for j in range(n))} <= added
-    assert all(each.startswith(("contact.rest.", "contact_change[", "contact_at_rest")) for each in added)
-    assert names["rest"]["contact_change[1]"].unit == "N.m" and names["rest"]["contact_at_rest"].type == "Boolean"
-    assert names["rest"]["contact.rest.travel"].unit == "m"
 
 
 def test_a_saved_rest_goes_on() -> None:

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from extension_cases import ROWS, name_of, random_rows
+from extension_cases import ROWS, name_of
 from fmu_binary import FINGER
+from random_extensions import random_extensions
 from random_fingers import random_case
 from repetitions import repeated
 from repository_paths import ROOT
@@ -115,11 +116,10 @@ def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_nothing_undeclared_influences_with_ten_extensions(seed: int, tmp_path: Path) -> None:
+def test_nothing_undeclared_influences_with_extensions(seed: int, tmp_path: Path) -> None:
     description, recording = random_case(seed, samples=100)
-    rng = np.random.default_rng([seed, 21])
     joints, tendons = len(description["joints"]), len(description["tendons"])
-    description["extensions"] = random_rows(rng, joints, tendons, 10)
+    description["extensions"] = random_extensions(np.random.default_rng([seed, 21]), joints, tendons, thresholds=False)
     nothing_undeclared_influences(description, recording, (1, 50, 99), tmp_path)
 
 
@@ -207,58 +207,6 @@ def test_contact_depends_as_the_torques_do(tmp_path: Path) -> None:
             assert set(found["contact"][0][name]) == together
 
 
-def slack_by_hand(finger: Instance, sample: Sample, name: str, i: int, tendon: int) -> bool:
-    """Whether some small change of one input of a first sample flips a tendon's slack."""
-    flags = set()
-    for change in (-1e-6, 0.0, 1e-6):
-        moved = {**sample, name: sample[name].copy()}
-        moved[name][0, i] += change
-        finger.reset()
-        finger.set_kinematics_source(3)
-        finger.set(sample["parameters"])
-        flags.add(bool(finger.run(moved)["slack"][0, tendon]))
-    return len(flags) == 2
-
-
-@pytest.mark.parametrize(
-    ("path", "passes", "angles", "velocities"),
-    [
-        ("tendons[1].edge_friction[1]", 1.0, [], [0, 1]),
-        ("tendons[1].edge_friction[2]", 1.0, [0], [1]),
-        ("tendons[1].pulley_friction[1]", 1.0, [], [1]),
-    ],
-)
-def test_slack_follows_every_effect(
-    path: str, passes: float, angles: list[int], velocities: list[int], tmp_path: Path
-) -> None:
-    """A loss of just the whole force: the smallest change of what the effect depends on decides on slack."""
-    found = declared(FINGER, tmp_path)["slack"]
-    assert found[0]["joint_velocity"] == [0, 1] and found[0]["joint_position"] == [0, 1]
-    assert found[2] == {}  # a cable loop
-    finger = Instance.from_description(FINGER, 3)
-    velocity = np.array([[0.3, 0.4]])
-    arms = np.array(FINGER["tendons"][0]["moment_arms"])
-    speed = float(arms[min(velocities) :] @ velocity[0, min(velocities) :])
-    values = {}
-    for parameter in finger.parameters():
-        law, name = parameter.path.rsplit(".", 1)[0], parameter.path.rsplit(".", 1)[-1]
-        if name in ("static", "coulomb", "viscous"):
-            values[parameter.path] = 0.0
-        if name == "viscous" and law.startswith(path):
-            # at angle 0, half way between the working points, the mean of the two laws holds
-            values[parameter.path] = passes / speed * (1.5 if "laws[2]" in law else 0.5 if "laws[1]" in law else 1.0)
-    sample = {
-        "time": np.zeros(1),
-        "tendon_force": np.full((1, 3), 5.0),
-        "tendon_position": np.zeros((1, 3)),
-        "joint_position": np.zeros((1, 2)),
-        "joint_velocity": velocity,
-        "parameters": values,
-    }
-    assert [i for i in range(2) if slack_by_hand(finger, sample, "joint_position", i, 0)] == angles
-    assert [i for i in range(2) if slack_by_hand(finger, sample, "joint_velocity", i, 0)] == velocities
-
-
 # --- one finger by hand -----------------------------------------------------------------------------------------------
 
 
@@ -288,9 +236,6 @@ def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path)
 
 
 # --- extensions ------------------------------------------------------------------------------------------------------
-
-
-TORQUES = ("compensated_torque", "friction_torque", "bias_torque")
 
 
 def bare(row: dict[str, Any]) -> dict[str, Any]:
@@ -325,41 +270,6 @@ def test_each_declared_number_of_an_extension_influences(row: dict[str, Any], tm
             finger.restore_state(state)
             finger.run(rows_of(recording, k, k + 1))
     assert {pair for pair in seen if pair[0] in NUMBERS} == wanted
-
-
-@pytest.mark.parametrize(
-    ("row", "angles", "velocities"),
-    [
-        ({"effect": "gravity", "joint": 3, "sine": 1}, [[0, 2], [], [0, 2]], [[], [], []]),
-        ({"effect": "inertia", "joint": 2, "inertia": 1}, [[], [1], []], [[], [1], []]),
-        ({"effect": "joint_coupling", "joint": 2, "stiffness": 1}, [[], [1, 2], [1, 2]], [[], [], []]),
-        # passes joints 1 and 3
-        ({"effect": "preload_friction", "tendon": 1, "coulomb": 1}, [[0, 2], [], [0, 2]], [[0, 2], [], [0, 2]]),
-        ({"effect": "preload_friction", "joint": 2, "tendon": 1, "coulomb": 1}, [[], [], [2]], [[], [], [2]]),
-        ({"effect": "load_friction", "joint": 1, "tendon": 1, "coulomb": 1}, [[0], [], []], [[0], [], []]),
-        ({"effect": "force_gain", "tendon": 1, "correction": 1}, [[], [], []], [[], [], []]),
-    ],
-    ids=lambda value: value["effect"] if isinstance(value, dict) else "",
-)
-def test_extensions_by_hand(
-    row: dict[str, Any], angles: list[list[int]], velocities: list[list[int]], tmp_path: Path
-) -> None:
-    """Three joints, the axis of the second one across the others, the first tendon passing joints 1 and 3."""
-    arms = [[0.01, 0.0, 0.005], [-0.01, 0.004, 0.0], [0.0, -0.004, -0.005], [0.003, 0.002, 0.001]]
-    description = {
-        "format": "tendonfmu-finger-1",
-        "name": "bare",
-        "joints": [{}, {}, {}],
-        "tendons": [{"stiffness": 1e3, "moment_arms": each} for each in arms],
-        "contact": {"threshold": [0.1] * 3},
-        "links": [{"axis": [0, 0, 1]}, {"axis": [0, 1, 0]}, {"axis": [0, 0, -3]}],
-        "tip": [0.1, 0, 0],
-        "extensions": [row],
-    }
-    found = declared(description, tmp_path)
-    for output in TORQUES:
-        assert [each["joint_position"] for each in found[output]] == angles
-        assert [each["joint_velocity"] for each in found[output]] == velocities
 
 
 # --- in the model description -----------------------------------------------------------------------------------------

@@ -131,13 +131,6 @@ def test_schema_takes_valid_fingers(description: dict[str, Any]) -> None:
     VALIDATOR.validate(description)
 
 
-def test_schema_takes_random_fingers() -> None:
-    for seed in range(50):
-        description = random_finger(seed)
-        assert accepted(description) is None
-        VALIDATOR.validate(description)
-
-
 @pytest.mark.parametrize("every", repeated([7, 1], 0))
 def test_schema_agrees_with_the_reader_on_every_changed_value(every: int) -> None:
     """Every seventh of them changes each value in two ways or more."""
@@ -251,14 +244,6 @@ def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
     assert [number.path for number in unknowns(description)][-len(fitted) :] == fitted
 
 
-def test_summary_counts_extensions(tmp_path: Path) -> None:
-    (tmp_path / "finger.json").write_text(json.dumps(FINGER | {"extensions": extension_cases.ROWS}))
-    lines = read_finger(tmp_path / "finger.json").summary()
-    found = next(line for line in lines if line.startswith("extensions "))
-    assert found.split()[:4] == ["extensions", str(len(extension_cases.ROWS)) + ":", "1", "cover_hardening,"]
-    assert "3 friction_drift" in found
-
-
 def test_summary_says_what_the_finger_is() -> None:
     text = "\n".join(read_finger(INDEX_FINGER).summary())
     for part in ("index_finger", "mcp_abduction", "dip_extensor", "472", "116"):
@@ -283,14 +268,3 @@ def test_a_refusal_is_one_line_with_file_and_key(tmp_path: Path, content: bytes 
         read_finger(path)
     message = str(refused.value)
     assert message.startswith(f"{path}: ") and expected in message and "\n" not in message
-
-
-def test_numbers_are_named_after_what_they_belong_to() -> None:
-    found = {number.path: f"{number.kind}.{number.key}" for number in unknowns(with_everything())}
-    assert found["joints[1].friction.coulomb"] == "friction.coulomb"
-    assert {kind for path, kind in found.items() if "edge_friction" in path and path.endswith("coulomb")} == {
-        "edge_friction.coulomb"
-    }
-    assert found["joints[1].load_friction.coulomb"] == "load_friction.coulomb"
-    assert found["joints[2].cover.stiffness"] == "cover.stiffness"
-    assert found["extensions[1].stiffness"] == "extensions.cover_hardening.stiffness"

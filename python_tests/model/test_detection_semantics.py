@@ -114,11 +114,6 @@ def test_entry_load_takes_out_what_entering_put_in(runner: Runner, name: str) ->
         close(change[4], (1.0 - kept) * (entered - lever(force[4]) * F2))
 
 
-def test_the_first_exit_has_no_entry_load(runner: Runner) -> None:
-    out = run(runner, entry_load({"edge_friction": [ASYMMETRIC]}, {}), [10.0, 10.0, 20.0], [0.0, 0.0, -1.0])
-    close(out["bias_torque"][2, 0] - out["bias_torque"][0, 0], -0.2 * law_value(ASYMMETRIC, -V_MIN))
-
-
 def test_entry_load_of_a_slack_tendon_is_none(runner: Runner) -> None:
     """Rest 1 is entered with 10 N, rest 2 slack: leaving rest 2 takes out nothing of either."""
     out = run(runner, entry_load({"edge_friction": [LAW]}, {}, forget_rate=0.0),
@@ -294,14 +289,6 @@ def test_a_new_contact_waits_anew(runner: Runner) -> None:
     close(out["bias_torque"][:, 0], [0.1, 0.1, 0.1375, 0.1375, 0.1375, 0.1375 + 0.3 * 0.0625])
 
 
-def test_release_at_once_updates_always(runner: Runner) -> None:
-    force = [10.0, 15.0, 18.0, 9.0, 10.0]
-    never = run(runner, finger([FREE], bias=HALF, contact=NEVER), force)
-    always = run(runner, finger([FREE], bias=HALF, contact={"threshold": [0.01], "release_time": 0.0}), force)
-    assert contact_of(always)[1:4] == [1, 1, 1]
-    np.testing.assert_array_equal(always["bias_torque"], never["bias_torque"])
-
-
 def test_released_innovation_ends_the_contact_by_itself(runner: Runner) -> None:
     """With release_time 0, m follows in contact too: y = 0.05·exp(−DT·(k − 1)/0.4) passes 0.02 after k = 3."""
     innovation = {"time": 0.4, "threshold": [0.02]}
@@ -474,11 +461,3 @@ def test_standard_deviation_adds_variances(runner: Runner) -> None:
     jump, hidden = 0.1 * abs(law_value(LAW, V_MIN) - law_value(LAW, 0.01)), 0.1 * 0.05
     stopped = 0.003**2 + ((0.5 * hidden) ** 2 + (0.25 * jump) ** 2) / 3.0
     close(out["compensated_torque_std"][:, 0], [0.003, math.sqrt(stopped)])
-
-
-def test_without_the_keys_only_the_bias_deviates(runner: Runner) -> None:
-    out = run(runner, one_edge(bias=HALF), 10.0, [1.0, 0.5, 0.0])
-    close(out["compensated_torque_std"][:, 0], np.sqrt(0.03 / np.array([1.0, 4.0, 7.0])))
-    for name in ("innovation", "stuck_friction", "friction_jump", "friction_parts"):
-        close(out[name], 0.0)
-    close(out["residual"][0], 0.0)

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import subprocess
-import time
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -200,20 +199,6 @@ def contacts(lines: str) -> tuple[list[float], list[float]]:
     begins = [float(words[0]) for words in found if words[1:3] == ["s", "contact,"]]
     ends = [float(words[0]) for words in found if words[1:3] == ["s", "free"]]
     return begins, ends
-
-
-def test_control_loop_of_the_examples_feels_the_pull(control_loop: Path) -> None:
-    begins, ends = contacts(call(control_loop, FINGER, "--rate", "3000", "--seconds", "2.2", "--no-wait"))
-    # one pull, from 1.5 s to 1.8 s
-    assert begins == [pytest.approx(1.5, abs=0.005)]
-    assert ends == [pytest.approx(1.8, abs=0.005)]
-
-
-def test_control_loop_of_the_examples_waits_for_its_samples(control_loop: Path) -> None:
-    started = time.monotonic()
-    printed = call(control_loop, FINGER, "--seconds", "0.5")
-    assert time.monotonic() - started >= 0.499
-    assert " 500 samples, 0 refused" in printed and "latest sample" in printed
 
 
 def test_control_loop_of_the_examples_feels_the_pushes_of_the_demo_recording(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ import pytest
 import analytic_extension_cases  # noqa: F401  adds cases
 import analytic_force_cases  # noqa: F401
 import oracle
-from analytic_cases import CASES, DRY, LAW, finger, one_edge, recording
+from analytic_cases import CASES, DRY, finger, one_edge, recording
 from random_fingers import random_case, random_law, random_moment_arms
 from repetitions import repeated
-from runners import NATIVE, ORACLE, RUNNERS, SLOW, Runner
+from runners import RUNNERS, SLOW, Runner
 
 
 @pytest.fixture(params=RUNNERS, ids=lambda runner: runner.name)
@@ -40,29 +39,8 @@ def test_case(runner: Runner, name: str) -> None:
     def run(description: Any, samples: Any, source: int = 3) -> Any:
         return runner(description, samples, source)
 
-    CASES[name](run)
-
-
-def slow_crossings(step: float) -> dict[str, Any]:
-    """Smooth motion with rests and reversals, sampled every `step` s."""
-    time = np.arange(round(2.0 / step) + 1) * step
-    return recording(time, 10.0 + 2.0 * np.sin(3.0 * time), np.sin(2.0 * time) ** 3, np.cos(time))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("runner", [ORACLE, NATIVE], ids=lambda runner: runner.name)
-def test_halving_the_step_changes_only_what_the_signals_change(runner: Runner) -> None:
-    """At common times the difference is of the order of the step (an entry or exit is seen a step later)."""
-    bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-4}
-    description = one_edge(bias=bias)
-    steps = [0.004, 0.002, 0.001, 0.0005]
-    runs = [runner(description, slow_crossings(step), 3)["friction_torque"][:, 0] for step in steps]
-    finest = runs[-1]
-    errors = [np.abs(run - finest[:: 2 ** (3 - k)]).mean() for k, run in enumerate(runs[:-1])]
-    assert errors[0] > 0.0
-    for coarse, fine in itertools.pairwise(errors):
-        assert fine < 0.65 * coarse
-    assert errors[-1] < 0.01 * np.ptp(finest)
+    check = CASES[name]
+    check(run)
 
 
 def test_the_step_does_not_matter_while_moving(runner: Runner) -> None:
@@ -164,18 +142,6 @@ def test_defaults_are_those_of_the_contract(runner: Runner) -> None:
     assert runs[0]["contact"].any()
     for name, series in runs[0].items():
         np.testing.assert_array_equal(series, runs[1][name], err_msg=name)
-
-
-def test_routing_without_full_column_rank_is_refused() -> None:
-    twice = finger([{"moment_arms": [0.01, 0.01]}, {"moment_arms": [0.02, 0.02]}], 2)
-    with pytest.raises(ValueError, match="full column rank"):
-        oracle.FingerOracle(twice)
-
-
-def test_time_that_goes_back_is_refused() -> None:
-    rec = recording([0.0, 0.2, 0.1], 10.0, 1.0)
-    with pytest.raises(ValueError, match="before the last sample"):
-        oracle.run(one_edge(LAW), rec, 3)
 
 
 def test_a_run_is_the_same_sample_by_sample() -> None:

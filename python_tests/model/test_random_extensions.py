@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from collections import Counter
 from collections.abc import Sequence
@@ -195,15 +194,3 @@ def test_derivatives_are_those_of_the_oracle() -> None:
                     compared["not 0"] += int((slopes[output] != 0.0).sum())
     assert compared["known"] > 0.95 * compared["all"], compared
     assert compared["not 0"] > 0.3 * compared["all"], compared
-
-
-def test_a_run_of_the_oracle_is_the_same_sample_by_sample() -> None:
-    """A copied oracle continues as the original: derivatives hold what is remembered by copies."""
-    for seed in (600, 601, 603):
-        description, inputs = case(seed)
-        finger = oracle.FingerOracle(description, source_of(seed))
-        for k, time in enumerate(inputs["time"][:60]):
-            finger = copy.deepcopy(finger)
-            step = finger.step(float(time), {name: inputs[name][k] for name in oracle.INPUTS})
-            expected = oracle_run(seed).outputs["friction_torque"][k]
-            np.testing.assert_array_equal(step.values["friction_torque"], expected)

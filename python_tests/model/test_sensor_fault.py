@@ -378,24 +378,6 @@ def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
     assert names["watched"]["sensor_fault.jump_margin"].unit == "N"
 
 
-def test_the_fmu_has_every_output_at_once(tmp_path: Path) -> None:
-    """What contact at rest and the place of contact depend on, with sensors that are watched."""
-    import fmpy
-
-    data = pair()
-    joints = len(data["joints"])
-    rest = {"travel": 1e-5, "threshold": [0.01] * joints}
-    data["contact"] = data["contact"] | {"rest": rest, "drift": {"threshold": [0.01] * joints}}
-    data |= {"links": [{"axis": [0, 0, 1], "offset": [0.05, 0, 0]}] * joints, "tip": [0.05, 0, 0]}
-    (tmp_path / "all.json").write_text(json.dumps(data), encoding="utf-8")
-    fmu = product("fmu.packaging").build_fmu(tmp_path / "all.json", tmp_path / "all.fmu", illustrated=False)
-    outputs = {each.variable.name: each for each in fmpy.read_model_description(str(fmu)).outputs}
-    assert {"contact_change[1]", "contact_at_rest", "contact_link", "sensor_fault[1]"} <= set(outputs)
-    for name in ("contact_at_rest", "sensor_fault[1]"):
-        depended = {each.name.split("[")[0] for each in outputs[name].dependencies}
-        assert {"tendon_force", "tendon_position", "joint_position"} <= depended
-
-
 def test_a_saved_fault_goes_on() -> None:
     description, recording = failing_case(504)
     assert NATIVE(description, recording, 1)["sensor_fault"].any()

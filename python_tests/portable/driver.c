@@ -9,77 +9,21 @@
  *
  *   inputs count, value references; real outputs count, value references; Boolean outputs count, value references;
  *   samples count; per sample: time, inputs (bits of doubles) */
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "fmi2Functions.h"
 
 #ifdef FMI2_FUNCTION_PREFIX
-#define FUNCTION(name) (void)library
-static void* open_library(const char* path) {
-  return (void*)(uintptr_t)path;
-}
-#elif defined(_WIN32)
-#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
-#include <windows.h>
-static void* open_library(const char* path) {
-  return (void*)LoadLibraryA(path);
-}
-static void* find(void* library, const char* name) {
-  return (void*)(uintptr_t)GetProcAddress((HMODULE)library, name);
-}
-#else
-#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
-#include <dlfcn.h>
-static void* open_library(const char* path) {
-  return dlopen(path, RTLD_NOW | RTLD_LOCAL);
-}
-static void* find(void* library, const char* name) {
-  return dlsym(library, name);
-}
+#define LINKED
 #endif
-
-enum { MOST = 256 };
+#include "driver.h"
 
 typedef struct numbers {
   fmi2ValueReference references[MOST];
   unsigned count;
 } numbers;
 
-static void fail(const char* what) {
-  fprintf(stderr, "driver: %s\n", what);
-  exit(1);
-}
-
-static void expect(fmi2Status status, const char* call) {
-  if (status != fmi2OK) {
-    fail(call);
-  }
-}
-
-static unsigned long long read_bits(FILE* file) {
-  unsigned long long bits;
-  if (fscanf(file, "%llx", &bits) != 1) {
-    fail("the file of samples ends early");
-  }
-  return bits;
-}
-
-static double read_double(FILE* file) {
-  const unsigned long long bits = read_bits(file);
-  double value;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
 static numbers read_references(FILE* file) {
   numbers n;
-  n.count = (unsigned)read_bits(file);
-  if (n.count > MOST) {
-    fail("too many variables");
-  }
+  n.count = read_count(file);
   for (unsigned i = 0; i < n.count; ++i) {
     n.references[i] = (fmi2ValueReference)read_bits(file);
   }
@@ -94,14 +38,8 @@ static void print_message(fmi2ComponentEnvironment environment, fmi2String name,
 }
 
 int main(int count, char** arguments) {
-  if (count != 5) {
-    fail("usage: driver LIBRARY GUID RESOURCES SAMPLES");
-  }
-  void* library = open_library(arguments[1]);
-  FILE* file = fopen(arguments[4], "r");
-  if (!library || !file) {
-    fail(library ? "the file of samples cannot be opened" : "the library cannot be loaded");
-  }
+  FILE* file;
+  void* library = begin(count, arguments, &file);
   FUNCTION(fmi2Instantiate);
   FUNCTION(fmi2SetupExperiment);
   FUNCTION(fmi2EnterInitializationMode);
@@ -124,10 +62,8 @@ int main(int count, char** arguments) {
   int states[MOST];
   for (unsigned k = 0; k < samples; ++k) {
     const double before = time;
-    time = read_double(file);
-    for (unsigned i = 0; i < inputs.count; ++i) {
-      values[i] = read_double(file);
-    }
+    read_doubles(file, &time, 1);
+    read_doubles(file, values, inputs.count);
     if (k == 0) { /* initialisation takes the first sample, the step that ends at the second one changes nothing */
       expect(fmi2SetupExperiment(finger, fmi2False, 0.0, time, fmi2False, 0.0), "fmi2SetupExperiment");
       expect(fmi2EnterInitializationMode(finger), "fmi2EnterInitializationMode");
@@ -139,11 +75,7 @@ int main(int count, char** arguments) {
     }
     expect(fmi2GetReal(finger, outputs.references, outputs.count, values), "fmi2GetReal");
     expect(fmi2GetBoolean(finger, flags.references, flags.count, states), "fmi2GetBoolean");
-    for (unsigned i = 0; i < outputs.count; ++i) {
-      unsigned long long bits;
-      memcpy(&bits, &values[i], sizeof bits);
-      printf("%016llx ", bits);
-    }
+    print_doubles(values, outputs.count);
     for (unsigned i = 0; i < flags.count; ++i) {
       printf("%d ", states[i]);
     }

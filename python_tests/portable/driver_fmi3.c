@@ -9,78 +9,22 @@
  *
  *   inputs count, for each its value reference and its number of elements; the same of Float64 and of Boolean outputs;
  *   samples count; per sample: time, inputs (bits of doubles) */
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "fmi3Functions.h"
 
 #ifdef FMI3_FUNCTION_PREFIX
-#define FUNCTION(name) (void)library
-static void* open_library(const char* path) {
-  return (void*)(uintptr_t)path;
-}
-#elif defined(_WIN32)
-#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
-#include <windows.h>
-static void* open_library(const char* path) {
-  return (void*)LoadLibraryA(path);
-}
-static void* find(void* library, const char* name) {
-  return (void*)(uintptr_t)GetProcAddress((HMODULE)library, name);
-}
-#else
-#define FUNCTION(name) name##TYPE* name = (name##TYPE*)(uintptr_t)find(library, #name)
-#include <dlfcn.h>
-static void* open_library(const char* path) {
-  return dlopen(path, RTLD_NOW | RTLD_LOCAL);
-}
-static void* find(void* library, const char* name) {
-  return dlsym(library, name);
-}
+#define LINKED
 #endif
-
-enum { MOST = 256 };
+#include "driver.h"
 
 typedef struct numbers {
   fmi3ValueReference references[MOST];
   unsigned count, elements;
 } numbers;
 
-static void fail(const char* what) {
-  fprintf(stderr, "driver_fmi3: %s\n", what);
-  exit(1);
-}
-
-static void expect(fmi3Status status, const char* call) {
-  if (status != fmi3OK) {
-    fail(call);
-  }
-}
-
-static unsigned long long read_bits(FILE* file) {
-  unsigned long long bits;
-  if (fscanf(file, "%llx", &bits) != 1) {
-    fail("the file of samples ends early");
-  }
-  return bits;
-}
-
-static double read_double(FILE* file) {
-  const unsigned long long bits = read_bits(file);
-  double value;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
 static numbers read_references(FILE* file) {
   numbers n;
-  n.count = (unsigned)read_bits(file);
+  n.count = read_count(file);
   n.elements = 0;
-  if (n.count > MOST) {
-    fail("too many variables");
-  }
   for (unsigned i = 0; i < n.count; ++i) {
     n.references[i] = (fmi3ValueReference)read_bits(file);
     n.elements += (unsigned)read_bits(file);
@@ -94,18 +38,12 @@ static numbers read_references(FILE* file) {
 static void print_message(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                           fmi3String text) {
   (void)environment;
-  fprintf(stderr, "driver_fmi3: status %d, %s: %s\n", (int)status, category, text);
+  fprintf(stderr, "driver: status %d, %s: %s\n", (int)status, category, text);
 }
 
 int main(int count, char** arguments) {
-  if (count != 5) {
-    fail("usage: driver_fmi3 LIBRARY TOKEN RESOURCES SAMPLES");
-  }
-  void* library = open_library(arguments[1]);
-  FILE* file = fopen(arguments[4], "r");
-  if (!library || !file) {
-    fail(library ? "the file of samples cannot be opened" : "the library cannot be loaded");
-  }
+  FILE* file;
+  void* library = begin(count, arguments, &file);
   FUNCTION(fmi3InstantiateCoSimulation);
   FUNCTION(fmi3EnterInitializationMode);
   FUNCTION(fmi3ExitInitializationMode);
@@ -126,10 +64,8 @@ int main(int count, char** arguments) {
   fmi3Boolean states[MOST];
   for (unsigned k = 0; k < samples; ++k) {
     const double before = time;
-    time = read_double(file);
-    for (unsigned i = 0; i < inputs.elements; ++i) {
-      values[i] = read_double(file);
-    }
+    read_doubles(file, &time, 1);
+    read_doubles(file, values, inputs.elements);
     if (k == 0) { /* initialisation takes the first sample, the step that ends at the second one changes nothing */
       expect(fmi3EnterInitializationMode(finger, fmi3False, 0.0, time, fmi3False, 0.0), "fmi3EnterInitializationMode");
       expect(fmi3SetFloat64(finger, inputs.references, inputs.count, values, inputs.elements), "fmi3SetFloat64");
@@ -145,11 +81,7 @@ int main(int count, char** arguments) {
     }
     expect(fmi3GetFloat64(finger, outputs.references, outputs.count, values, outputs.elements), "fmi3GetFloat64");
     expect(fmi3GetBoolean(finger, flags.references, flags.count, states, flags.elements), "fmi3GetBoolean");
-    for (unsigned i = 0; i < outputs.elements; ++i) {
-      unsigned long long bits;
-      memcpy(&bits, &values[i], sizeof bits);
-      printf("%016llx ", bits);
-    }
+    print_doubles(values, outputs.elements);
     for (unsigned i = 0; i < flags.elements; ++i) {
       printf("%d ", states[i]);
     }

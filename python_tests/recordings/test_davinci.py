@@ -6,7 +6,6 @@ Needs the recordings in ../shared/data or $TENDONFMU_DATA.
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -74,21 +73,3 @@ def test_signs_and_units_by_the_error_without_a_friction_model(tmp_path: Path, n
     moment_arm = json.loads(JAW.read_text())["tendons"][0]["moment_arms"][0]
     friction = moment_arm * table["tendon_force[1]"] - table["external_torque[1]"]
     assert rms(friction[table["time"] >= SETTLED].to_numpy()) == pytest.approx(expected, abs=0.001)
-
-
-@pytest.mark.long
-def test_numbers_of_the_jaw_are_those_of_the_fit(tmp_path: Path) -> None:
-    fitted = tmp_path / "jaw.json"
-    done = subprocess.run(
-        [sys.executable, str(JAW.with_name("fit_jaw.py")), "-o", str(fitted)],
-        capture_output=True, text=True, env=os.environ | {"TENDONFMU_DATA": str(DATA)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-
-    def numbers(file: Path) -> list[float]:
-        finger = json.loads(file.read_text(encoding="utf-8"))
-        edge = finger["tendons"][0]["edge_friction"][0]
-        laws = (finger["joints"][0]["friction"], edge["positive"], edge["negative"])
-        return [law["coulomb"] for law in laws] + finger["bias"]["initial_torque"]
-
-    assert numbers(fitted) == pytest.approx(numbers(JAW), abs=2e-4)

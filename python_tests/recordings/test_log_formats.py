@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from command import Call
-from evidence.recordings.log_cases import FORMATS, START, TYPE, header, ros_store, sound, truth, write
+from evidence.recordings.log_faults import FORMATS, START, TYPE, header, ros_store, sound, truth, write
 from map_cases import LOG, SMALL, VALIDATOR, edited, written
 from repository_paths import ROOT
 from tendonfmu.errors import InputError

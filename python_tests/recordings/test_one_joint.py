@@ -142,17 +142,6 @@ def test_the_description_is_sound_and_its_numbers_are_those_of_the_log(call: Cal
     assert (fitted["coulomb"], fitted["viscous"]) == pytest.approx((COULOMB, VISCOUS), rel=0.02)
 
 
-def test_a_motor_may_turn_many_times(call: Call, tmp_path: Path) -> None:
-    """400 rad are no fault of a machine: no finding about units."""
-    signals = machine(rest=0.0)
-    signals["angle"], signals["speed"] = 200.0 * signals["angle"], 200.0 * signals["speed"]
-    machine_log(tmp_path, signals)
-    made = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "finger.json")
-    assert made.status == 0, made.err
-    answer = call("check", "finger.json", "rec.parquet")
-    assert answer.status == 0 and "nothing found" in answer.out and answer.err == "", answer
-
-
 # --- describe joint ---------------------------------------------------------------------------------------------------
 
 

@@ -1,6 +1,6 @@
 """`tendonfmu check FINGER.json RECORDING`: signs, order and units of columns, clocks and sensors.
 
-The systematic table is `bench/recording_check.py`.
+The systematic table is `evidence/recordings/check.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.match import UNFIT_FOR_SEARCH, admit, belongs, refuse_errors
-from tendonfmu.recordings.match_text import verdict
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import GROUPS, Recording, read_recording
 
@@ -333,28 +332,6 @@ def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound:
     assert answer.status == 0, answer.err
     answer = call("check", INDEX, "mended.parquet")
     assert answer.status == 0 and "belongs to this finger" in answer.out
-
-
-@pytest.mark.parametrize("how", ["--quiet", "--json"])
-def test_the_first_error_is_on_standard_error_where_nothing_stands_above(
-    call: Call, tmp_path: Path, sound: Recording, how: str
-) -> None:
-    spoilt = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "spoilt.parquet")
-    answer = call("check", INDEX, spoilt, how)
-    assert answer.status == 1 and len(answer.err.splitlines()) == 1
-    assert "see above" not in answer.err and 'at "tendon_force[2]": "sign": -1' in answer.err
-    assert "see above" in call("check", INDEX, spoilt).err
-
-
-def test_no_advice_is_said_twice(finger: Finger, sound: Recording) -> None:
-    """Even where two tendons changed places; one of something is in the singular."""
-    order = [1, 0, 2, 3, 4, 5, 6, 7]
-    spoilt = exchanged("tendon_position", order)(exchanged("tendon_force", order)(sound))
-    (finding,) = belongs(finger, [spoilt])
-    words = 'the keys "tendon_force[1]" and "tendon_force[2]", "tendon_position[1]" and "tendon_position[2]"'
-    assert finding.write.endswith(words) and "exchanged with" not in finding.seen
-    assert len(finding.line()) < 500
-    assert "1 error, 0 warnings" in verdict(spoilt, [finding])
 
 
 # --- the commands that fit --------------------------------------------------------------------------------------------

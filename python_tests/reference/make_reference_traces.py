@@ -34,11 +34,11 @@ INPUTS = {"tendon_force": 6, "tendon_position": 9}  # name: decimals kept, as a 
 # of the FMU, with the one that is not differentiated
 OUTPUTS = (*agreement.REAL_OUTPUTS, *agreement.BOOLEAN_OUTPUTS, "compensated_torque_std")
 
-# name: (description, seed of the motion, samples)
+# name: (description, seed of the motion, samples); 2 s in which every branch of the finger's model is taken
 TRACES = {
-    "index_finger": (HERE.parents[1] / "examples" / "fingers" / "index_finger.json", 1, 448),
-    "asymmetric_pair": (HERE / "asymmetric_pair.json", 4, 640),
-    "cable_loop": (HERE / "cable_loop.json", 3, 640),
+    "index_finger": (HERE.parents[1] / "examples" / "fingers" / "index_finger.json", 28, 256),
+    "asymmetric_pair": (HERE / "asymmetric_pair.json", 37, 256),
+    "cable_loop": (HERE / "cable_loop.json", 114, 256),
 }
 
 

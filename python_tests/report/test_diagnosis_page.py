@@ -6,8 +6,6 @@ import html
 import json
 import math
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.resources import files as files_of
 from pathlib import Path
@@ -21,19 +19,17 @@ from matplotlib.image import imread
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
 from repetitions import repeated
-from tendonfmu.diagnosis.cause import CausePlace, Where
+from tendonfmu.diagnosis.cause import CausePlace
 from tendonfmu.diagnosis.reported import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.report.diagnosis_files import build_report, report_text
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import (
-    hidden_sentences,
     left_of,
     left_sentence,
     lines,
     names_of,
-    own_gain_sentences,
     tables,
     title_of,
     unit_of,
@@ -194,17 +190,6 @@ def test_every_verdict_has_a_page(full: Diagnosis, verdict: str, count: int, kin
     assert verdict in plain(text) and not re.search(r"\b(1 causes|0 causes|None|causes explains)\b", plain(text))
 
 
-def test_a_change_is_told_in_words_of_its_own() -> None:
-    """Neither on the page, its drawings and keys, nor in the terminal is the reference's model called another name."""
-    for found in (examples.changed(), replace(examples.adequate(), kind="change", references=("then.parquet",))):
-        page = diagnosis_page(found)
-        shown = re.sub(r"(nominal|extended)\.(json|fmu)", "", plain(page))
-        for words in (shown, "\n".join(lines(found)) + str(list(tables(found))), Elements(page).scripts[0]):
-            assert not re.search(r"nominal|extended|given model|given structure", words, re.IGNORECASE)
-        needs_nothing_else(page)
-        assert not re.search(r"[\s\"]nan|NaN|inf[\s\"]", page.split("<body>")[1].split("<script")[0])
-
-
 @pytest.mark.parametrize(
     ("effect", "numbers", "words"),
     [
@@ -278,14 +263,6 @@ def test_a_correlated_remainder_is_not_called_noise(white: tuple[float, float], 
     assert ("noise" in left_sentence(found)) == (memory == "") and memory in left_sentence(found)
 
 
-def test_causes_whose_gain_means_another_thing_are_told_apart(full: Diagnosis) -> None:
-    assert [sentence.split(":")[0] for sentence in own_gain_sentences(full)] == [
-        *("own gain of 1, 2, 3", "own gain of 4", "own gain of 5")
-    ]
-    assert len(list(own_gain_sentences(examples.one_cause()))) == 1
-    assert not list(own_gain_sentences(examples.adequate()))
-
-
 def test_numbers_are_told_as_people_write_them() -> None:
     shares = (0.577, 0.042, -0.031, -1e-9, 0.0)
     assert [percent(value).replace("\u00a0", " ") for value in shares] == ["58 %", "4.2 %", "−3.1 %", "0 %", "0 %"]
@@ -315,24 +292,6 @@ def test_the_terminal_shows_all_parts(full: Diagnosis) -> None:
         *("inertia, at joint 2 (pip)", full.unexplained.description[1:], full.signals),
     ):
         assert part in said
-
-
-def test_many_effects_that_cannot_be_seen_share_a_sentence() -> None:
-    """One by one up to two; more in one sentence for those that the refit absorbs and one for those too small."""
-    absorbed, small = examples.INVISIBLE
-    places = tuple(replace(absorbed, where=Where("cover_hardening", joint=1 + k % 2)) for k in range(6))
-    others = tuple(replace(absorbed, where=Where(name), title=name) for name in "abc")
-    names = names_of(examples.adequate())
-
-    def said(*invisible: Any) -> list[str]:
-        return list(hidden_sentences(replace(examples.adequate(), invisible=invisible), names))
-
-    assert len(said(*places)) == 1 and "6 places" in said(*places)[0] and "joint 1 (mcp)" in said(*places)[0]
-    assert len(said(absorbed, small)) == 2 and "1.1" in said(small)[0] and "3.0" in said(small)[0]
-    (many,) = said(*places, *others)
-    assert many.startswith("4 effects") and "a; b; c" in many
-    first, second = said(small, *others)
-    assert first.startswith("3 effects") and second.startswith("1 effect ") and "3.0" in second
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------
@@ -397,18 +356,6 @@ def test_the_tables_hold_the_numbers(page: str) -> None:
     assert "found 15 22 false alarms 6 1 median delay 142 ms 61 ms" in detection
 
 
-@pytest.mark.long
-def test_the_page_needs_no_matplotlib() -> None:
-    """It takes longer to load than all that is drawn."""
-    code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import diagnosis_examples as examples;"
-        "from tendonfmu.report.diagnosis_page import diagnosis_page; diagnosis_page(examples.adequate());"
-        "sys.exit('matplotlib' in sys.modules)"
-    )
-    support = str(Path(examples.__file__).parent)
-    assert subprocess.run([sys.executable, "-c", code, support], check=False).returncode == 0
-
-
 def test_names_and_warnings_are_escaped(full: Diagnosis) -> None:
     nominal = json.loads(json.dumps(full.nominal_data))
     nominal["joints"][1]["name"] = nominal["tendons"][2]["name"] = HOSTILE
@@ -451,8 +398,3 @@ def test_a_browser_has_nothing_to_complain_of(browser: str, page: str, tmp_path:
     image = imread(shot)[:2400, :1280, :3]
     bands = [np.mean(part < 0.8) for part in np.array_split(image, 8)]
     assert all(0.003 < share < 0.5 for share in bands), bands
-
-
-def test_a_request_would_be_seen(browser: str, tmp_path: Path) -> None:
-    wanting = "<!DOCTYPE html><img src='http://localhost:9/picture.png' alt=''>"
-    assert measure(browser, tmp_path, wanting, 390)["requests"] == ["http://localhost:9/picture.png"]

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fit_pictures import index_finger, internal_values, made_up_picture, made_up_unknowns
-from tendonfmu.drawing.panel import STYLES, Curve, Panel, Sheet
+from fit_pictures import finger_of, index_finger, internal_values, made_up_picture, made_up_unknowns
+from tendonfmu.drawing.panel import Curve, Panel, Sheet
 from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import native
 from tendonfmu.model.friction_places import Effect, effects
-from tendonfmu.report import fit_laws
 from tendonfmu.report.fit_figures import (
     SHOWN,
     correlation,
@@ -187,7 +186,7 @@ def bare_picture(
     found = made_up_unknowns(data)
     z = internal_values(data, found)
     assert covariance.shape == (len(z), len(z))
-    return FitPicture({"parameters": []}, start or data, data, found, z, covariance, [])
+    return FitPicture({"parameters": []}, finger_of(start or data), finger_of(data), found, z, covariance, [])
 
 
 EDGE = "tendons[7].edge_friction[2]"  # with working points
@@ -237,7 +236,9 @@ def test_shared_values_add_up_in_a_band() -> None:
     shared = [joined if k == first else unknown for k, unknown in enumerate(found) if k != second]
     covariance = np.zeros((len(shared), len(shared)))
     covariance[first, first] = 1e-6
-    picture = FitPicture({"parameters": []}, data, data, shared, np.zeros(len(shared)), covariance, [])
+    picture = FitPicture(
+        {"parameters": []}, finger_of(data), finger_of(data), shared, np.zeros(len(shared)), covariance, []
+    )
     effect = find(data, EDGE)
     middle = np.array([0.5 * (effect.angles[0] + effect.angles[1])])
     drawn = LawBands(picture).over_angle(effect, effect, 1, 0.01, middle)
@@ -259,19 +260,12 @@ def test_no_friction_below_zero(picture: FitPicture) -> None:
 def test_every_law_has_its_panel(picture: FitPicture, sheets: list[Sheet]) -> None:
     laws = [sheet for sheet in sheets if sheet.section == "laws"]
     assert [sheet.name for sheet in laws] == ["laws_joints", *(f"laws_tendon_{i}" for i in range(1, 9))]
-    assert sum(len(sheet.panels) for sheet in laws) == len(effects(picture.fitted)) == 44
+    assert sum(len(sheet.panels) for sheet in laws) == len(effects(picture.fitted.data)) == 44
     notes = [panel.note for sheet in laws for panel in sheet.panels]
     known, of = np.array([[int(x) for x in note.split(" ")[0].split("/")] for note in notes]).sum(axis=0)
     covers = [entry for entry in picture.report["parameters"] if ".cover." in entry["path"]]
     assert of == picture.report["identified"]["of"] - len(covers)
     assert known == picture.report["identified"]["count"] - sum(entry["identified"] for entry in covers)
-
-
-def test_what_is_not_drawn_is_said(picture: FitPicture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fit_laws, "LAWS_DRAWN", 10)
-    drawn = list(law_sheets(picture))
-    assert sum(len(sheet.panels) for sheet in drawn) == 10
-    assert all("34 further laws" in sheet.caption for sheet in drawn)
 
 
 def test_directions_differ_where_the_law_does() -> None:
@@ -344,15 +338,6 @@ def test_groups_cover_the_matrix(picture: FitPicture) -> None:
             panel.heat.values.shape == (math.ceil(count / 2), math.ceil(count / 2))
             and (np.diag(panel.heat.values) == 100).all()
         )
-        assert [name for _, name in panel.y_ticks] == ["mcp_abduction … dip_flexion", *picture.tendon_names]
+        assert [name for _, name in panel.y_ticks] == ["mcp_abduction … dip_flexion", *picture.fitted.tendon_names]
         fourth = panel.borders[4] - panel.borders[3]
         assert 2 * fourth == sum(unknown.path.startswith("tendons[3].") for unknown in picture.unknowns)
-
-
-def test_every_style_is_known(sheets: list[Sheet]) -> None:
-    used = {style for sheet in sheets for style, _ in sheet.keys}
-    for sheet in sheets:
-        for panel in sheet.panels:
-            assert panel.alt and panel.title
-            used |= {part.style for part in (*panel.curves, *panel.bands, *panel.dots)} | set(panel.stripes)
-    assert used <= set(STYLES)

@@ -17,15 +17,14 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+import worn_finger
 from fit_pictures import made_up_picture
 from real_browser import Elements, figures_of, measure, needs_nothing_else, visit
 from repetitions import repeated
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.picture import FitPicture
-from tendonfmu.files.tables import write_table
-from tendonfmu.model.balance import balanced_forces, moment_arms
 from tendonfmu.report.fit_page import PAGE, fit_page, write_fit_page
-from tendonfmu.report.fit_text import consistency, page_tables, residual_tables
+from tendonfmu.report.fit_text import page_tables, residual_tables
 from tendonfmu.report.numbers import rounded
 
 LARGEST = 5_000_000  # bytes
@@ -78,13 +77,6 @@ def test_figures_are_whole_and_described(page: str) -> None:
     assert len(told) == 82 and min(map(len, told)) > 40 and len(set(told)) > 75
 
 
-def test_links_lead_somewhere(page: str) -> None:
-    elements = Elements(page)
-    ids = {attributes["id"] for _, attributes in elements.tags if "id" in attributes}
-    targets = {(attributes["href"] or "").removeprefix("#") for attributes in elements.all("a")}
-    assert len(targets) == 7 and targets <= ids
-
-
 def test_every_number_is_in_the_tables(written: Written, page: str) -> None:
     picture = written[0]
     table = page.split('id="numbers"')[1]
@@ -126,11 +118,11 @@ def text_of(picture: FitPicture) -> str:
 
 def test_names_and_warnings_are_escaped(written: Written) -> None:
     picture = written[0]
-    fitted = copy.deepcopy(dict(picture.fitted))
+    fitted = copy.deepcopy(dict(picture.fitted.data))
     fitted["joints"][0]["name"] = fitted["tendons"][0]["name"] = HOSTILE
     recordings = [{**picture.report["recordings"][0], "path": HOSTILE}]
     hostile = changed(picture, finger=HOSTILE, warnings=[HOSTILE], recordings=recordings, options={HOSTILE: [HOSTILE]})
-    text = fit_page(dataclasses.replace(hostile, fitted=fitted))
+    text = fit_page(dataclasses.replace(hostile, fitted=dataclasses.replace(picture.fitted, data=fitted)))
     assert "<script" not in text  # nor one of its own: no figures
     assert text.count("&lt;script&gt;") >= 6
 
@@ -167,7 +159,7 @@ def test_comparisons_have_tables_and_many_of_them_one_tile(written: Written) -> 
 def test_one_joint_has_one_table(written: Written) -> None:
     """A row for each set of data instead of a table."""
     picture = written[0]
-    one = copy.deepcopy(dict(picture.fitted))
+    one = copy.deepcopy(dict(picture.fitted.data))
     del one["joints"][1:]
     residual = {key: value[:1] for key, value in picture.report["residual"]["train"].items()}
     report: dict[str, Any] = {
@@ -175,20 +167,11 @@ def test_one_joint_has_one_table(written: Written) -> None:
         "parameters": [each for each in picture.report["parameters"] if each["path"].startswith("joints[1].")],
         "innovations": {"nis": {"mean": None}, "whiteness": {"lag_one": [0.0], "ljung_box_p": [1.0]}},
     }
-    found = page_tables(dataclasses.replace(changed(picture, **report), fitted=one))
+    found = page_tables(
+        dataclasses.replace(changed(picture, **report), fitted=dataclasses.replace(picture.fitted, data=one))
+    )
     assert [row.name for row in found[0].rows] == ["Training", "Held out of training", "Not trained on: b"]
     assert len(found) == 1 and found[0].rows[1].fitted == pytest.approx(1e3 * residual["rms"][0])
-
-
-def test_the_innovations_are_described_where_they_are_known(written: Written) -> None:
-    """NIS as it is, and the joints whose innovations are not white."""
-    nis = {"mean": 4.0, "interval": [0.99, 1.01], "consistent": False}
-    for lag_one, names in (([0.0] * 4, []), ([0.0, 0.5, 0.0, -0.3], [1, 3])):
-        innovations = {"nis": nis, "whiteness": {"lag_one": lag_one, "ljung_box_p": [0.5] * 4}}
-        size, *white = consistency(changed(written[0], innovations=innovations))
-        assert "(NIS) 4;" in size and "factor of 2;" in size and len(white) == bool(names)
-        for k in names:
-            assert f"{written[0].joint_names[k]} {lag_one[k]:.2f}" in white[0]
 
 
 def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:
@@ -200,44 +183,11 @@ def test_a_folder_that_cannot_be_made(written: Written, tmp_path: Path) -> None:
 # --- from the command line --------------------------------------------------------------------------------------------
 
 
-def finger_of_one_joint() -> dict[str, Any]:
-    law = {"static": 0.03, "coulomb": 0.02, "stribeck_velocity": 0.005, "viscous": 0.3}
-    tendons = [
-        {"name": name, "stiffness": 4000.0, "moment_arms": [arm], "edge_friction": [law]}
-        for name, arm in (("flexor", 0.01), ("extensor", -0.01))
-    ]
-    return {
-        "format": "tendonfmu-finger-1",
-        "name": "one joint",
-        "joints": [{"name": "only", "friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}],
-        "tendons": tendons,
-        "bias": {"noise_std": 0.001},
-        "contact": {"threshold": [1.0]},
-    }
-
-
-def recording_of(data: dict[str, Any], pretension: float, seed: int) -> dict[str, Any]:
-    """20 s of the finger's own model, back and forth, with some noise on the forces."""
-    time = np.arange(2000) * 0.01
-    angle = 0.4 * np.sin(2.1 * time) + 0.2 * np.sin(0.7 * time)
-    motion = {"time": time, "joint_position": angle[:, None], "joint_velocity": np.gradient(angle, time)[:, None]}
-    force = balanced_forces(data, motion, np.full(len(time), pretension))
-    force += np.random.default_rng(seed).normal(scale=0.02, size=force.shape)
-    stretch = angle[:, None] * moment_arms(data)[:, 0] + force / 4000.0
-    table = {"time": time}
-    for i in (0, 1):
-        table |= {f"tendon_force[{i + 1}]": force[:, i], f"tendon_position[{i + 1}]": stretch[:, i]}
-    return table
-
-
 @pytest.mark.long
 def test_the_command_writes_it(tmp_path: Path) -> None:
     """A real fit, with the two recordings of figs. 6 and 7: training, and four times the pretension."""
-    data = finger_of_one_joint()
-    (tmp_path / "finger.json").write_text(json.dumps(data), encoding="utf-8")
-    for name, pretension in (("train", 10.0), ("x4", 40.0)):
-        write_table(tmp_path / f"{name}.csv", recording_of(data, pretension, seed=7))
-    words = "fit finger.json train.csv -o fitted.json --report r.json --figures figures --compare x4.csv"
+    worn_finger.write_files(tmp_path, train=worn_finger.record(), x4=worn_finger.record(pretension=80.0))
+    words = "fit finger.json train.parquet -o fitted.json --report r.json --figures figures --compare x4.parquet"
     done = subprocess.run(
         [sys.executable, "-m", "tendonfmu.cli", *words.split()], cwd=tmp_path, capture_output=True, text=True
     )
@@ -276,13 +226,3 @@ def test_a_browser_has_nothing_to_complain_of(browser: str, written: Written, tm
     file = tmp_path / PAGE
     shutil.copy(written[1] / PAGE, file)
     assert "CONSOLE" not in visit(browser, file, "--dump-dom").stderr
-
-
-@pytest.mark.long
-def test_the_browser_tests_can_fail(browser: str, tmp_path: Path) -> None:
-    wide = "<!DOCTYPE html><div style='width:900px'>wide</div>"
-    found = measure(browser, tmp_path, wide, 400)
-    assert found["scroll"] > 800 and len(found["out"]) >= 1 and found["drawings"] == []
-    file = tmp_path / "error.html"
-    file.write_text("<!DOCTYPE html><script>console.error('wrong')</script>", encoding="utf-8")
-    assert "CONSOLE" in visit(browser, file, "--dump-dom").stderr

@@ -8,13 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from plant_figures import (
-    LoopFigure,
     PreslidingFigure,
     bristle_numbers,
     led,
-    loop_figure,
     model_friction,
     presliding_figure,
     truth_figure,
@@ -37,11 +34,6 @@ def rig() -> Rig:
 @pytest.fixture(scope="module")
 def presliding(rig: Rig) -> PreslidingFigure:
     return presliding_figure(rig, JOINT, TENDON)
-
-
-@pytest.fixture(scope="module")
-def loops(rig: Rig) -> LoopFigure:
-    return loop_figure(rig, JOINT)
 
 
 def test_the_drawing_is_to_scale(rig: Rig) -> None:
@@ -82,43 +74,6 @@ def test_the_bristles_are_those_named(rig: Rig, presliding: PreslidingFigure) ->
         slope = np.polyfit(contact.angle[bending], np.log1p(contact.bristle[bending]), 1)[0]
         assert -1.0 / slope == pytest.approx(distance, rel=tolerance)
     assert set(bristle_numbers(rig, JOINT, TENDON)) == {"pulley", "edge", "joint"}
-
-
-@pytest.mark.long
-@needs_plant
-def test_the_loops_tell_what_the_page_says(loops: LoopFigure) -> None:
-    """In the middle of a stroke the model is a few percent off; after a reversal as much as the friction itself."""
-    for loop in loops.loops:
-        sliding = (loop.angle > 0.3) & (loop.angle < 0.8)
-        size = np.sqrt(np.mean(loop.rig[sliding] ** 2))
-        assert np.sqrt(np.mean((loop.model - loop.rig)[sliding] ** 2)) < 0.05 * size
-        assert np.abs(loop.model - loop.rig).max() > 1.5 * size
-
-
-@pytest.mark.long
-@needs_plant
-def test_the_models_jumps_are_drawn_once(loops: LoopFigure, presliding: PreslidingFigure) -> None:
-    """Where the joint stands the model's torque jumps with each trembling of the velocity; its line has one jump at
-    either end of the loop, and one after the reversal."""
-
-    def jumps(torque: NDArray[np.float64]) -> int:
-        return int(np.sum(np.abs(np.diff(np.sign(torque))) > 0))
-
-    assert max(jumps(loop.model) for loop in loops.loops) > 2
-    assert [jumps(loop.model_line[:, 1]) for loop in loops.loops] == [2, 2]
-    for loop in loops.loops:
-        assert np.abs(np.diff(loop.model_line[:-1, 0])).min() >= 1e-4
-    assert [jumps(loop.model_line[:, 1]) for loop in presliding.reversals] == [1, 1]
-
-
-@pytest.mark.long
-@needs_plant
-def test_the_small_moves_are_numbered_where_they_turn(presliding: PreslidingFigure) -> None:
-    """Back and forth by 2 to 21 mrad, as the page says."""
-    moves = 1e3 * np.diff([0.0, *presliding.small.angle[presliding.turns]])
-    assert len(moves) == 6 and np.all(moves[:-1] * moves[1:] < 0.0) and moves[0] < 0.0
-    sizes = np.abs(moves)
-    assert round(sizes.min()) == 2 and round(sizes.max()) == 21
 
 
 @needs_plant

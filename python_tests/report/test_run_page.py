@@ -15,8 +15,7 @@ from fmu_binary import FINGER
 from real_browser import figures_of, measure, needs_nothing_else
 from repetitions import repeated
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.report.run_page import run_page
-from tendonfmu.report.run_report import run_report
+from tendonfmu.report.run_page import run_page, run_report
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
 JOINTS, TENDONS, SAMPLES = 2, 3, 400

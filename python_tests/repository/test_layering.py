@@ -48,7 +48,7 @@ ONLY = {
     "tendonfmu._plant": "simulate/plant.py",
     "tendonfmu._estimation": "estimate/estimation.py",
     "plotly": "drawing/figures.py",
-    "PIL": "drawing/raster.py",
+    "PIL": "drawing/finger_picture.py",
     "rich": "cli/console.py",
     "dask": "tasks/jobs.py",
     "distributed": "tasks/jobs.py",
@@ -141,7 +141,8 @@ def test_few_modules_print() -> None:
 FEW_IMPORTS = {
     "drawing/*.py": r"tendonfmu\.(arrays|drawing|errors|files|lazy_exports|model\.(DrawnTendon|FingerDrawing)$)",
     "report/*_figures.py": (
-        r"tendonfmu\.(arrays|detect|diagnosis|drawing|estimate|files|report|statistics|recordings\.flagged_stretches$)"
+        r"tendonfmu\.(arrays|detect|diagnosis|drawing|estimate|files|report|statistics"
+        r"|model\.part_of$|recordings\.flagged_stretches$)"
     ),
     "model/native.py": r"tendonfmu\.(_native|arrays|errors|model\.output_names)",
 }

@@ -116,14 +116,6 @@ def test_twin_mass_matrix_and_energy() -> None:
         assert abs(drift) < 1e-2 * powers, f"seed {seed}: {drift} W of {powers} W"
 
 
-def test_twin_pendulum_by_hand() -> None:
-    """One link turning about y, mass at 20 mm: M = I + m l², G = −m g l cos q (positive q lowers the tip)."""
-    link = {"axis": [0.0, 2.0, 0.0], "mass": 0.05, "centre_of_mass": [0.02, 0.0, 0.0], "inertia": [1e-6, 2e-6, 2e-6]}
-    body, q = Multibody({"links": [link]}), np.array([0.3])
-    assert body.mass_matrix(q)[0, 0] == pytest.approx(2e-6 + 0.05 * 0.02**2, rel=1e-12)
-    assert body.gravity_torque(q)[0] == pytest.approx(-0.05 * 9.81 * 0.02 * np.cos(0.3), rel=1e-12)
-
-
 def test_twin_double_pendulum_by_hand() -> None:
     """Two point masses at the ends of links of lengths a, b in one plane: the textbook's mass matrix and C."""
     a, b, first, second = 0.04, 0.03, 0.02, 0.05

@@ -18,12 +18,11 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from command import Call
-from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, fmi_platform, unpack
+from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, fmi_platform
 from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, plant_binary, play
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
-from tendonfmu.fmu.packaging import build_fmu
 from tendonfmu.simulate.fmu_packaging import build_plant_fmu
 from tendonfmu.simulate.plant import Plant
 from tendonfmu.simulate.rig import read_rig
@@ -78,12 +77,6 @@ def test_the_default_experiment_is_the_rigs(plant_fmu_path: Path) -> None:
     experiment = fmpy.read_model_description(str(plant_fmu_path)).defaultExperiment
     found = [experiment.startTime, experiment.stopTime, experiment.stepSize, experiment.tolerance]
     assert list(map(float, found)) == [0.0, 3.0, 0.001, TOLERANCE]
-
-
-def test_its_outputs_are_the_friction_fmus_inputs(plant_fmu: UnpackedFmu, tmp_path: Path) -> None:
-    (tmp_path / "finger.json").write_text(json.dumps(fmu_rig()["finger"]))
-    friction = unpack(build_fmu(tmp_path / "finger.json", tmp_path / "friction.fmu"), tmp_path / "friction")
-    assert set(friction.names("input")) <= set(plant_fmu.names("output"))
 
 
 @pytest.mark.long
@@ -330,22 +323,6 @@ def test_experiments_tolerance(plant_fmu: UnpackedFmu) -> None:
             assert instance.call("SetupExperiment", 1, given, 0.0, 0, 0.0) == OK
             assert f"this FMU goes on with {used:g}" in instance.last_message
             assert tolerance(instance) == used
-
-
-# --- in a host -------------------------------------------------------------------------------------------------------
-
-
-def test_many_instances_leak_no_handle(plant_fmu: UnpackedFmu) -> None:
-    for _ in range(1200):
-        instance = Instance(plant_fmu, logger=False)
-        assert instance.component is not None
-        instance.library.fmi2FreeInstance(instance.component)
-
-
-def test_fmpy_simulates(plant_fmu_path: Path) -> None:
-    result = fmpy.simulate_fmu(str(plant_fmu_path), stop_time=0.1, start_values={"pretension": 2.0, "sensors": False})
-    assert len(result) > 50 and np.all(np.isfinite(result["truth.joint_torque[1]"]))
-    assert np.array_equal(result["tendon_force[1]"], result["truth.tendon_force[1]"])
 
 
 # --- its page ---------------------------------------------------------------------------------------------------------

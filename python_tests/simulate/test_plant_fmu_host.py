@@ -16,15 +16,6 @@ from plant_rigs import needs_plant
 pytestmark = needs_plant
 
 
-@pytest.mark.long
-@needs_count
-def test_instances_leave_nothing(plant_fmu: UnpackedFmu) -> None:
-    """No handle, and less than half of the smallest block (32 bytes) each by the allocator's own count."""
-    count = 120
-    used, opened = least_growth(plant_fmu, "bare", count)
-    assert used < 16 * count and opened == 0
-
-
 @needs_count
 def test_the_unloaded_library_leaves_nothing(plant_fmu: UnpackedFmu) -> None:
     """libstdc++, which is linked in, would keep 72,704 bytes for exceptions without memory."""

@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections.abc import Callable
-from ctypes import c_double, c_int
+from ctypes import c_double
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from test_fmu_states import with_number
 
-from fmu_binary import DISCARD, ERROR, OK, WARNING, Instance, UnpackedFmu, unpack
+from fmu_binary import ERROR, OK, Instance, UnpackedFmu, unpack
 from fmu_kinds import plant_kind
 from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, play
 from plant_rigs import needs_plant
@@ -49,7 +49,6 @@ def pointer(value: object) -> object:
 
 
 BAD_CALLS: dict[str, tuple[Callable[[Instance], int], str]] = {
-    "NaN input": (lambda i: i.set_real({COMMAND: NAN}), "tendon_position_command[1] = nan: expected -10 to 10 m"),
     "huge input": (lambda i: i.set_real({FORCE: 1e5}), "push_force[3] = 100000: expected -10000 to 10000 N"),
     "truth written": (lambda i: i.set_real({"truth.friction_level": 1.0}), "truth.friction_level: an output is not"),
     "fixed parameter": (lambda i: i.set_real({"step": 1e-4}), "step: a fixed parameter is written before"),
@@ -97,27 +96,6 @@ def test_settings_out_of_range(plant_fmu: UnpackedFmu, write: Callable[[Instance
         before = instance.save()
         assert write(instance) == ERROR and expected in instance.last_message
         assert instance.save() == before
-
-
-def test_logging(plant_fmu: UnpackedFmu) -> None:
-    with Instance(plant_fmu, logging=False) as instance:
-        assert instance.step(0.0) == ERROR and instance.messages == []
-    with Instance(plant_fmu) as instance:
-        names = (ctypes.c_char_p * 1)(b"logEvents")
-        assert instance.call("SetDebugLogging", 1, 1, names) == OK
-        instance.initialise()
-        assert instance.step(-1.0) == ERROR
-        assert [(m[1], m[2], m[3]) for m in instance.messages] == [
-            ("logEvents", "fmi2ExitInitializationMode: the finger has settled", 4711)
-        ]
-        assert instance.call("SetDebugLogging", 1, 1, (ctypes.c_char_p * 1)(b"all")) == WARNING
-
-
-def test_status_inquiries(plant_fmu: UnpackedFmu) -> None:
-    with running(plant_fmu) as instance:
-        time = c_double()
-        assert instance.call("GetRealStatus", 2, pointer(time)) == OK and time.value == pytest.approx(0.005, abs=1e-15)
-        assert instance.call("GetIntegerStatus", 0, pointer(c_int())) == DISCARD
 
 
 # --- solver failures --------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from oracle_plant import PlantTwin
-from plant_rigs import ANTAGONISTS, ARM, STIFFNESS, TWO_JOINTS, balance, dry, grid, make, needs_plant, run, small_rig
+from plant_rigs import ARM, STIFFNESS, TWO_JOINTS, balance, dry, grid, make, needs_plant, run, small_rig
 from plant_rigs import strokes as legs_of
 from random_plants import random_plant
 
@@ -398,12 +398,3 @@ def test_power_of_pulleys(where: str, drives: bool) -> None:
         assert power == pytest.approx(np.sum(0.03 * 15.0 * np.sign(slides) * turned), rel=1e-6)
         if speeds[0] != 0.0:
             assert (power < 0.0) == drives
-
-
-def test_stiffness_of_the_finger_by_hand() -> None:
-    """A quasi-static push deflects the joint by torque / (Σ k r²)."""
-    push = {"start": 0.0, "rise": 0.3, "hold": 1.0, "fall": 0.1, "force": 0.5, "direction": [0.0, 0.0, -1.0]}
-    rig = small_rig(ANTAGONISTS, pushes=[push | {"frame": "link"}], links=[{"damping": 0.005}])
-    found = run(rig, np.array([0.0, 0.8]))
-    moved = found["joint_position"][1, 0] - found["joint_position"][0, 0]
-    assert moved == pytest.approx(0.5 * 0.04 / (2.0 * STIFFNESS * ARM**2), rel=1e-6)

@@ -36,15 +36,6 @@ def test_index_rigs_expand(name: str) -> None:
     assert len(rig.times()) == 30000 and rig.times()[-1] == 29999 / 500
 
 
-def test_the_index_rigs_tell_one_story() -> None:
-    free, strong, pushed = (read_rig(RIGS / name) for name in INDEX_RIGS)
-    assert free.expanded["physics"] == strong.expanded["physics"] == pushed.expanded["physics"]
-    assert free.motion.joints == strong.motion.joints != pushed.motion.joints
-    assert strong.motion.pretension["value"] == [4 * value for value in free.motion.pretension["value"]]
-    assert (len(free.expanded["pushes"]), len(pushed.expanded["pushes"])) == (0, 11)
-    assert pushed.files == [RIGS / INDEX_RIGS[2], RIGS / INDEX_RIGS[0], RIGS / "../fingers/index_finger.json"]
-
-
 def test_the_numbers_of_version_1_are_frozen() -> None:
     """Later figures are compared with these: a change is a version 2, not another digest here."""
     digests = [
@@ -56,12 +47,6 @@ def test_the_numbers_of_version_1_are_frozen() -> None:
     finger = json.loads((RIGS / "../fingers/index_finger.json").read_text())
     physics = json.dumps({key: finger[key] for key in ("joints", "tendons")}, sort_keys=True)
     assert hashlib.sha256(physics.encode()).hexdigest()[:16] == "51d5ec52adb92818"
-
-
-def test_expansion_is_reproducible() -> None:
-    for seed in (3, 4):
-        assert random_rig(seed) == random_rig(seed) != random_rig(seed + 1)
-    assert read_rig(RIGS / INDEX_RIGS[2]).json() == read_rig(RIGS / INDEX_RIGS[2]).json()
 
 
 def test_recording_times_stay_below_the_duration(tmp_path: Path) -> None:
@@ -176,41 +161,23 @@ def test_bad_json_is_refused(tmp_path: Path, text: str, line: str) -> None:
     [
         (("name",), "", r'name = "": expected the rig\'s name'),
         (("version",), 0, r"version = 0: expected an integer from 1"),
-        (("version",), None, r"version: missing; expected an integer"),
         (("seed",), 2**53 + 1, r"seed = 9007199254740993: expected an integer from 0 to 9007199254740992"),
         (("colour",), "red", r'colour = "red": unknown key; expected one of format, base, name'),
         (("finger",), 3, r"finger = 3: expected a finger description, or the path of one"),
         (("finger",), "none.json", r"none\.json: No such file or directory; expected a finger description"),
         (("finger",), None, r"finger: missing"),
-        (
-            ("finger", "joints", 0, "friction", "coulomb"),
-            -1.0,
-            r"finger: joints\[1\]\.friction\.coulomb = -1: expected",
-        ),
-        (("physics",), None, r"physics: missing; expected an object with links"),
         (("physics", "links"), [], r"physics\.links = \[\]: expected a list of 4, one link per joint of the finger"),
-        (
-            ("physics", "links", 1, "offset"),
-            [0.0, 1.0],
-            r"physics\.links\[2\]\.offset = \[0\.0, 1\.0\]: expected a list of 3",
-        ),
         (("physics", "links", 1, "axis"), "y", r'physics\.links\[2\]\.axis = "y": expected a list of 3, x, y and z'),
         (("physics", "links", 2, "limits", "upper"), -1.0, r"links\[3\]\.limits\.upper = -1\.0: expected"),
         (("physics", "tip"), [0.0, 0.0, True], r"physics\.tip\[3\] = true: expected a number in m"),
         (("sensors", "rate"), 0, r"sensors\.rate = 0: expected a number in Hz, at least 1 and at most 100000"),
         (("motion",), None, r"motion: missing; expected an object with the key kind"),
-        (
-            ("motion", "position"),
-            [0.0] * 3,
-            r"motion\.position = \[0\.0, 0\.0, 0\.0\]: expected a list of 4, one angle per joint",
-        ),
         (("motion", "position", 1), 1.5, r"motion\.position\[2\] = 1\.5: expected an angle within the joint's range"),
         (("pushes",), "tip", r'pushes = "tip": expected a list of pushes, or an object with count'),
         (("recording", "duration"), 0.0, r"recording\.duration = 0\.0: expected a number in s, above 0"),
         (("recording", "duration"), 1e6, r"recording\.duration = 1000000\.0: expected at most 50000000"),
         (("recording", "columns"), ["torque"], r'recording\.columns\[1\] = "torque": expected "joint_position" or'),
         (("recording", "columns"), ["contact"] * 2, r'recording\.columns\[1\] = "contact": expected each column once'),
-        (("recording", "rate"), 500, r"recording\.rate = 500: unknown key; expected one of duration, columns"),
     ],
 )
 def test_bad_rigs_are_refused_by_key(tmp_path: Path, path: tuple[Any, ...], value: Any, line: str) -> None:
@@ -243,13 +210,7 @@ def without_antagonists() -> dict[str, Any]:
         (("physics", "friction", "presliding", "edge"), 0.0, r"physics\.friction\.presliding\.edge = 0\.0: expected"),
         (("physics", "gravity"), [0.0, -9.81], r"physics\.gravity has 2 elements: expected a list of 3 numbers"),
         (("physics", "spring"), 1.0, r"physics\.spring.*"),
-        (("physics", "joint_coupling"), [0.1], r"physics\.joint_coupling has 1 element: expected a list of 3 numbers"),
         (("sensors", "tendon_force", "noise"), -1.0, r"sensors\.tendon_force\.noise = -1\.0: expected"),
-        (
-            ("sensors", "tendon_force", "gain"),
-            [1.0, 1.0],
-            r"sensors\.tendon_force\.gain has 2 elements: expected a list of 8 numbers",
-        ),
         (("sensors", "joint_position", "backlash"), 0.1, r"sensors\.joint_position.*backlash"),
         (("integration", "method"), "euler", r'integration\.method = "euler": expected'),
         (("integration", "relative_tolerance"), 1.0, r"integration\.relative_tolerance = 1\.0: expected"),

@@ -7,29 +7,20 @@ from __future__ import annotations
 
 import copy
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant_rigs import needs_plant
-from random_rigs import random_rig
-from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
-from tendonfmu.simulate.rig import read_rig
-from tendonfmu.simulate.simulation import simulate
 
 EXAMPLES = ROOT / "examples"
 FINGER = json.loads((EXAMPLES / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
 FREE = EXAMPLES / "demo_recording" / "index_finger_free.parquet"
-# What is no friction: how velocities are made, and how fast the bias follows and stiction is forgotten.
-ESTIMATOR = ("velocity_threshold", "velocity_filter_cutoff", "bias")
 NEVER = 1e6  # N·m; the bias must not freeze
-SEEDS = range(1, 7)
 
 Array = NDArray[np.float64]
 
@@ -69,21 +60,3 @@ def test_with_other_friction_it_leaves_more(factor: float) -> None:
     right, wrong = left_over(FINGER, recording), left_over(with_friction(FINGER, factor), recording)
     assert np.all(wrong > 1.2 * right), (wrong, right)
     assert np.any(wrong > 1 / 3), wrong
-
-
-@needs_plant
-@pytest.mark.parametrize("seed", repeated(SEEDS, 0, 1))
-def test_issue_3_the_same_third_on_a_rig_drawn_at_random(tmp_path: Path, seed: int) -> None:
-    """With the index finger's filter and bias; nothing of it is fitted to the rig."""
-    data = random_rig(seed, duration=60.0)
-    data["finger"] |= {key: FINGER[key] for key in ESTIMATOR}
-    (tmp_path / "rig.json").write_text(json.dumps(data), encoding="utf-8")
-    rig = read_rig(tmp_path / "rig.json")
-    table = simulate(rig).recording
-    tendons = len(data["finger"]["tendons"])
-    inputs = {
-        name: np.column_stack([table[f"{name}[{i + 1}]"] for i in range(tendons)])
-        for name in ("tendon_force", "tendon_position")
-    }
-    left = left_over(rig.expanded["finger"], {"time": table["time"], **inputs})
-    assert np.all(left < 1 / 3), left

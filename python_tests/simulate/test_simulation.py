@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import signal
@@ -320,18 +319,6 @@ def test_signals_have_their_shapes(plant: Plant) -> None:
         plant.run(np.array([0.01]))
 
 
-def test_the_right_hand_side_and_its_derivative_are_reached(plant: Plant) -> None:
-    plant.initialise()
-    state = plant.continuous_state()
-    assert state.shape == (plant.order,)
-    slope, jacobian = plant.derivative(0.0, state), plant.jacobian(0.0, state)
-    assert slope.shape == (plant.order,) and jacobian.shape == (plant.order, plant.order)
-    assert np.array_equal(slope[:4], state[4:8])  # q' is the joints' velocity
-    assert np.array_equal(jacobian[:4, 4:8], np.eye(4))
-    with pytest.raises(PlantError, match=f"expected a state of {plant.order} numbers"):
-        plant.derivative(0.0, state[1:])
-
-
 def test_inputs_act_and_states_come_back(plant: Plant) -> None:
     plant.configure(scheduled_motion=False, scheduled_pushes=False, sensors=False)
     plant.initialise()
@@ -374,10 +361,3 @@ def test_other_threads_run_while_the_plant_does(plant: Plant) -> None:
         done.set()
         thread.join()
     assert during > 3
-
-
-def test_a_bad_rig_text_is_refused() -> None:
-    with pytest.raises(PlantError):
-        Plant("{}")
-    with pytest.raises(PlantError):
-        Plant(json.dumps({"format": "tendonfmu-rig-1"}).encode())

@@ -83,15 +83,6 @@ def test_the_model_is_configured_without_eigen(tmp_path: Path) -> None:
     assert "tendonfmu_description" in built
 
 
-@pytest.mark.long
-@needs_cmake
-def test_the_estimation_needs_no_sundials(tmp_path: Path) -> None:
-    said = configure(tmp_path, "-DTENDONFMU_PLANT=OFF")
-    if "Eigen" in said:
-        pytest.skip("SKIPPED: Eigen is not there")
-    assert "tendonfmu_estimation" in targets(tmp_path)
-
-
 @needs_cmake
 @pytest.mark.parametrize(
     ("version", "reason"),
@@ -209,13 +200,6 @@ def test_set_up_goes_on_without_the_package(tmp_path: Path) -> None:
     # The lists may be stale: they are refreshed before it gives up, and that only once a day.
     assert " update -qq" in called
     assert call_set_up(tmp_path, "6.4.1", "fails") == ("", "")
-
-
-@needs_bash
-def test_set_up_leaves_a_package_that_is_too_old(tmp_path: Path) -> None:
-    said, called = call_set_up(tmp_path, "5.8.0+dfsg1-1", "works")
-    assert said == "" and "download" not in called
-    assert not (tmp_path / "build/sundials/package").exists()
 
 
 @needs("readelf")

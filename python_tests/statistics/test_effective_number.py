@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.statistics.effective_number import correlation_time, effective_samples, sample_weights
+from tendonfmu.statistics.whitening import correlation_time, effective_samples, sample_weights
 
 Numbers = NDArray[np.float64]
 

@@ -377,46 +377,6 @@ def unexplained() -> Diagnosis:
     )
 
 
-def many_joints() -> Diagnosis:
-    """4 joints, 8 tendons, long names, 12 recordings."""
-    joints = ("abduction", "metacarpophalangeal", "proximal interphalangeal", "distal interphalangeal")
-    tendons = tuple(f"{side} {k}" for k in range(1, 5) for side in ("flexor profundus", "extensor digitorum"))
-    found, finger = three_causes(), finger_of(joints, tendons)
-    causes = tuple(
-        replace(
-            cause,
-            where=Where("edge_friction", j, t),
-            title="a tendon rubs at an edge before a joint",
-            parameters={f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")},
-            places=(CausePlace(j, t, {f"tendons[{t}].edge_friction[{j}].laws[2].coulomb": (0.021, "1")}),),
-            size="2.1 % of the tendon force",
-            evidence=tuple(replace(each, joint=j) for each in cause.evidence[:1]),
-        )
-        for cause, j, t in ((GRAVITY, 4, 7), (LOAD_FRICTION, 3, 2))
-    )
-    rms = (5.1e-3, 6.2e-3, 3.3e-3, 1.8e-3)
-    return replace(
-        found,
-        recordings=tuple(f"recordings_of_the_left_hand/free_motion_at_pretension_{k:02d}.parquet" for k in range(12)),
-        nominal=ModelErrors(rms, rms),
-        extended=ModelErrors(tuple(0.5 * each for each in rms), tuple(0.55 * each for each in rms)),
-        bias_only_rms=tuple(6 * each for each in rms),
-        noise_floor=tuple(0.4 * each for each in rms),
-        causes=(*causes, *found.causes),
-        steps=(4.4e-3, 3.6e-3, 3.1e-3, 2.7e-3, 2.5e-3, 2.42e-3),
-        unexplained=replace(found.unexplained, by_joint=(0.28, 0.11, 0.2, 0.05)),
-        views=tuple(
-            view
-            for j, size in enumerate(rms, start=1)
-            for view in views_of(j, 0.5 * size, {"angle": lambda q: 0.006 * np.sin(3 * q)}, 0.51)
-        ),
-        whiteness=((0.94, 0.51),) * 4,
-        nominal_data=finger,
-        extended_data=_extended(finger, found.causes),
-        tested=1873,
-    )
-
-
 def changed() -> Diagnosis:
     """What is different since a reference: a number that grows over three recordings, a term, and a load."""
     found = one_cause()
@@ -482,6 +442,5 @@ ALL: dict[str, Callable[[], Diagnosis]] = {
     "one_cause": one_cause,
     "three_causes": three_causes,
     "unexplained": unexplained,
-    "many_joints": many_joints,
     "changed": changed,
 }

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 ROWS: list[dict[str, Any]] = [
     {"effect": "cover_hardening", "joint": 2, "stiffness": 0.1},
     {"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
@@ -41,19 +39,3 @@ ROWS: list[dict[str, Any]] = [
 def name_of(row: dict[str, Any]) -> str:
     """Effect and place, for the name of a test."""
     return "-".join(str(row[key]) for key in ("effect", "joint", "tendon") if key in row)
-
-
-def random_rows(rng: np.random.Generator, joints: int, tendons: int, count: int) -> list[dict[str, Any]]:
-    """Up to `count` rows at random places of a finger, each effect at most once a place."""
-    found: dict[str, dict[str, Any]] = {}
-    for template in rng.permutation(np.array(ROWS, dtype=object))[:count]:
-        row = dict(template)
-        last = joints - (row["effect"] == "joint_coupling")
-        if last < 1:
-            continue
-        if "joint" in row:
-            row["joint"] = int(rng.integers(1, last + 1))
-        if "tendon" in row:
-            row["tendon"] = int(rng.integers(1, tendons + 1))
-        found[name_of(row)] = row
-    return list(found.values())

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from repository_paths import ROOT
+from tendonfmu.estimate.estimation import Unknown
 from tendonfmu.estimate.fisher_information import unknowns
 from tendonfmu.estimate.picture import FitPicture, FitSeries, Role
-from tendonfmu.model import native
+from tendonfmu.model import Finger, finger_from_data, native
 from tendonfmu.recordings.recording import read_recording
 
 EXAMPLES = ROOT / "examples"
@@ -31,13 +31,8 @@ ROLES = {
 Numbers = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class MadeUp:
-    """As `estimation.Unknown`."""
-
-    path: str
-    role: str
-    parameters: tuple[int, ...]
+def finger_of(data: dict[str, Any]) -> Finger:
+    return finger_from_data(data)
 
 
 def index_finger() -> dict[str, Any]:
@@ -64,7 +59,7 @@ def wrong_start(data: dict[str, Any], seed: int = 1) -> dict[str, Any]:
     return start
 
 
-def made_up_unknowns(data: dict[str, Any]) -> list[MadeUp]:
+def made_up_unknowns(data: dict[str, Any]) -> list[Unknown]:
     """One for every number that a fit of the finger estimates; coulomb moves static along."""
     index = {parameter.path: k for k, parameter in enumerate(native.Instance.from_description(data).parameters())}
     found = []
@@ -73,11 +68,11 @@ def made_up_unknowns(data: dict[str, Any]) -> list[MadeUp]:
         moved = [index[number.path]]
         if role == "coulomb":
             moved.append(index[number.path.replace(".coulomb", ".static")])
-        found.append(MadeUp(number.path, role, tuple(moved)))
+        found.append(Unknown(number.path, role, tuple(moved), 0.0, 0.0, 0.0, 0.0))
     return found
 
 
-def internal_values(data: dict[str, Any], found: list[MadeUp]) -> Numbers:
+def internal_values(data: dict[str, Any], found: list[Unknown]) -> Numbers:
     values = {p.path: p.start for p in native.Instance.from_description(data).parameters()}
     z = []
     for one in found:
@@ -147,7 +142,7 @@ def _residual(series: FitSeries, where: NDArray[np.bool_]) -> dict[str, Any]:
 
 
 def made_up_report(
-    data: dict[str, Any], start: dict[str, Any], found: list[MadeUp], covariance: Numbers, series: list[FitSeries]
+    data: dict[str, Any], start: dict[str, Any], found: list[Unknown], covariance: Numbers, series: list[FitSeries]
 ) -> dict[str, Any]:
     """As "tendonfmu-fit-1" says, from the made-up numbers."""
     values, begun = (
@@ -223,4 +218,4 @@ def made_up_picture() -> FitPicture:
         series_of(data, FREE_X4, "index_finger_free_x4", "comparison"),
     ]
     report = made_up_report(data, start, found, covariance, series)
-    return FitPicture(report, start, data, found, z, covariance, series)
+    return FitPicture(report, finger_of(start), finger_of(data), found, z, covariance, series)

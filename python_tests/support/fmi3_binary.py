@@ -8,7 +8,6 @@ import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from ctypes import c_bool, c_char_p, c_double, c_int, c_int32, c_size_t, c_void_p
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fmu_binary import OK, AnyInstance
+from fmu_binary import OK, AnyInstance, UnpackedFmu, Variable
 
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 TYPES: dict[str, Any] = {"Float64": c_double, "Int32": c_int32, "Boolean": c_bool}
@@ -58,70 +57,29 @@ def _signatures(library: ctypes.CDLL) -> None:
     library.fmi3GetVersion.restype = c_char_p
 
 
-@dataclass(frozen=True)
-class Variable3:
-    """size: number of elements of an array, None for a scalar."""
-
-    vr: int
-    type: str
-    causality: str
-    variability: str
-    start: str | None
-    size: int | None
-
-    @property
-    def count(self) -> int:
-        return 1 if self.size is None else self.size
-
-
 def fmi3_platform() -> str:
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     return f"{machine}-{ {'linux': 'linux', 'darwin': 'darwin', 'win32': 'windows'}[sys.platform] }"
 
 
-@dataclass
-class UnpackedFmu3:
-    """folder: of the unpacked FMU."""
+class UnpackedFmu3(UnpackedFmu):
+    number = "Float64"
 
-    folder: Path
-    library: ctypes.CDLL = field(init=False)
-    variables: dict[str, Variable3] = field(init=False)
-
-    def __post_init__(self) -> None:
-        root = ElementTree.parse(self.folder / "modelDescription.xml").getroot()
-        self.token = root.attrib["instantiationToken"]
+    def read(self, root: ElementTree.Element) -> None:
+        self.guid = self.token = root.attrib["instantiationToken"]
         self.variables = {}
         for each in root.find("ModelVariables") or ():
             a, dimension = each.attrib, each.find("Dimension")
-            self.variables[a["name"]] = Variable3(
-                int(a["valueReference"]),
-                each.tag,
-                a["causality"],
-                a["variability"],
-                a.get("start"),
-                None if dimension is None else int(dimension.attrib["start"]),
+            size = None if dimension is None else int(dimension.attrib["start"])
+            self.variables[a["name"]] = Variable(
+                int(a["valueReference"]), each.tag, a["causality"], a["variability"], a.get("start"), size
             )
-        self.binary = next(path for path in (self.folder / "binaries" / fmi3_platform()).iterdir())
-        self.library = ctypes.CDLL(str(self.binary))
+
+    def platform(self) -> str:
+        return fmi3_platform()
+
+    def declare(self) -> None:
         _signatures(self.library)
-
-    def names(self, causality: str, kind: str = "Float64") -> list[str]:
-        return [name for name, v in self.variables.items() if v.causality == causality and v.type == kind]
-
-    def with_derivatives(self) -> list[str]:
-        return [name for name in self.names("output") if self.variables[name].variability == "continuous"]
-
-    def count(self, names: Sequence[str]) -> int:
-        """Elements of these variables together."""
-        return sum(self.variables[name].count for name in names)
-
-    def element_names(self, names: Sequence[str]) -> list[str]:
-        """Names of the elements, as in FMI 2.0."""
-        found = []
-        for name in names:
-            size = self.variables[name].size
-            found += [name] if size is None else [f"{name}[{i}]" for i in range(1, size + 1)]
-        return found
 
     @property
     def resources(self) -> bytes:

@@ -102,6 +102,11 @@ class Variable:
     causality: str
     variability: str
     start: str | None
+    size: int | None = None  # elements of an array of FMI 3.0; None of a scalar
+
+    @property
+    def count(self) -> int:
+        return 1 if self.size is None else self.size
 
 
 @dataclass
@@ -112,30 +117,47 @@ class UnpackedFmu:
     mode: int = ctypes.DEFAULT_MODE
     library: ctypes.CDLL = field(init=False)
     variables: dict[str, Variable] = field(init=False)
+    number = "Real"  # the type of numbers
 
     def __post_init__(self) -> None:
-        root = ElementTree.parse(self.folder / "modelDescription.xml").getroot()
+        self.read(ElementTree.parse(self.folder / "modelDescription.xml").getroot())
+        self.binary = next(path for path in (self.folder / "binaries" / self.platform()).iterdir())
+        self.library = ctypes.CDLL(str(self.binary), mode=self.mode)
+        self.declare()
+
+    def read(self, root: ElementTree.Element) -> None:
         self.guid = root.attrib["guid"]
         self.variables = {}
         for scalar in root.iter("ScalarVariable"):
-            kind = scalar[0]
-            a = scalar.attrib
-            self.variables[a["name"]] = Variable(
-                int(a["valueReference"]), kind.tag, a["causality"], a["variability"], kind.attrib.get("start")
-            )
-        self.binary = next(path for path in (self.folder / "binaries" / fmi_platform()).iterdir())
-        self.library = ctypes.CDLL(str(self.binary), mode=self.mode)
+            kind, a = scalar[0], scalar.attrib
+            start = kind.attrib.get("start")
+            reference = int(a["valueReference"])
+            self.variables[a["name"]] = Variable(reference, kind.tag, a["causality"], a["variability"], start)
+
+    def platform(self) -> str:
+        return fmi_platform()
+
+    def declare(self) -> None:
         _signatures(self.library)
 
-    def names(self, causality: str, kind: str = "Real") -> list[str]:
-        return [name for name, v in self.variables.items() if v.causality == causality and v.type == kind]
+    def names(self, causality: str, kind: str = "") -> list[str]:
+        wanted = causality, kind or self.number
+        return [name for name, v in self.variables.items() if (v.causality, v.type) == wanted]
+
+    def count(self, names: Sequence[str]) -> int:
+        """Elements of these variables together."""
+        return sum(self.variables[name].count for name in names)
 
     def element_names(self, names: Sequence[str]) -> list[str]:
-        """Of FMI 3.0, whose variables may be arrays, names of the elements."""
-        return list(names)
+        """Names of the elements, as in FMI 2.0."""
+        elements = []
+        for name in names:
+            size = self.variables[name].size
+            elements += [name] if size is None else [f"{name}[{i}]" for i in range(1, size + 1)]
+        return elements
 
     def with_derivatives(self) -> list[str]:
-        """The Real outputs but for discrete ones."""
+        """The outputs that are numbers but for discrete ones."""
         return [name for name in self.names("output") if self.variables[name].variability == "continuous"]
 
     @property

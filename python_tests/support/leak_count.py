@@ -84,20 +84,6 @@ def whole(fmu: UnpackedFmu) -> Callable[[int], None]:
     return cycle
 
 
-def losing(fmu: UnpackedFmu) -> Callable[[int], None]:
-    """As bare(), but every tenth instance leaves a block of the smallest size and a handle."""
-    assert C_LIBRARY
-    malloc, one = C_LIBRARY.malloc, bare(fmu)
-
-    def cycle(k: int) -> None:
-        one(k)
-        if k % 10 == 0:
-            malloc(1)
-            os.open(os.devnull, os.O_RDONLY)
-
-    return cycle
-
-
 def unloaded(fmu: UnpackedFmu) -> Callable[[int], None]:
     """The library loaded from a copy, one instance made and freed, the library unloaded."""
     import _ctypes
@@ -116,7 +102,7 @@ def unloaded(fmu: UnpackedFmu) -> Callable[[int], None]:
     return cycle
 
 
-CYCLES = {function.__name__: function for function in (bare, whole, losing, unloaded)}
+CYCLES = {function.__name__: function for function in (bare, whole, unloaded)}
 
 
 def growths(cycle: Callable[[int], None], count: int) -> Iterator[tuple[int, int]]:

@@ -85,7 +85,6 @@ PARTS = {
     "wine": _program("Windows binaries", "Debian: wine64", "wine64", "wine"),
     "qemu": _program("binaries for aarch64", "Debian: qemu-user-static", "qemu-aarch64-static"),
     "aarch64 library": _file("binaries for aarch64", Path("/usr/aarch64-linux-gnu"), "Debian: libc6-arm64-cross"),
-    "llvm-nm": _program("symbols of Windows binaries", "Debian: llvm", "llvm-nm"),
     "nm": _program("symbols of the binaries", "Debian: binutils", "nm"),
     "objdump": _program("code of the binaries", "Debian: binutils", "objdump"),
     "readelf": _program("what the binaries need", "Debian: binutils", "readelf"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from oracle_detection import Detector, direction_above
 from oracle_extensions import Extensions
-from oracle_finger import NEAR, Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
+from oracle_finger import Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
 from oracle_sensors import SensorWatch, Watch
 from oracle_start import StartFriction, gain_of
@@ -101,30 +101,23 @@ class FingerOracle:
             raise ValueError(f"time: {time} lies before the last sample's {self.time}")
         first = self.samples == 0
         dt = 0.0 if first else time - self.time
-        out = Step()
+        out = Step(forced or {})
         x0 = inputs.get("tendon_position")
         inputs = self.extensions.signals(time, inputs, first)
         f0 = np.asarray(inputs["tendon_force"], dtype=float)
 
-        def decide(key: Key, value: Any, others: list[Any]) -> Any:
-            chosen = (forced or {}).get(key, value)
-            out.decisions[key] = chosen
-            if others:
-                out.alternatives[key] = others
-            return chosen
-
         # 0. sensors
-        self._watch(inputs, f0, time, decide, out)
+        self._watch(inputs, f0, time, out)
         # 1. kinematics
-        q, v = self._kinematics(inputs, f0, dt, first, decide, out)
+        q, v = self._kinematics(inputs, f0, dt, first, out)
         x_dot = tendon_velocity(self.R, v)
         travel = v * dt if self.travel is None else self.travel
         self.travelled = travel, tendon_velocity(self.R, travel)
-        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, decide, out)
+        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, out)
         # 2. each friction effect: F, the increment b, and what stiction may hide
-        F, b, hidden = self._effects(q, v, x_dot, time, dt, first, decide, out)
+        F, b, hidden = self._effects(q, v, x_dot, time, dt, first, out)
         # 3. forces at and between the joints, and with them what multiplies an F or a b
-        f_between, f_before_edge, slack = self._propagate(f0, F.edge, F.pulley, decide, out)
+        f_between, f_before_edge, slack = self._propagate(f0, F.edge, F.pulley, out)
         f = self._loads(f_before_edge, f_between)
         # 4. totals, eq. (10)
         T = self._total(F * f) + self._springs(q)
@@ -141,20 +134,20 @@ class FingerOracle:
             self.b_eff = np.where(self.watch.anew, tau - T, self.b_eff + db)
         T_eff = self.b_eff + T
         hold = functools.partial(self._at_joints, arms=np.abs(self.R))
-        self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, decide)
+        self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, out)
         # 4a. what friction may differ by
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
         unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew)
         self.start.forget(unwatched)
         bounds = self.detector.bounds(hold(hidden * f), self._parts(F * f, q), change, self.start.unlearned, dt)
         unwell = bool(unwatched.any()) or (self.sensors is not None and bool(self.sensors.faults.any()))
-        self.detector.watch(f0, x0, mean_force, time, dt, first or unwell, decide, out)
+        self.detector.watch(f0, x0, mean_force, time, dt, first or unwell, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
         if not first:
             # 5. contact, 6. bias update or its inhibition
             r = np.where(unwatched, 0.0, tau - T_eff)
             self.detector.forget(unwatched)
-            joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, decide, out)
+            joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, out)
             if self.detector.updates(time):
                 K, own = self._gain(dt, noise)
                 correction = K * r
@@ -190,9 +183,7 @@ class FingerOracle:
         self.samples += 1
         return out
 
-    def _watch(
-        self, inputs: Mapping[str, Array], f0: Array, time: float, decide: Callable[..., Any], out: Step
-    ) -> None:  # fmt: skip
+    def _watch(self, inputs: Mapping[str, Array], f0: Array, time: float, out: Step) -> None:
         """Step 0: the rows in use, x0 − f0/k, and by how much the angles of the sample before change with the rows."""
         k = np.array([tendon.stiffness for tendon in self.tendons])
         before = self.spring_end
@@ -202,11 +193,11 @@ class FingerOracle:
             x = self.spring_end + f0 / k
         if self.sensors is not None:
             q = None if self.source == 1 else np.asarray(inputs["joint_position"], dtype=float)
-            self.watch = self.sensors.take(f0, np.asarray(x, dtype=float), q, time, decide, out)
+            self.watch = self.sensors.take(f0, np.asarray(x, dtype=float), q, time, out)
         self.shift = (self.watch.inverse - self.watch.before) @ before
 
     def _kinematics(
-        self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool, decide: Callable[..., Any], out: Step
+        self, inputs: Mapping[str, Array], f0: Array, dt: float, first: bool, out: Step
     ) -> tuple[Array, Array]:
         if self.source == 1:
             q = self.watch.inverse @ self.spring_end
@@ -217,7 +208,7 @@ class FingerOracle:
             return q, np.array(inputs["joint_velocity"], dtype=float)
         if self.position_filter is not None:
             self.position_filter.shift(self.shift)
-            v, self.travel = self.position_filter.take(q, dt, first, decide, out)
+            v, self.travel = self.position_filter.take(q, dt, first, out)
             return q, v
         if first:
             return q, np.zeros(self.n)
@@ -227,8 +218,7 @@ class FingerOracle:
         return q, self.v + (1.0 - math.exp(-2.0 * math.pi * self.cutoff * dt)) * (raw - self.v)
 
     def _effects(
-        self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool,
-        decide: Callable[..., Any], out: Step,
+        self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool, out: Step,
     ) -> tuple[Places, Places, Places]:  # fmt: skip
         """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
         F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
@@ -242,12 +232,12 @@ class FingerOracle:
                 taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
                 whole = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle))
                 self.start.slides(effect, travel, displacement, factor * whole, first)
-                direction = direction_above(velocity, effect.limit(self.hysteresis), key, decide, out)
+                direction = direction_above(velocity, effect.limit(self.hysteresis), key, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
                 if effect.rests and self.detector.bounds_presliding:
                     getattr(hidden, kind)[at] = effect.whole
             else:
-                taken = self._take_effect(effect, velocity, angle, time, first, key, decide, out)
+                taken = self._take_effect(effect, velocity, angle, time, first, key, out)
                 self.start.sticks(effect, factor * taken[0], first)
             getattr(F, kind)[at], getattr(b, kind)[at] = factor * taken[0], factor * taken[1]
             if effect.stuck and self.detector.friction_bound is not None:
@@ -270,11 +260,10 @@ class FingerOracle:
         return v[at[0]], 0.0, ("joint", at[0])
 
     def _take_effect(
-        self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Key,
-        decide: Callable[..., Any], out: Step,
+        self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Key, out: Step,
     ) -> tuple[float, float]:  # fmt: skip
         """Step 2 of section 5: (F, b) of one effect, and what it remembers."""
-        direction = direction_above(v, effect.limit(self.hysteresis), key, decide, out)
+        direction = direction_above(v, effect.limit(self.hysteresis), key, out)
         self._count_place(effect, direction, abs(v), angle)
 
         effect.taken_out, effect.enters = 0.0, False
@@ -344,9 +333,7 @@ class FingerOracle:
                 product[at] -= effect.taken_out
         return products
 
-    def _propagate(
-        self, f0: Array, F_B: Array, F_A: Array, decide: Callable[..., Any], out: Step
-    ) -> tuple[Array, Array, Array]:
+    def _propagate(self, f0: Array, F_B: Array, F_A: Array, out: Step) -> tuple[Array, Array, Array]:
         """eqs. (6), (7) as a recursion: f_B[i, j], f_A before the edge of joint j, and slack[i]."""
         f_between = np.zeros((self.m, self.n))
         f_before_edge = np.zeros((self.m, self.n))
@@ -357,11 +344,7 @@ class FingerOracle:
             if self.tendons[i].bidirectional:
                 self.branches["bidirectional_pushes" if force < 0.0 else "bidirectional_pulls"] += 1
                 return force
-            near = computed and abs(force) < NEAR
-            if computed:
-                out.force_margin = min(out.force_margin, abs(force))
-            negative = decide(("force", i, place, j), force < 0.0, [not force < 0.0] if near else [])
-            if negative:
+            if out.decide(("force", i, place, j), force < 0.0, abs(force) if computed else 0.0):
                 slack[i] = True
                 self.branches["slack_at_spring" if place == "spring" else "slack_by_loss"] += 1
                 return 0.0
@@ -470,26 +453,16 @@ def run(
     description: Mapping[str, Any],
     recording: Mapping[str, Array],
     kinematics_source: int = 1,
-    forced: Mapping[Key, Any] | None = None,
 ) -> Result:
-    """Runs a finger over a recording: `time` [N] (s) and the inputs, [N, m] or [N, n] each.
-
-    forced: decisions to take differently, keyed (sample, *decision key); see agreement.py.
-    """
+    """Runs a finger over a recording: `time` [N] (s) and the inputs, [N, m] or [N, n] each."""
     finger = FingerOracle(description, kinematics_source)
-    by_sample: dict[int, dict[Key, Any]] = {}
-    for key, value in (forced or {}).items():
-        by_sample.setdefault(key[0], {})[key[1:]] = value
     present = [name for name in INPUTS if recording.get(name) is not None]
     steps = []
     for k, time in enumerate(np.asarray(recording["time"], dtype=float)):
         inputs = {name: recording[name][k] for name in present}
-        steps.append(finger.step(float(time), inputs, by_sample.get(k)))
+        steps.append(finger.step(float(time), inputs))
     return Result(
         outputs={name: np.array([step.values[name] for step in steps]) for name in steps[0].values},
-        velocity_margin=np.array([step.velocity_margin for step in steps]),
-        residual_margin=np.array([step.residual_margin for step in steps]),
-        force_margin=np.array([step.force_margin for step in steps]),
-        alternatives={k: step.alternatives for k, step in enumerate(steps) if step.alternatives},
+        margin=np.array([step.margin for step in steps]),
         branches=finger.branches,
     )

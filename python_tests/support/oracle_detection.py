@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import NEAR, given
+from oracle_finger import Key, Step, given
 from oracle_rest import RestWatch
 
 Array = NDArray[Any]
@@ -23,14 +23,10 @@ OF_LATE = 0.1  # of T_q
 FASTEST = 10.0  # the evidence of `cusum` grows at most this many seconds a second
 
 
-def direction_above(v: float, limit: float, key: tuple[Any, ...], decide: Callable[..., Any], out: Any) -> int:
+def direction_above(v: float, limit: float, key: Key, out: Step) -> int:
     """sgn(v) where |v| > limit, else 0."""
     sign = int(v > 0.0) - int(v < 0.0)
-    margin = abs(abs(v) - limit)
-    out.velocity_margin = min(out.velocity_margin, margin)
-    direction = sign if abs(v) > limit else 0
-    others = [d for d in (-1, 0, 1) if d != direction] if abs(v) < NEAR else [0 if direction else sign]
-    return int(decide(key, direction, others if margin < NEAR else []))
+    return int(out.decide(key, sign if abs(v) > limit else 0, abs(abs(v) - limit)))
 
 
 @dataclass
@@ -168,12 +164,11 @@ class Detector:
         return self.uncertainty[j] or []
 
     def watch(
-        self, f0: Array, x0: Array | None, mean_force: float, time: float, dt: float, first: bool,
-        decide: Callable[..., Any], out: Any,
+        self, f0: Array, x0: Array | None, mean_force: float, time: float, dt: float, first: bool, out: Step,
     ) -> None:  # fmt: skip
         """Step 5a, of contact.rest. x0: the tendon positions as they are given."""
         if self.rest is not None:
-            self.rest.take(f0, np.array(x0, dtype=float), mean_force, time, dt, first, decide, out)
+            self.rest.take(f0, np.array(x0, dtype=float), mean_force, time, dt, first, out)
 
     def begin(self, time: float) -> None:
         """The first sample."""
@@ -201,17 +196,16 @@ class Detector:
         return {"contact_change": self.rest.change, "contact_at_rest": np.asarray(self.rest.at_rest.any())}
 
     def contact(
-        self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float,
-        decide: Callable[..., Any], out: Any,
+        self, r: Array, bounds: Bounds, mean_force: float, time: float, dt: float, out: Step,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Step 5: joint_contact [n] and y [n] (0 with the method `threshold`), after `watch`."""
         y = np.zeros(self.n) if self.method == "threshold" else r - self.filtered
         if self.slow is not None:
             self.slow.take(r, time, dt)
         found = np.zeros(self.n, dtype=bool)
-        loaded = np.zeros(self.n, dtype=bool) if self.rest is None else self.rest.loaded(r, decide, out)
+        loaded = np.zeros(self.n, dtype=bool) if self.rest is None else self.rest.loaded(r, out)
         for j in range(self.n):
-            if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, decide, out) or loaded[j]:
+            if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, out) or loaded[j]:
                 found[j] = True
                 self.last_exceeded[j] = time
             # times are inputs: every implementation subtracts the same two numbers, so this is never "near"
@@ -226,8 +220,7 @@ class Detector:
         return found, y
 
     def _exceeds(
-        self, j: int, r: float, y: float, bounds: Bounds, mean_force: float, dt: float,
-        decide: Callable[..., Any], out: Any,
+        self, j: int, r: float, y: float, bounds: Bounds, mean_force: float, dt: float, out: Step,
     ) -> bool:  # fmt: skip
         """Whether any of the method's criteria is exceeded at joint j."""
         ratio = self.release_ratio if self.in_contact[j] else 1.0
@@ -236,10 +229,7 @@ class Detector:
         def above(name: str, value: float, limit: float) -> bool:
             nonlocal without_ratio
             without_ratio = without_ratio or value > limit
-            margin = abs(value - ratio * limit)
-            out.residual_margin = min(out.residual_margin, margin)
-            exceeds = value > ratio * limit
-            return bool(decide((name, j), exceeds, [not exceeds] if margin < NEAR else []))
+            return out.above((name, j), value, ratio * limit)
 
         allowed = self.threshold[j] + self.threshold_per_force[j] * mean_force + bounds.E[j]
         by_residual = above("contact", abs(r), allowed + self.level * bounds.u[j])
@@ -250,7 +240,7 @@ class Detector:
             if self.method == "innovation":
                 by_innovation = above("innovation", abs(y), B)
             else:
-                self._gather_evidence(j, abs(y), B, dt, decide, out)
+                self._gather_evidence(j, abs(y), B, dt, out)
                 by_innovation = above("cusum", self.evidence[j], self.evidence_time)
             if by_residual != by_innovation:
                 self.branches["residual_alone" if by_residual else f"{self.method}_alone"] += 1
@@ -263,11 +253,10 @@ class Detector:
             self.branches["release_ratio_holds"] += 1
         return exceeds
 
-    def _gather_evidence(self, j: int, y: float, B: float, dt: float, decide: Callable[..., Any], out: Any) -> None:
+    def _gather_evidence(self, j: int, y: float, B: float, dt: float, out: Step) -> None:
         """g_j of `cusum`, in seconds."""
         if B == 0.0:
-            out.residual_margin = min(out.residual_margin, y)
-            growth = FASTEST if decide(("no_bound", j), y > 0.0, [not y > 0.0] if y < NEAR else []) else -1.0
+            growth = FASTEST if out.above(("no_bound", j), y, 0.0) else -1.0
             self.branches["evidence_without_bound"] += 1
         else:
             growth = min(FASTEST, y / B - 1.0)

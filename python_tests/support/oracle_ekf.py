@@ -23,8 +23,8 @@ class JosephFilter:
     """
 
     def __init__(
-        self, unknowns: Unknowns, n: int, scale: Array, lower: Array, upper: Array,
-        prior_std: float = 1.0, parameter_drift: float = 0.0,
+        self, unknowns: Unknowns, n: int, scale: Array, lower: Array, upper: Array, prior_std: float = 1.0,
+        parameter_drift: float = 0.0,
     ) -> None:  # fmt: skip
         self.unknowns, self.n = unknowns, n
         self.scale, self.lower, self.upper = scale, lower, upper

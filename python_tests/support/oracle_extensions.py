@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oracle_detection import direction_above
-from oracle_finger import Effect, Joint, given
+from oracle_finger import Effect, Joint, Key, Step, given
 
 Array = NDArray[Any]
 
@@ -63,10 +63,10 @@ class Sides:
     read: set[tuple[Any, ...]] = field(default_factory=set)  # velocities whose s any effect reads
     now: dict[tuple[Any, ...], int] = field(default_factory=dict)  # sgn(v) where |v| > v_min at this sample, else 0
 
-    def take(self, key: tuple[Any, ...], v: float, threshold: float, decide: Callable[..., Any], out: Any) -> None:
+    def take(self, key: Key, v: float, threshold: float, out: Step) -> None:
         if key not in self.read:
             return
-        moves = direction_above(v, threshold, ("side", *key), decide, out)
+        moves = direction_above(v, threshold, ("side", *key), out)
         self.now[key] = moves
         if moves:
             side = self.tendon if key[0] == "tendon" else self.joint
@@ -260,15 +260,15 @@ class Extensions:
         return used
 
     def advance(
-        self, q: Array, v: Array, x_dot: Array, f0: Array, dt: float, first: bool,
-        thresholds: tuple[float, float], decide: Callable[..., Any], out: Any,
+        self, q: Array, v: Array, x_dot: Array, f0: Array, dt: float, first: bool, thresholds: tuple[float, float],
+        out: Step,
     ) -> None:  # fmt: skip
         """What torques and friction see of this sample. thresholds: v_min of tendons and joints."""
         for i, row in enumerate(x_dot):
             for j, velocity in enumerate(row):
-                self.sides.take(("tendon", i, j), velocity, thresholds[0], decide, out)
+                self.sides.take(("tendon", i, j), velocity, thresholds[0], out)
         for j, velocity in enumerate(v):
-            self.sides.take(("joint", j), velocity, thresholds[1], decide, out)
+            self.sides.take(("joint", j), velocity, thresholds[1], out)
         acceleration = np.zeros(self.n) if first else (v - self.v_before) / dt
         self.v_before = v
         sides = self.sides.tendon.copy(), self.sides.joint.copy()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Key = tuple[Any, ...]
-NEAR = 1e-9  # docs/reference/semantics.md#agreement: a decision closer than this to its threshold may go either way
+NEAR = 1e-9  # a decision closer than this to its threshold may be turned by rounding
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 
 
@@ -196,36 +196,35 @@ def read_tendons(description: Mapping[str, Any]) -> list[Tendon]:
 
 @dataclass
 class Result:
-    """Outputs of a run and what the agreement rule and the branch counts need.
-
-    outputs: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`).
-    velocity_margin, residual_margin, force_margin: [N], smallest distance of the sample to a
-        threshold (m/s or rad/s, N.m, N); evidence, in s, counts with the residual.
-    alternatives: sample -> {decision key: values the decision may also take within NEAR}.
-    branches: how often each branch was taken.
-    """
+    """Outputs of a run: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`)."""
 
     outputs: dict[str, Array]
-    velocity_margin: Array
-    residual_margin: Array
-    force_margin: Array
-    alternatives: dict[int, dict[Key, list[Any]]]
-    branches: Counter[str]
+    margin: Array  # [N], of each step
+    branches: Counter[str]  # how often each branch was taken
 
     @property
     def near(self) -> Array:
         """[N] bool: samples within NEAR of some threshold."""
-        smallest = np.minimum(np.minimum(self.velocity_margin, self.residual_margin), self.force_margin)
-        return np.asarray(smallest < NEAR)
+        return np.asarray(self.margin < NEAR)
 
 
 @dataclass
 class Step:
     """What one sample yields besides the change of the state."""
 
+    forced: Mapping[Key, Any] = field(default_factory=dict)  # decisions that are taken this way, whatever the values
     values: dict[str, Array] = field(default_factory=dict)
-    velocity_margin: float = math.inf
-    residual_margin: float = math.inf
-    force_margin: float = math.inf
     decisions: dict[Key, Any] = field(default_factory=dict)
-    alternatives: dict[Key, list[Any]] = field(default_factory=dict)
+    # smallest distance to a threshold (m/s, rad/s, N·m, N or s); exactly at it (at rest, v_min = 0) nothing is left to
+    # rounding
+    margin: float = math.inf
+
+    def decide(self, key: Key, value: Any, distance: float = 0.0) -> Any:
+        """The decision of that name: the value, unless another one is forced. distance: to the threshold."""
+        if distance > 0.0:
+            self.margin = min(self.margin, distance)
+        self.decisions[key] = self.forced.get(key, value)
+        return self.decisions[key]
+
+    def above(self, key: Key, value: float, limit: float) -> bool:
+        return bool(self.decide(key, bool(value > limit), abs(value - limit)))

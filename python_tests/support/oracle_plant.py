@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracle_finger import given
 from oracle_plant_parts import (
     Contact,
     Friction,
     Multibody,
-    Spline,
     Tendon,
     diversion_shape,
-    given,
     push_profile,
     read_law,
+    spline,
 )
 
 Array = NDArray[Any]
@@ -116,10 +116,10 @@ class PlantTwin:
 
     def _read_motion(self) -> None:
         self.desired = [
-            Spline(joint["time"], joint["position"], joint["velocity"], joint["acceleration"])
+            spline(joint["time"], joint["position"], joint["velocity"], joint["acceleration"])
             for joint in self.motion["joints"]
         ]
-        self.pretension = Spline(self.motion["pretension"]["time"], self.motion["pretension"]["value"])
+        self.pretension = spline(self.motion["pretension"]["time"], self.motion["pretension"]["value"])
         # null vector of Rᵀ nearest to ones, mean 1, with the true arms in the first posture
         posture = np.array([path(0.0) for path in self.desired])
         R = np.array([tendon.arms(posture) for tendon in self.tendons])

@@ -10,30 +10,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BPoly
+
+from oracle_finger import given, read_side
 
 Array = NDArray[Any]
-Side = tuple[float, float, float, float]  # static, coulomb, stribeck velocity, viscous
+Side = tuple[float, ...]  # static, coulomb, stribeck velocity, viscous
 COMPLEX_STEP = 1e-30
-
-
-def given(table: Mapping[str, Any] | None, key: str, default: Any) -> Any:
-    """The entry, or the default where the table or the key is absent or null."""
-    value = None if table is None else table.get(key)
-    return default if value is None else value
 
 
 def read_law(law: Mapping[str, Any]) -> tuple[Side, Side]:
     """Positive and negative side."""
-
-    def side(table: Mapping[str, Any]) -> Side:
-        return (
-            float(table["static"]),
-            float(table["coulomb"]),
-            float(table["stribeck_velocity"]),
-            float(given(table, "viscous", 0.0)),
-        )
-
-    return (side(law["positive"]), side(law["negative"])) if "positive" in law else (side(law), side(law))
+    positive, negative = (law["positive"], law["negative"]) if "positive" in law else (law, law)
+    return read_side(positive), read_side(negative)
 
 
 @dataclass
@@ -190,38 +179,16 @@ class Multibody:
         return stepped
 
 
-class Spline:
+def spline(
+    time: Sequence[float], value: Sequence[float], slope: Any = None, curvature: Any = None
+) -> Callable[[float], float]:
     """Quintic Hermite polynomials between knots (value, slope, curvature), constant outside."""
-
-    def __init__(self, time: Sequence[float], value: Sequence[float], slope: Any = None, curvature: Any = None) -> None:
-        self.time, self.value = [float(t) for t in time], [float(x) for x in value]
-        self.slope = [0.0] * len(self.time) if slope is None else list(slope)
-        self.curvature = [0.0] * len(self.time) if curvature is None else list(curvature)
-
-    def __call__(self, t: float) -> float:
-        if t <= self.time[0]:
-            return self.value[0]
-        if t >= self.time[-1]:
-            return self.value[-1]
-        k = max(i for i, knot in enumerate(self.time) if knot <= t)
-        h = self.time[k + 1] - self.time[k]
-        s = (t - self.time[k]) / h
-        # conditions on the six coefficients of the polynomial in s: value, slope, curvature at s = 0 and 1
-        conditions = np.array(
-            [
-                [1, 0, 0, 0, 0, 0],
-                [0, 1, 0, 0, 0, 0],
-                [0, 0, 2, 0, 0, 0],
-                [1, 1, 1, 1, 1, 1],
-                [0, 1, 2, 3, 4, 5],
-                [0, 0, 2, 6, 12, 20],
-            ],
-            dtype=float,
-        )
-        # The value at the first knot is added last: its size must not cost the polynomial digits.
-        ends = [0.0, self.slope[k] * h, self.curvature[k] * h * h]
-        ends += [self.value[k + 1] - self.value[k], self.slope[k + 1] * h, self.curvature[k + 1] * h * h]
-        return float(self.value[k] + np.polyval(np.linalg.solve(conditions, np.array(ends))[::-1], s))
+    if len(time) == 1:
+        return lambda t: float(value[0])
+    zeros = np.zeros(len(time))
+    knots = np.column_stack([value, zeros if slope is None else slope, zeros if curvature is None else curvature])
+    polynomials = BPoly.from_derivatives(time, knots)
+    return lambda t: float(polynomials(min(max(t, time[0]), time[-1])))
 
 
 def push_profile(push: Mapping[str, Any], t: float) -> float:

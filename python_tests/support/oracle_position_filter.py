@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oracle_detection import direction_above
-from oracle_finger import given
+from oracle_finger import Key, Step, given
 
 Array = NDArray[Any]
 
@@ -39,7 +39,7 @@ class JointFilter:
         self.estimate[0] += angle
         self.z += angle
 
-    def take(self, q: float, h: float, key: tuple[Any, ...], decide: Callable[..., Any], out: Any) -> float:
+    def take(self, q: float, h: float, key: Key, out: Step) -> float:
         """One later sample: how far z moves."""
         if h > LONGEST_STEP:
             self.branches["filter_begins_anew"] += 1
@@ -57,7 +57,7 @@ class JointFilter:
         self.P = P - np.outer(K, P[0])
         x, v, _ = self.estimate
         before = self.z
-        if direction_above(v, 2.0 * math.sqrt(self.P[1, 1]), key, decide, out):
+        if direction_above(v, 2.0 * math.sqrt(self.P[1, 1]), key, out):
             self.z = x
             self.branches["gate_open"] += 1
         else:
@@ -76,16 +76,14 @@ class PositionFilter:
         for joint, angle in zip(self.filters, angles, strict=True):
             joint.shift(float(angle))
 
-    def take(
-        self, q: Array, dt: float, first: bool, decide: Callable[..., Any], out: Any
-    ) -> tuple[Array, Array]:  # fmt: skip
+    def take(self, q: Array, dt: float, first: bool, out: Step) -> tuple[Array, Array]:
         """Velocity and travel of the joints, [n]."""
         if first:
             for joint, angle in zip(self.filters, q, strict=True):
                 joint.begin(float(angle))
             return np.zeros(len(q)), np.zeros(len(q))
         travel = [
-            joint.take(float(angle), dt, ("gate", j), decide, out)
+            joint.take(float(angle), dt, ("gate", j), out)
             for j, (joint, angle) in enumerate(zip(self.filters, q, strict=True))
         ]
         return np.array([joint.estimate[1] for joint in self.filters]), np.array(travel)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import NEAR, given
+from oracle_finger import Key, Step, given
 
 Array = NDArray[Any]
 
@@ -50,8 +50,7 @@ class RestWatch:
         self.carried = np.zeros(n)  # signed bound of a load from the rest before
 
     def take(
-        self, f0: Array, x0: Array, mean_force: float, time: float, dt: float, first: bool,
-        decide: Callable[..., Any], out: Any,
+        self, f0: Array, x0: Array, mean_force: float, time: float, dt: float, first: bool, out: Step,
     ) -> None:  # fmt: skip
         """One sample."""
         if first:
@@ -67,11 +66,8 @@ class RestWatch:
         D = noise + self.creep * math.sqrt(rested)
         B = D if self.sudden is None else self.sudden
 
-        def above(name: tuple[Any, ...], value: float, limit: float) -> bool:
-            margin = abs(value - limit)
-            out.residual_margin = min(out.residual_margin, margin)
-            exceeds = bool(value > limit)
-            return bool(decide(("rest", *name), exceeds, [not exceeds] if margin < NEAR else []))
+        def above(name: Key, value: float, limit: float) -> bool:
+            return out.above(("rest", *name), value, limit)
 
         # x0 and the travel are inputs: every implementation subtracts and compares the same numbers
         far = np.abs(x0 - x_mark) > self.travel
@@ -84,7 +80,7 @@ class RestWatch:
                 self.branches["rest_begins"] += 1
                 self._mark(x0, time, True)
             return
-        if self._drives(x0, decide, out):
+        if self._drives(x0, out):
             for j in np.flatnonzero(self.at_rest):
                 self.carried[j] = math.copysign(B[j], self.extreme[j])
                 self.branches["load_carried"] += 1
@@ -110,7 +106,7 @@ class RestWatch:
         self.at_rest = np.zeros(len(self.threshold), dtype=bool)
         self.extreme = np.zeros_like(self.threshold)
 
-    def _drives(self, x0: Array, decide: Callable[..., Any], out: Any) -> bool:
+    def _drives(self, x0: Array, out: Step) -> bool:
         """Any motor that its force cannot have moved; one that gives way does not drive."""
         _, x_mark, f_mark = self.mark
         _, x_recent, f_recent = self.recent
@@ -118,19 +114,14 @@ class RestWatch:
         for i in range(len(x0)):
             pulled, moved = self.f[i] - f_recent[i], x0[i] - x_recent[i]
             if abs(moved) > self.travel:
-                out.force_margin = min(out.force_margin, abs(pulled))
-                pulls = bool(moved * pulled >= 0.0)
-                if decide(("pulls", i), pulls, [not pulls] if abs(pulled) < NEAR else []):
+                if out.decide(("pulls", i), bool(moved * pulled >= 0.0), abs(pulled)):
                     found = True
                 else:
                     self.branches["motor_gives_way"] += 1
             soft = self.travel + abs(self.f[i] - f_mark[i]) / self.stiffness[i]
-            margin = abs(abs(x0[i] - x_mark[i]) - soft)
+            beyond = abs(x0[i] - x_mark[i]) - soft
             # in N at the tendon: lengths of some micrometres are never 1e-9 m apart
-            out.force_margin = min(out.force_margin, margin * self.stiffness[i])
-            beyond = bool(abs(x0[i] - x_mark[i]) > soft)
-            near = margin * self.stiffness[i] < NEAR
-            if decide(("beyond", i), beyond, [not beyond] if near else []):
+            if out.decide(("beyond", i), bool(beyond > 0.0), abs(beyond) * self.stiffness[i]):
                 self.branches["motor_beyond_yield"] += 1
                 found = True
         return found
@@ -159,15 +150,12 @@ class RestWatch:
             self.branches["contact_at_rest"] += exceeds
             self.at_rest[j] = exceeds
 
-    def loaded(self, r: Array, decide: Callable[..., Any], out: Any) -> Array:
+    def loaded(self, r: Array, out: Step) -> Array:
         """[n] in contact at rest, or with a load from the rest before that the residual still shows."""
         for j in np.flatnonzero(self.carried != 0.0):
             level = abs(self.carried[j])
             felt = math.copysign(1.0, self.carried[j]) * r[j]
-            margin = abs(felt - level)
-            out.residual_margin = min(out.residual_margin, margin)
-            lasts = bool(felt > level)
-            if not decide(("carried", int(j)), lasts, [not lasts] if margin < NEAR else []):
+            if not out.above(("carried", int(j)), felt, level):
                 self.carried[j] = 0.0
                 self.branches["carried_load_ends"] += 1
         return np.asarray(self.at_rest | (self.carried != 0.0))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import given
+from oracle_finger import Key, Step, given
 
 Array = NDArray[Any]
 
@@ -128,17 +128,12 @@ class SensorWatch:
     def _is_taut(self, i: int, f: float) -> bool:
         return self.tendons[i].bidirectional or bool(f > self.margin)
 
-    def take(
-        self, f: Array, x: Array, q: Array | None, time: float, decide: Callable[..., Any], out: Any
-    ) -> Watch:  # fmt: skip
+    def take(self, f: Array, x: Array, q: Array | None, time: float, out: Step) -> Watch:
         """One sample."""
         before = self.inverse
 
-        def above(name: tuple[Any, ...], value: float, limit: float) -> bool:
-            margin = abs(value - limit)
-            out.force_margin = min(out.force_margin, margin)
-            exceeds = bool(value > limit)
-            return bool(decide(("sensor", *name), exceeds, [not exceeds] if margin < NEAR else []))
+        def above(name: Key, value: float, limit: float) -> bool:
+            return out.above(("sensor", *name), value, limit)
 
         w = [self._joint_side(i, f, x, q) for i in range(len(f))]
         faulty_before = [bool(tendon.fault) for tendon in self.tendons]
@@ -200,7 +195,7 @@ class SensorWatch:
 
     def _force_stands(
         self, i: int, f: float, x: float, w: float | None, again: bool, time: float, above: Above
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         tendon = self.tendons[i]
         well = not tendon.fault
         lost = well and not again
@@ -221,7 +216,7 @@ class SensorWatch:
 
     def _position_stands(
         self, i: int, f: float, x: float, w: float | None, again: bool, time: float, above: Above
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         tendon = self.tendons[i]
         well = not tendon.fault
         left = tendon.held_position is None or abs(x - tendon.held_position[0]) > self.position_resolution

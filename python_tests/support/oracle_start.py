@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import Effect, Places
+from oracle_finger import Effect, Places, Step
 
 Array = NDArray[Any]
 
@@ -48,7 +48,7 @@ class StartFriction:
 
     def turn(
         self, places: Iterable[tuple[str, Any, Effect]], turned: Places, f: Places,
-        at_joints: Callable[[Places], Array], decide: Callable[..., Any],
+        at_joints: Callable[[Places], Array], out: Step,
     ) -> None:  # fmt: skip
         """turned: zeros to fill. f: what multiplies an F. Derivatives hold V: a decision."""
         if self.share is None:
@@ -59,7 +59,7 @@ class StartFriction:
             if effect.start_left <= LEAST_LEFT:
                 effect.start_left = 0.0
             self.branches["start_turned" if effect.turned > 0.0 else "start_stands"] += 1
-        self.unlearned = decide(("unlearned",), self.unlearned + self.share * at_joints(turned * f), [])
+        self.unlearned = out.decide(("unlearned",), self.unlearned + self.share * at_joints(turned * f))
 
     def forget(self, unwatched: Array) -> None:
         """Joints whose sensors fail."""

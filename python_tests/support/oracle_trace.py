@@ -14,7 +14,7 @@ from __future__ import annotations
 import copy
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 import oracle
 from oracle_extensions import Row, distance_of, factor_of, next_share, torque_of
-from oracle_finger import Effect, given
+from oracle_finger import NEAR, Effect, given
 
 Array = NDArray[Any]
 Values = Mapping[str, Any]  # path of a parameter -> its number, or [U, 1] numbers
@@ -90,12 +90,11 @@ class Recorder(oracle.FingerOracle):
         return self.totals[-1]
 
     def _take_effect(
-        self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Any,
-        decide: Callable[..., Any], out: oracle.Step,
+        self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Any, out: oracle.Step,
     ) -> tuple[float, float]:  # fmt: skip
         stuck, side, since, last = effect.stuck, effect.side, effect.stuck_since, effect.last_stuck
         absorbed = self.absorbed - effect.absorbed_since
-        F, b = super()._take_effect(effect, v, angle, time, first, key, decide, out)
+        F, b = super()._take_effect(effect, v, angle, time, first, key, out)
         direction = out.decisions[key]
         of_side = {1: 0.0, -1: 0.0}
         if not first and direction != 0 and stuck:
@@ -156,9 +155,7 @@ class Trace:
         self.force = np.array([moment.f0 for moment in finger.moments])
         self.q = np.array([step.values["joint_angle"] for step in steps])
         self.tau = np.array([step.values["joint_torque"] for step in steps])
-        # within 1e-9 of a threshold; exactly at it (at rest, v_min = 0) nothing is left to rounding
-        margins = np.array([[step.velocity_margin, step.force_margin] for step in steps])
-        self.near = ((margins > 0.0) & (margins < oracle.NEAR)).any(axis=1)
+        self.near = np.array([step.margin for step in steps]) < NEAR
         self.residual = np.array([np.full(self.n, np.nan), *finger.residuals])
         self.branches = finger.branches
         self.rows = finger.extensions.rows

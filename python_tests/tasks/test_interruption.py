@@ -26,7 +26,7 @@ if os.name != "posix":
 import diagnosis_examples as examples
 from tendonfmu.errors import InputError
 from tendonfmu.report.diagnosis_files import REPORT, write_diagnosis
-from tendonfmu.tasks.interruption import ended_by_signals, uninterrupted
+from tendonfmu.tasks.phases import ended_by_signals, uninterrupted
 
 HERE = SUPPORT
 PROMPT = 10.0  # s; on a busy machine

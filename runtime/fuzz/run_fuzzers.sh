@@ -16,8 +16,9 @@ if [[ $# -lt 2 ]]; then
   cmake --build "$build" --parallel 2 >/dev/null
 fi
 
-failed=0
-while IFS= read -r program; do
+# fuzz PROGRAM
+fuzz() {
+  local program=$1 name folder corpus arguments limit log
   name=$(basename "$program")
   folder=$(dirname "$program")
   corpus=$build/corpus/$name
@@ -34,7 +35,12 @@ while IFS= read -r program; do
   else
     tail -n 40 "$log" >&2
     echo "$name: FAILED, see $log and $build/findings" >&2
-    failed=1
+    return 1
   fi
-done < <(find "$build" -type f -perm -u+x -name 'fuzz_*' | sort)
-exit "$failed"
+}
+
+export -f fuzz
+export build seconds
+# As many at once as there are processors; a failure of one ends no other.
+find "$build" -type f -perm -u+x -name 'fuzz_*' -print0 | sort -z |
+  xargs -0 -n 1 -P "$(getconf _NPROCESSORS_ONLN)" bash -c 'fuzz "$1"' fuzz

@@ -1,7 +1,7 @@
 """Makes a tuned finger from free motion (`tendonfmu calibrate`).
 
-`calibration` runs check, diagnosis, fit, tuning and score in steps that can be resumed. `report`, `text` and `files`
-present and write the results.
+`calibration` runs check, diagnosis, fit, tuning and score in steps that can be resumed. `report` and `text` present
+and write the results.
 """
 
 from typing import TYPE_CHECKING
@@ -11,6 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import text
     from .calibration import DIAGNOSIS, Calibration, calibrate
-    from .files import PAGE, REPORT, check_folder, write_calibration
+    from .text import PAGE, REPORT, check_folder, write_calibration
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,15 +1,28 @@
-"""The results of a calibration in sentences and rows, for the page and the terminal."""
+"""The results of a calibration in sentences and rows, for the page and the terminal, and its files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from tendonfmu.files import counted
-from tendonfmu.report import Row, Table, rounded, together
+from tendonfmu.calibrate.calibration import DIAGNOSIS, Calibration
+from tendonfmu.files import check_output, check_output_folder, counted, write_text
+from tendonfmu.fmu import build_fmu
+from tendonfmu.model import description_text
+from tendonfmu.report import Row, Table, render, rounded, together
 
 Report = Mapping[str, Any]
 
+FINGER, FMU, PAGE, REPORT = "finger.json", "finger.fmu", "calibration.html", "calibration.json"
+_WHAT = {
+    PAGE: "the results, for a browser",
+    FINGER: "the calibrated description",
+    FMU: "the same as an FMU",
+    REPORT: "the numbers of the page",
+}
+_DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how it was found"}
 MODELS = {
     "bias_only": "no friction model, the bias alone",
     "as_given": "the description as given",
@@ -176,3 +189,53 @@ def tables(report: Report) -> Iterator[Table]:
     )
     if sizes := size_rows(report):
         yield "pushes found, by size relative to the error in free motion", ("size", "found", "95 % interval"), sizes
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def files_of(report: Mapping[str, Any]) -> dict[str, str]:
+    """Return the name of each file in the folder, with its content in words."""
+    return _WHAT | (_DIAGNOSED if report["structure"]["recordings"] else {})
+
+
+def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
+    """Check that the results can be written, before a long computation."""
+    check_output_folder(folder)
+    if folder.is_dir():
+        for name in (FINGER, FMU, PAGE, REPORT):
+            check_output(folder / name, *inputs)
+
+
+def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]:
+    """Write the files of a calibration; each appears whole or not at all, the report last."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / FINGER, description_text(dict(calibration.data)))
+    build_fmu(folder / FINGER, folder / FMU)
+    write_text(folder / PAGE, calibration_page(calibration.report))
+    written = files_of(calibration.report)
+    report = {**calibration.report, "files": list(written)}
+    text = ",\n".join(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in report.items())
+    write_text(folder / REPORT, f"{{\n{text}\n}}\n")
+    return {folder / name: what for name, what in written.items()}
+
+
+def calibration_page(report: Mapping[str, Any]) -> str:
+    """Return the HTML text of the page."""
+    tone, sentence = verdict(report)
+    return render(
+        "calibration.html.jinja",
+        report=report,
+        tone=tone,
+        verdict=sentence,
+        headline_numbers=list(tiles(report)),
+        errors=error_rows(report),
+        causes=cause_rows(report),
+        torques=torque_rows(report),
+        torque_headings=list(TORQUE_HEADINGS),
+        sensors=sensor_sentence(report),
+        push=push_sentence(report) if report["pushes"] is not None else "",
+        sizes=size_rows(report),
+        recordings=recording_rows(report),
+        files=files_of(report),
+    )

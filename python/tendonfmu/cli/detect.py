@@ -37,7 +37,7 @@ def tune(
     from tendonfmu.estimate import check_outputs
     from tendonfmu.files import report_text, write_text
     from tendonfmu.interface import tune as tune_finger
-    from tendonfmu.report import tune_text, write_tune_figures
+    from tendonfmu.report import detect_text, write_tune_figures
 
     check_outputs(output, report, figures, [finger, *recordings])
     try:
@@ -55,7 +55,7 @@ def tune(
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)
-    print_tables(tune_text.tables(tuning), tune_text.lines(tuning), left="joint")
+    print_tables(detect_text.tune_tables(tuning), detect_text.tune_lines(tuning), left="joint")
     say(f"{output}: {options.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
         say_files(write_tune_figures(tuning, figures))
@@ -81,7 +81,7 @@ def score(
     from tendonfmu.files import report_text
     from tendonfmu.interface import ScoreWarning
     from tendonfmu.interface import score as score_finger
-    from tendonfmu.report import score_text
+    from tendonfmu.report import detect_text
 
     check_outputs(output, None, figures, [model, *recordings])
     with progress_bar("runs", progress) as show, warnings.catch_warnings():
@@ -92,7 +92,7 @@ def score(
     result.write(output)
     text = report_text(result.report)
     print_json(lambda: text)
-    print_tables(score_text.tables(result.scored), score_text.lines(result.scored), left="")
+    print_tables(detect_text.score_tables(result.scored), detect_text.score_lines(result.scored), left="")
     say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")
     if figures is not None:
         from tendonfmu.report import write_score_figures

@@ -29,7 +29,7 @@ def run_sheet(finger: IndexFinger) -> Sheet:
         title = f"{motion}, {finger.results[name].mean_force:.0f} N"
         alt = f"Joint {_spaced(FLEXION)}, {title}: measured torque, the FMU's prediction, and what is left"
         panels.append(_panel(finger.curves(name, FLEXION), _TORQUE | _LEFT, title, alt, "free", SHOWN))
-    return Sheet("run", "run", "", "", (*_TORQUE_KEYS, ("after", "what is left of it")), tuple(panels))
+    return Sheet("run", "run", "", (*_TORQUE_KEYS, ("after", "what is left of it")), panels)
 
 
 def push_sheet(finger: IndexFinger) -> Sheet:
@@ -59,7 +59,7 @@ def push_sheet(finger: IndexFinger) -> Sheet:
         ("standstill", "somebody pushes"),
         ("negative", "the FMU reports contact"),
     )
-    return Sheet("detect", "detect", "", "", keys, tuple(panels))
+    return Sheet("detect", "detect", "", keys, panels)
 
 
 def compensated_sheet(finger: IndexFinger) -> Sheet:
@@ -104,7 +104,7 @@ def compensated_sheet(finger: IndexFinger) -> Sheet:
         ("missed", "contact labelled"),
     )
     title = f"{finger.description.name}: friction compensation"
-    return Sheet("compensated", "compensated", title, "", keys, (*panels, contacts))
+    return Sheet("compensated", "compensated", title, keys, (*panels, contacts))
 
 
 def _panel(curves: Curves, styles: Mapping[str, str], title: str, alt: str, zoom: str, shown: Interval) -> Panel:
@@ -146,7 +146,7 @@ def calibration_sheet(report: Mapping[str, Any]) -> Sheet:
     errors = [1e3 * np.array([*report["error"][model], together(report["error"][model])]) for model in models]
     panel = _error_panel("On a recording that it has not seen", "mN·m", names, *errors)
     keys = (("floor", "no friction model"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
-    return Sheet("calibrate", "calibrate_error", "", "", keys, (panel,))
+    return Sheet("calibrate", "calibrate_error", "", keys, (panel,))
 
 
 def fit_sheets(picture: FitPicture) -> Iterator[Sheet]:
@@ -158,11 +158,11 @@ def fit_sheets(picture: FitPicture) -> Iterator[Sheet]:
         errors = [np.array(column([getattr(row, key) for row in rows])) for key in ("bias_only", "start", "fitted")]
         panels.append(_error_panel(title, table.unit, [row.name for row in rows], *errors))
     keys = (("floor", "no friction model"), ("before_dots", "before the fit"), ("after_dots", "fitted"))
-    yield Sheet("fit", "fit_error", "", "", keys, tuple(panels))
+    yield Sheet("fit", "fit_error", "", keys, panels)
     *_, unseen = torque_sheets(picture)
-    yield Sheet("fit", "fit_torque", "", "", unseen.keys, unseen.panels)
+    yield Sheet("fit", "fit_torque", "", unseen.keys, unseen.panels)
     joints = next(sheet for sheet in law_sheets(picture) if sheet.name == "laws_joints")
-    yield Sheet("fit", "fit_laws", "", "", joints.keys, joints.panels)
+    yield Sheet("fit", "fit_laws", "", joints.keys, joints.panels)
 
 
 def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, before: Numbers, after: Numbers) -> Panel:

@@ -15,9 +15,9 @@ from scipy.signal import lfilter
 
 from tendonfmu.arrays import Array, Data, Numbers, rounded
 from tendonfmu.detect.alarm_level import allowed_alarms, rate_limit
-from tendonfmu.detect.free_motion import NEVER, FreePart, runs_of
+from tendonfmu.detect.free_motion import FreePart, runs_of
 from tendonfmu.files import counted
-from tendonfmu.model import DEFAULTS, number_of
+from tendonfmu.model import DEFAULTS, NEVER, number_of
 
 SETTLE_TIME = DEFAULTS["contact.rest.settle_time"]  # s
 INNOVATION_TIME = 0.5  # s; a touch rises within this time, creep hardly changes

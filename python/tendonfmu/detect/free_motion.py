@@ -14,14 +14,13 @@ from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-from tendonfmu.model import Finger, native, number_of
+from tendonfmu.model import NEVER, Finger, native, number_of
 from tendonfmu.options import KinematicsSource
 from tendonfmu.recordings import Held, Recording, prepare
 
 Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
 
 SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
-NEVER = 1e9  # N·m, a threshold that is never exceeded
 BEYOND_NOISE = 6.0  # times the noise of a reference sensor: a larger mean over `SMOOTHED` is contact
 SMOOTHED = 0.05  # s
 STILL = 0.01  # least share of the time with motion; less says nothing about friction

@@ -14,7 +14,7 @@ from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
 from tendonfmu.recordings import LABEL
-from tendonfmu.statistics import Estimate, intervals
+from tendonfmu.statistics import Interval, intervals
 
 FORMAT = "tendonfmu-score-1"
 
@@ -137,15 +137,15 @@ def _point(point: RocPoint) -> dict[str, Any]:
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, Any]:
+def _estimate(estimate: Interval) -> dict[str, Any]:
     return {"value": estimate.value, "interval": _interval(estimate)}
 
 
-def _estimates(estimates: Sequence[Estimate] | None) -> list[dict[str, Any]] | None:
+def _estimates(estimates: Sequence[Interval] | None) -> list[dict[str, Any]] | None:
     return None if estimates is None else [_estimate(each) for each in estimates]
 
 
-def _interval(estimate: Estimate) -> list[float] | None:
+def _interval(estimate: Interval) -> list[float] | None:
     return None if math.isnan(estimate.low) or math.isnan(estimate.high) else [estimate.low, estimate.high]
 
 

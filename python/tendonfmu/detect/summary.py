@@ -10,7 +10,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import ContactSums, DetectionScore, Event, FreeBlocks
-from tendonfmu.statistics import Estimate, intervals
+from tendonfmu.statistics import Interval, intervals
 
 QUARTILES = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75, "ninety_percent": 0.9}
 FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.25 to 8, with 1, those of the description
@@ -20,10 +20,10 @@ FACTORS = tuple(2.0 ** (k / 4) for k in range(-8, 13))  # on the thresholds: 0.2
 class ContactError:
     """Errors of the compensated torque against the reference during events, by joint [n]; `rms` in N·m."""
 
-    rms: list[Estimate]
-    correlation: list[Estimate]
-    slope: list[Estimate]
-    within: list[Estimate] | None
+    rms: list[Interval]
+    correlation: list[Interval]
+    slope: list[Interval]
+    within: list[Interval] | None
 
 
 @dataclass(frozen=True)
@@ -36,22 +36,22 @@ class Summary:
     held: int  # number of found events whose alarm lasts to their end
     false_alarms: int  # number of false alarms, its interval, and their rate (1/min)
     free_minutes: float  # free time (min), and the share of it in alarm
-    found_share: Estimate  # shares of the events, and of the found events
-    held_share: Estimate
-    false_alarm_count: Estimate
-    false_alarms_per_minute: Estimate
-    delay: dict[str, Estimate]  # quantiles of the delay (s) by name of `QUARTILES`
-    force_at_alarm: Estimate | None  # median force at the alarm of the found events (N); None if unknown
+    found_share: Interval  # shares of the events, and of the found events
+    held_share: Interval
+    false_alarm_count: Interval
+    false_alarms_per_minute: Interval
+    delay: dict[str, Interval]  # quantiles of the delay (s) by name of `QUARTILES`
+    force_at_alarm: Interval | None  # median force at the alarm of the found events (N); None if unknown
     # [n] median magnitudes of the torques at the alarm (N·m); None if unknown
-    compensated_at_alarm: list[Estimate] | None
-    external_at_alarm: list[Estimate] | None
+    compensated_at_alarm: list[Interval] | None
+    external_at_alarm: list[Interval] | None
     # alarms that outlast their event: number of events, times in all and at most (s), and mean per event (s)
     overhang_events: int
     overhang_seconds: float
     longest_overhang: float
-    overhang: Estimate
-    free_alarm_share: Estimate
-    free_rms: list[Estimate]  # [n] rms of the residual in free time (N·m)
+    overhang: Interval
+    free_alarm_share: Interval
+    free_rms: list[Interval]  # [n] rms of the residual in free time (N·m)
     contact: ContactError | None  # errors of the estimated torque; None without a reference sensor or without an event
 
 
@@ -86,36 +86,36 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
     )
 
 
-def _force(events: Sequence[Event], seed: int) -> Estimate | None:
+def _force(events: Sequence[Event], seed: int) -> Interval | None:
     known = np.array([event.force for event in events if not math.isnan(event.force)], dtype=float)
     return intervals.quantile(known, 0.5, seed) if len(known) else None
 
 
-def _torques(values: Sequence[Numbers | None], seed: int) -> list[Estimate] | None:
+def _torques(values: Sequence[Numbers | None], seed: int) -> list[Interval] | None:
     """Compute the median magnitude of each joint."""
     known = [np.abs(value) for value in values if value is not None]
     return [intervals.quantile(column, 0.5, seed) for column in np.array(known).T] if known else None
 
 
-def _mean(values: Numbers, seed: int) -> Estimate:
+def _mean(values: Numbers, seed: int) -> Interval:
     """Compute a mean. If all values are 0, resampling sees nothing else, so there is no interval."""
     if not values.any():
-        return Estimate(0.0 if len(values) else math.nan)
+        return Interval(0.0 if len(values) else math.nan)
     return intervals.of_sums(np.column_stack([np.ones(len(values)), values]), _ratio, seed)[0]
 
 
-def _alarm_share(free: FreeBlocks, seed: int) -> Estimate:
+def _alarm_share(free: FreeBlocks, seed: int) -> Interval:
     """Compute the share of the free time in alarm."""
     if not free.seconds.sum():
-        return Estimate(math.nan)
+        return Interval(math.nan)
     if not free.alarm_seconds.any():
-        return Estimate(0.0, 0.0, intervals.share(0, len(free.seconds)).high)
+        return Interval(0.0, 0.0, intervals.share(0, len(free.seconds)).high)
     return intervals.of_sums(np.column_stack([free.seconds, free.alarm_seconds]), _ratio, seed)[0]
 
 
-def _free_rms(free: FreeBlocks, seed: int) -> list[Estimate]:
+def _free_rms(free: FreeBlocks, seed: int) -> list[Interval]:
     if not free.samples.sum():
-        return [Estimate(math.nan)] * free.squares.shape[1]
+        return [Interval(math.nan)] * free.squares.shape[1]
     return intervals.of_sums(np.column_stack([free.samples, free.squares]), _root_mean, seed)
 
 
@@ -132,8 +132,8 @@ def _contact_error(sums: ContactSums | None, seed: int) -> ContactError | None:
     if sums is None or not len(sums.samples):
         return None
     moments = np.hstack([sums.samples[:, None], sums.x, sums.y, sums.xx, sums.yy, sums.xy])
-    told = ~np.isnan(sums.within).any(axis=1)
-    within = np.column_stack([sums.samples, sums.within])[told]
+    known = ~np.isnan(sums.within).any(axis=1)
+    within = np.column_stack([sums.samples, sums.within])[known]
     return ContactError(
         rms=intervals.of_sums(np.column_stack([sums.samples, sums.errors]), _root_mean, seed),
         correlation=intervals.of_sums(moments, lambda drawn: _regression(drawn)[0], seed),
@@ -168,8 +168,8 @@ class RocPoint:
     found: int
     masked: int
     false_alarms: int  # number of false alarms, and their rate (1/h)
-    found_share: Estimate  # share of the events that is found
-    false_alarms_per_hour: Estimate
+    found_share: Interval  # share of the events that is found
+    false_alarms_per_hour: Interval
     free_alarm_share: float  # share of the free time in alarm
     median_delay: float  # median delay (s); NaN if none is found
 

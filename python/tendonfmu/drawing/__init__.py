@@ -3,7 +3,7 @@
 - `panel`: what a figure shows, with its colours and sizes
 - `figures`: makes it as a Plotly figure, which pages embed; `grid`: several in one, for notebooks
 - `png`: draws the Plotly figures of a sheet as a PNG file
-- `finger_picture`: draws what an FMU carries, with Pillow (`raster`)
+- `finger_picture`: draws what an FMU carries, with Pillow
 """
 
 from typing import TYPE_CHECKING

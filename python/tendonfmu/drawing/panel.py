@@ -237,9 +237,9 @@ class Sheet:
     section: str  # heading of the page under which the sheet is
     name: str  # stem of the PNG file
     title: str
-    caption: str  # what to see, in a sentence or two
-    keys: tuple[tuple[str, str], ...]  # (style, meaning) of what is drawn
-    panels: tuple[Panel, ...]
+    keys: Sequence[tuple[str, str]]  # (style, meaning) of what is drawn
+    panels: Sequence[Panel]
+    caption: str = ""  # what to see, in a sentence or two
     folded: bool = False  # shown on demand only
 
 

@@ -58,6 +58,11 @@ class Unknown:
     upper: float
     scale: float  # expected magnitude
 
+    @property
+    def name(self) -> str:
+        """Its path in the fit's own form: the last part says its role."""
+        return self.path if self.role == "value" else f"{self.path.rsplit('.', 1)[0]}.{self.role}"
+
 
 @dataclass(frozen=True)
 class BatchResult:

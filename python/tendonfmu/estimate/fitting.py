@@ -309,8 +309,8 @@ class FrictionFit(Configured):
         self._require_fitted()
         return FitPicture(
             report=self.report_,
-            start=self.start_.data,
-            fitted=self.description_.data,
+            start=self.start_,
+            fitted=self.description_,
             unknowns=self.unknowns_,
             z=self.z_,
             covariance=self.z_covariance_,

@@ -106,11 +106,7 @@ class Watch:
 
 def unknown_names(estimator: Estimator) -> list[str]:
     """Name the unknowns of an estimator."""
-    # returns [u]
-    return [
-        unknown.path if unknown.role == "value" else f"{unknown.path.rsplit('.', 1)[0]}.{unknown.role}"
-        for unknown in estimator.unknowns
-    ]
+    return [unknown.name for unknown in estimator.unknowns]  # [u]
 
 
 def _estimator(structure: Structure) -> Estimator:

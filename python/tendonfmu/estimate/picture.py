@@ -3,17 +3,10 @@
 There is one `FitSeries` per recording: those trained on (role "training"; held-out blocks of time have `used` False),
 and whole recordings that were held out or given to compare with (role "comparison", such as the motion at four times
 the pretension).
-
-Examples
---------
->>> picture = FitPicture(report, start=description.data, fitted=fitted_data, unknowns=estimator.unknowns, z=result.z,
-...                      covariance=result.covariance, series=[...])
->>> write_fit_page(picture, Path("figures"))  # report/fit_page.py: PNG files and report.html
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -21,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.estimation import Unknown
-from tendonfmu.model import Effect, Instance, Law
+from tendonfmu.model import Effect, Finger, Instance, Law
 
 Role = Literal["training", "comparison"]
 CONFIDENCE = 1.96  # standard errors: 95 %
@@ -55,22 +48,12 @@ class FitPicture:
     # "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
     # "rms" (the residual with the parameters of the start), it is shown
     report: Mapping[str, Any]
-    start: Data  # descriptions as parsed JSON
-    fitted: Data
+    start: Finger
+    fitted: Finger
     unknowns: Sequence[Unknown]  # [p] unknowns of the estimation
     z: Numbers  # [p] their estimate
     covariance: Numbers  # [p, p] of z, prior included
     series: Sequence[FitSeries]  # recordings, training first, in the order given
-
-    @property
-    def joint_names(self) -> list[str]:
-        """[n] names; `joint 2` where there is none."""
-        return [joint.get("name") or f"joint {j}" for j, joint in enumerate(self.fitted["joints"], start=1)]
-
-    @property
-    def tendon_names(self) -> list[str]:
-        """[m] names; `tendon 2` where there is none."""
-        return [tendon.get("name") or f"tendon {i}" for i, tendon in enumerate(self.fitted["tendons"], start=1)]
 
 
 # --- laws with their confidence bands ---------------------------------------------------------------------------------
@@ -123,7 +106,7 @@ class LawBands:
     """Curves of the laws of a fit, with their confidence bands."""
 
     def __init__(self, picture: FitPicture) -> None:
-        parameters = Instance.from_description(json.dumps(picture.fitted)).parameters()
+        parameters = Instance(picture.fitted.image).parameters()
         paths = [parameter.path for parameter in parameters]
         self._covariance = np.asarray(picture.covariance)
         self._column = {

@@ -22,7 +22,7 @@ from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
 from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.structure import Structure
-from tendonfmu.model import native
+from tendonfmu.model import NEVER, native
 from tendonfmu.statistics import error_directions
 
 LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions
@@ -33,7 +33,6 @@ _SAMPLES, _SIZE = 1000, 2_000_000  # most samples; most samples times joints tim
 _CHUNK = 500_000  # numbers of a Jacobian in memory
 _STEP = 0.01  # s between samples that are evaluated separately; no result depends on it
 _ROUNDING = 1e-9  # of a variance: keeps a covariance positive in spite of rounding errors
-_NEVER = 1e9  # N·m, a contact threshold that is never exceeded
 
 
 @dataclass(frozen=True)
@@ -187,5 +186,5 @@ def friction_parts(data: Data, arrays: Mapping[str, Numbers]) -> Numbers:
     """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m)."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints
-    asked = {**data, "contact": {"threshold": [_NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
+    asked = {**data, "contact": {"threshold": [NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
     return np.asarray(native.Instance.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files.counting import are, counted
+from tendonfmu.files.texts import are, counted
 from tendonfmu.files.writing import whole_file
 
 if TYPE_CHECKING:

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
         pack,
         package_file,
         render_documentation,
+        terminals_and_icons,
     )
     from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
     from .reference_results import bridged_rows, reference_run, related_members
     from .running import check_model, columns_of, finger_of, outputs_of, run_model, summary
-    from .terminals import terminals_and_icons
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

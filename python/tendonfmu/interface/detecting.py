@@ -13,11 +13,10 @@ import numpy as np
 
 from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
 from tendonfmu.files import counted, report_text, write_text
-from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.options import ScoreOptions, TuneOptions
 from tendonfmu.recordings import RecordingSource, flagged_stretches
-from tendonfmu.report import score_text, tune_text
+from tendonfmu.report import detect_text, html_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,7 +77,8 @@ class TuneResult:
         return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [SeriesRow("alarms (1/h)", counted)])
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], tune_text.tables(self.tuning), tune_text.lines(self.tuning), self.warnings)
+        tables, lines = detect_text.tune_tables(self.tuning), detect_text.tune_lines(self.tuning)
+        return html_of(repr(self)[1:-1], tables, lines, self.warnings)
 
 
 def tune(
@@ -218,7 +218,8 @@ class ScoreResult:
         return series_figure(f"{track.recording.path}", "time (s)", time, rows, shaded)
 
     def _repr_html_(self) -> str:
-        return html_of(repr(self)[1:-1], score_text.tables(self.scored), score_text.lines(self.scored), self.warnings)
+        tables, lines = detect_text.score_tables(self.scored), detect_text.score_lines(self.scored)
+        return html_of(repr(self)[1:-1], tables, lines, self.warnings)
 
 
 def score(

@@ -13,11 +13,10 @@ from tendonfmu.diagnosis import Cause, reported_causes
 from tendonfmu.diagnosis import Diagnosis as Found
 from tendonfmu.diagnosis import diagnose as find
 from tendonfmu.estimate import check_given_once
-from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource, finger_from_data
 from tendonfmu.options import DiagnoseOptions
 from tendonfmu.recordings import RecordingSource, listed_sources
-from tendonfmu.report import build_report, diagnosis_sheets, diagnosis_text, write_diagnosis
+from tendonfmu.report import build_report, diagnosis_sheets, diagnosis_text, html_of, write_diagnosis
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import PhaseState
 

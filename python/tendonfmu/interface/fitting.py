@@ -13,11 +13,10 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.fmu import SetParameter, write_parameter_set
-from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import Finger, FingerSource, native
 from tendonfmu.options import FitOptions
 from tendonfmu.recordings import RecordingSource
-from tendonfmu.report import fit_text
+from tendonfmu.report import fit_text, html_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from tendonfmu.files import frame_of, write_table
 from tendonfmu.fmu import columns_of, run_model
 from tendonfmu.fmu import summary as summary_of
-from tendonfmu.interface.notebook import html_of
 from tendonfmu.model import FingerSource, finger_file
 from tendonfmu.options import RunOptions
 from tendonfmu.recordings import Recording, RecordingSource, flagged_stretches, read_recording
+from tendonfmu.report import html_of
 
 if TYPE_CHECKING:
     import pandas as pd

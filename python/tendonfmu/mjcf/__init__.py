@@ -1,8 +1,8 @@
 """Models of MuJoCo (MJCF): a finger description made from one, and fitted numbers written back into one.
 
-Only `compiled_model` calls MuJoCo. `tendon_choice` and `geometry` read the compiled model, `left_out` lists what a
-description cannot hold, and `finger_import` puts all of it together. The way back: `number_export` decides what MJCF
-can express, `xml_source` changes the XML.
+Only `compiled_model` calls MuJoCo. `finger_parts` reads tendons, moment arms, links and their weight, and
+`finger_import` makes a description of them and lists what it cannot hold. The way back: `number_export` decides what
+MJCF can express, `xml_source` changes the XML.
 """
 
 from typing import TYPE_CHECKING

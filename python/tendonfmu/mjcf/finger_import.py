@@ -1,4 +1,4 @@
-"""A finger description made from joints and tendons of a MuJoCo model."""
+"""A finger description made from joints and tendons of a MuJoCo model, and what of the model it does not have."""
 
 from __future__ import annotations
 
@@ -14,24 +14,30 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
-from tendonfmu.mjcf.geometry import (
+from tendonfmu.mjcf.finger_parts import (
+    WEIGHTLESS,
     LinkGeometry,
     MomentArm,
+    choose_tendons,
+    drives_of,
     gravity_rows,
     holding_torques,
+    is_driven,
     link_geometry,
     moment_arms,
+    motors_of,
+    moved_velocities,
     sampled_angles,
+    stiffness_of,
 )
-from tendonfmu.mjcf.left_out import left_out
-from tendonfmu.mjcf.tendon_choice import choose_tendons, drives_of, motors_of, stiffness_of
 from tendonfmu.model import NativeError, native
 
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
 STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
 LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
-WEIGHTLESS = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
+MISSED = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
+OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a description"
 
 
 @dataclass(frozen=True)
@@ -302,7 +308,7 @@ def _weight(
     torques = holding_torques(model, joints, angles)
     rows, missed = gravity_rows(angles, torques, None if links is None else links.axes)
     largest = float(np.abs(torques).max())
-    if missed <= WEIGHTLESS * largest:
+    if missed <= MISSED * largest:
         return rows, []
     reason = "with --tip the axes' directions are taken into account" if links is None else "the axes are not parallel"
     return rows, [
@@ -315,3 +321,96 @@ def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
         native.image_from_json(json.dumps(data))
     except NativeError as refused:
         raise InputError(f"{model.path}: these joints and tendons do not make a valid finger: {refused}") from None
+
+
+# --- what a description does not have ---------------------------------------------------------------------------------
+
+
+def left_out(
+    model: CompiledModel,
+    joints: Sequence[Joint],
+    tendons: Sequence[Tendon],
+    angles: Numbers,
+    has_gravity: bool,
+    has_links: bool,
+) -> list[str]:
+    """List what an import leaves out."""
+    # angles: [K, n] (rad)
+    rows = [
+        *_of_joints(model, joints, angles),
+        *_of_tendons(model, joints, tendons, angles),
+        *_other_drives(model, joints, tendons),
+        *_constraints(model, joints, tendons),
+    ]
+    if not has_gravity:
+        rows += _weight_left_out(model, joints, angles)
+    if not has_links:
+        rows.append("links: the joints' places need a fingertip; --tip names a site, geom or body")
+    return [*rows, OF_EVERY_MODEL]
+
+
+def _of_joints(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Iterator[str]:
+    yield from _named("joint", [joint.name for joint in joints if joint.limits], "limits")
+    nonlinear = [joint.name for joint in joints if joint.is_nonlinear]
+    yield from _named("joint", nonlinear, "stiffness or damping of higher order")
+    model.place(joints, (angles.min(axis=0) + angles.max(axis=0)) / 2)
+    matrix = model.inertia(joints)
+    bare = [j for j, joint in enumerate(joints) if not joint.armature]
+    if bare:
+        sizes = ", ".join(f"{joints[j].name} {matrix[j, j]:.3g}" for j in bare)
+        yield f"inertia of links (kg·m²) at joints without armature: {sizes}"
+    aside = np.abs(matrix - np.diag(np.diag(matrix)))
+    if aside.max() > 0.0:
+        yield f"inertia that couples the joints, and forces of their speeds: up to {aside.max():.3g} kg·m²"
+
+
+def _of_tendons(
+    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], angles: Numbers
+) -> Iterator[str]:
+    moves = moved_velocities(model, joints, angles)
+    velocities = [joint.velocity for joint in joints]
+    yield from _named("tendon", [tendon.name for tendon in tendons if tendon.is_limited], "limits of the length")
+    for tendon in tendons:
+        if tendon.damping:
+            yield f"tendon {tendon.name}: damping {tendon.damping:g} N·s/m: no viscous friction without a tendon force"
+        if tendon.armature:
+            yield f"tendon {tendon.name}: armature {tendon.armature:g} kg"
+        if tendon.stiffness and any(actuator.tendon == tendon.index for actuator in model.actuators):
+            yield f"tendon {tendon.name}: spring of {tendon.stiffness:g} N/m beside its actuator"
+        motors = motors_of(model, tendon)
+        if tendon.frictionloss and motors:
+            yield f"tendon {tendon.name}: frictionloss {tendon.frictionloss:g} N of the spring between motor and finger"
+        for joint in model.joints:
+            if joint.velocity not in velocities and moves[tendon.index, joint.velocity] and joint not in motors:
+                yield f"tendon {tendon.name}: also moves joint {joint.name}, which is not in --joints"
+    for tendon in model.tendons:
+        if tendon not in tendons and moves[tendon.index, velocities].any():
+            why = "not in --tendons" if is_driven(model, tendon) else "without a drive; --tendons takes it"
+            yield f"tendon {tendon.name or tendon.index + 1}: {why}"
+
+
+def _other_drives(model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon]) -> Iterator[str]:
+    for actuator in model.actuators:
+        for joint in joints:
+            if actuator.joint == joint.index:
+                yield f"actuator {actuator.name}: drives joint {joint.name} without a tendon"
+
+
+def _constraints(model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon]) -> Iterator[str]:
+    of_finger = {"joint": {joint.index for joint in joints}, "tendon": {tendon.index for tendon in tendons}}
+    names = {"joint": [joint.name for joint in model.joints], "tendon": [tendon.name for tendon in model.tendons]}
+    for name, kind, ends in model.equalities():
+        if of_finger[kind] & set(ends):
+            yield f"constraint {name}: couples {kind} {' and '.join(names[kind][end] for end in ends)}"
+
+
+def _weight_left_out(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Iterator[str]:
+    largest = np.abs(holding_torques(model, joints, angles)).max(axis=0)
+    if largest.max() > WEIGHTLESS:
+        sizes = ", ".join(f"{joint.name} {1e3 * size:.3g}" for joint, size in zip(joints, largest, strict=True))
+        yield f"weight of the links, at most (mN·m): {sizes}; --gravity takes it"
+
+
+def _named(kind: str, names: Sequence[str], what: str) -> Iterator[str]:
+    if names:
+        yield f"{kind} {', '.join(names)}: {what}"

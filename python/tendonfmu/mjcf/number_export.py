@@ -13,7 +13,7 @@ from tendonfmu.errors import InputError, InternalError, own_fault
 from tendonfmu.files import counted, whole_file
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 from tendonfmu.mjcf.finger_import import links_inertia
-from tendonfmu.mjcf.tendon_choice import motors_of
+from tendonfmu.mjcf.finger_parts import motors_of
 from tendonfmu.mjcf.xml_source import XmlSource
 from tendonfmu.model import Law, effects, extension_rows, read_finger, sides
 

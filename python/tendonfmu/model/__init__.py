@@ -1,8 +1,8 @@
 """What a finger is: its description and the compiled model.
 
 `description` reads a finger description. `native` is the binding of the C runtime; every call of the model goes through
-it. Other modules hold the places of friction (`friction_places`), extensions, quasi-static balance, the geometry of the
-routing, and checks for implausible but valid descriptions (`plausibility`).
+it. Other modules hold the places of friction and quasi-static balance (`friction_places`), extensions, the geometry of
+the routing, and checks for implausible but valid descriptions (`plausibility`).
 """
 
 from typing import TYPE_CHECKING
@@ -11,7 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import native
-    from .balance import balanced_forces, friction_probe, moment_arms, pretension_vector
     from .description import (
         Finger,
         FingerSource,
@@ -34,11 +33,25 @@ if TYPE_CHECKING:
         extended_row,
         extension_numbers,
         extension_rows,
+        law_path,
         number_of,
+        part_of,
         place_of,
+        steps_of,
     )
-    from .description_path import law_path, steps_of
-    from .friction_places import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
+    from .friction_places import (
+        NEVER,
+        Effect,
+        balanced_forces,
+        effects,
+        friction_probe,
+        moment_arms,
+        pretension_vector,
+        sliding_velocity,
+        velocity_threshold,
+        without_detection,
+        working_point_weights,
+    )
     from .native import Instance, NativeError
     from .output_dependencies import (
         INPUTS_OF_SOURCE,

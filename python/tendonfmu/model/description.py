@@ -17,8 +17,7 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, write_text
 from tendonfmu.model import native
-from tendonfmu.model.description_numbers import extension_numbers, extension_rows
-from tendonfmu.model.description_path import with_values_at
+from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
 from tendonfmu.model.routing_geometry import finger_drawing, finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none

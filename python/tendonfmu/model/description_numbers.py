@@ -1,12 +1,20 @@
-"""Which numbers a finger description and its `extensions` have, and what is taken where it leaves them out."""
+"""Which numbers a finger description has, what is taken where it leaves them out, and their paths.
+
+A path, such as `tendons[1].edge_friction[2].coulomb`, is that of the parsed JSON and of the FMU's parameters. Indices
+count from 1.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
+
+from tendonfmu.errors import InputError
+from tendonfmu.model.native import Instance
 
 # Generated from the tables in runtime/description by `python tools/tables/generate.py`; SI units.
 _TABLE = json.loads((files("tendonfmu") / "schema" / "description_numbers.json").read_text(encoding="utf-8"))
@@ -87,3 +95,108 @@ def number_of(data: Mapping[str, Any], path: str) -> float:
     for key in path.split("."):
         node = (node or {}).get(key)
     return DEFAULTS[path] if node is None else float(node)
+
+
+# --- paths ------------------------------------------------------------------------------------------------------------
+
+
+Step = str | int  # a key, or an index from 0
+
+_PATH = re.compile(r"[a-z_]+(\[[1-9][0-9]*\])*(\.[a-z_]+(\[[1-9][0-9]*\])*)*")
+_LAW = re.compile(
+    r"(?P<effect>joints\[(?P<joint>\d+)\]\.(?P<own>friction|load_friction)"
+    r"|tendons\[(?P<tendon>\d+)\]\.(?P<along>edge_friction|pulley_friction)\[(?P<at>\d+)\])"
+    r"(?:\.laws\[(?P<point>\d+)\])?(?:\.(?P<side>positive|negative))?(?:\.(?P<number>[a-z_]+))?"
+)
+_PADDED = ("pulley_friction", "edge_friction")  # short lists stand for lists with null at the end
+
+
+@dataclass(frozen=True)
+class LawPath:
+    """The parts of the path of a friction law, or of a number in one; indices count from 1."""
+
+    effect: str  # path of the effect, such as `tendons[1].edge_friction[2]`
+    kind: str  # friction, load_friction, edge_friction or pulley_friction
+    joint: int
+    tendon: int | None
+    point: int | None  # which of its `laws`, by the angle
+    side: str | None  # positive or negative
+    number: str | None
+
+
+def steps_of(path: str) -> list[Step]:
+    """Split a path into keys and indices."""
+    return [int(index) - 1 if index else name for name, index in re.findall(r"([a-z_]+)|\[(\d+)\]", path)]
+
+
+def part_of(path: str) -> tuple[str, int, str] | None:
+    """Split the path of a number of a joint or tendon: `joints` or `tendons`, its number, and the rest of the path."""
+    found = re.match(r"(joints|tendons)\[(\d+)\]\.?", path)
+    return None if found is None else (found[1], int(found[2]), path[found.end() :])
+
+
+def law_path(path: str) -> LawPath | None:
+    """Split the path of a law or of a number in one; None if it is another path."""
+    found = _LAW.fullmatch(path)
+    if found is None:
+        return None
+    tendon, point = (None if found[name] is None else int(found[name]) for name in ("tendon", "point"))
+    joint = int(found["joint"] or found["at"])
+    return LawPath(
+        found["effect"], found["own"] or found["along"], joint, tendon, point, found["side"], found["number"]
+    )
+
+
+def with_values_at(data: dict[str, Any], values: Mapping[str, Any], instance: Instance) -> dict[str, Any]:
+    """Write values into a description, in place, and return it."""
+    for path, value in values.items():
+        if not isinstance(path, str) or not _PATH.fullmatch(path):
+            raise InputError(f"{path!r}: expected a path such as tendons[1].stiffness or contact.threshold[1]")
+        steps = steps_of(path)
+        place: Any = data
+        for k, step in enumerate(steps[:-1]):
+            place = _entered(place, steps, k, step, instance)
+        _check_step(place, steps, len(steps) - 1, instance.joints)
+        place[steps[-1]] = value
+    return data
+
+
+def _entered(place: Any, steps: Sequence[Step], k: int, step: Step, instance: Instance) -> Any:
+    """Return what is at a step. It is made if it is absent."""
+    _check_step(place, steps, k, instance.joints)
+    found = place.get(step) if isinstance(step, str) else place[step]
+    if found is None:
+        found = _assumed(_text(steps[: k + 1]), step, instance) if isinstance(steps[k + 1], int) else {}
+        place[step] = found
+    return found
+
+
+def _assumed(path: str, key: Step, instance: Instance) -> list[Any]:
+    """Return the list that the model assumes where the description has none."""
+    if key in _PADDED:
+        return [None] * instance.joints
+    known = {parameter.path for parameter in instance.parameters()}
+    found: list[Any] = []
+    while f"{path}[{len(found) + 1}]" in known:
+        found.append(instance.get(f"{path}[{len(found) + 1}]"))
+    return found
+
+
+def _check_step(place: Any, steps: Sequence[Step], k: int, joints: int) -> None:
+    """Raise InputError if a step does not lead from a place to another one."""
+    step, path = steps[k], _text(steps[: k + 1])
+    if isinstance(step, str):
+        if not isinstance(place, dict):
+            raise InputError(f"{path}: no such path; {_text(steps[:k])} has no keys")
+        return
+    if not isinstance(place, list):
+        raise InputError(f"{path}: no such path; {_text(steps[:k])} is no list")
+    if k and steps[k - 1] in _PADDED:
+        place += [None] * (joints - len(place))
+    if step >= len(place):
+        expected = f"1 to {len(place)}" if place else "no index, since the list is empty"
+        raise InputError(f"{path}: no such path; expected {expected}")
+
+
+def _text(steps: Sequence[Step]) -> str:
+    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")

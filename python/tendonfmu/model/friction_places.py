@@ -1,4 +1,8 @@
-"""Where a finger has friction: each effect with its place, the motion that drives it, and its numbers."""
+"""Where a finger has friction, and which tendon forces carry it.
+
+Each effect has its place, the motion that drives it, and its numbers. In quasi-static balance Rᵀ f0 = T (eq. 12): the
+forces are a pretension that balances itself, and what carries the friction of a motion.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,15 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.model.balance import moment_arms
+from tendonfmu.errors import InputError
+from tendonfmu.model import native
 from tendonfmu.model.description import Law
 from tendonfmu.model.description_numbers import number_of
+
+LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
+_SWEEPS = 20000
+_ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
+NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
 @dataclass(frozen=True)
@@ -78,3 +88,68 @@ def working_point_weights(effect: Effect, joint_position: Numbers) -> Numbers:
     angle = joint_position[:, effect.joint - 2] if effect.joint > 1 else np.zeros(len(joint_position))
     unit = np.eye(len(effect.angles))
     return np.column_stack([np.interp(angle, effect.angles, row) for row in unit])
+
+
+# --- forces in balance ------------------------------------------------------------------------------------------------
+
+
+def moment_arms(data: Mapping[str, Any]) -> Numbers:
+    """Return the routing matrix R of a description."""
+    # returns [m, n] (m)
+    return np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
+
+
+def pretension_vector(data: Mapping[str, Any]) -> Numbers:
+    """Return the tendon forces per newton of pretension."""
+    # returns [m]
+    arms = moment_arms(data)
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
+    shares = project @ np.ones(len(arms))
+    least = np.where(pulls, LEAST_SHARE, -np.inf)
+    correction = np.zeros(len(arms))
+    for _ in range(_SWEEPS):
+        if np.all(shares >= least * (1 - 1e-9)):
+            break
+        allowed = np.maximum(shares + correction, least)
+        correction += shares - allowed
+        shares = project @ allowed
+    else:
+        raise InputError(
+            "tendons: no balanced pretension; expected moment arms with a solution of "
+            "Rᵀ f = 0 in which every tendon pulls"
+        )
+    mean = float(np.mean(shares))
+    return shares / mean if mean > 1e-9 else np.zeros(len(arms))
+
+
+def without_detection(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
+    """Return a description without contact detection, whose bias keeps some settings and is moved only by jumps."""
+    bias: dict[str, Any] = {"drift_variance": 0.0, "initial_variance": 0.0}
+    bias["initial_torque"] = [0.0] * len(data["joints"])
+    given = data.get("bias") or {}
+    bias |= {key: given[key] for key in kept if given.get(key) is not None}
+    return {**data, "bias": bias, "contact": {"threshold": [NEVER] * len(data["joints"])}, "sensor_fault": None}
+
+
+def friction_probe(data: Mapping[str, Any]) -> native.Instance:
+    """Make a finger that computes the friction model only."""
+    probe = without_detection(data, "noise_std", "noise_std_per_force", "forget_rate", "noise_time")
+    return native.Instance.from_description(probe, 3)
+
+
+def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
+    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0)."""
+    # T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is
+    # unknown.
+    # motion: [N] (s); pretension: [N] (N); returns tendon forces [N, m] (N)
+    finger = friction_probe(data)
+    start = finger.save_state()
+    spread = np.linalg.pinv(moment_arms(data))
+    internal = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
+    forces = internal
+    for _ in range(_ITERATIONS):
+        finger.restore_state(start)
+        outputs = finger.run({**motion, "tendon_force": forces})
+        forces = internal + (outputs["friction_torque"] - outputs["bias_torque"]) @ spread
+    return np.asarray(forces)

@@ -6,7 +6,6 @@ detection, over the samples that it may learn from.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.model import native, number_of
+from tendonfmu.model import native, number_of, without_detection
 
 LAGS = 20  # of the Ljung-Box test; even, so that the chi-square tail is a finite sum
 CONFIDENCE = 0.95
 _BLOCK, _SMALL = 64, 1e-30
-_NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ def model_alone(
 ) -> Model:
     """Run a finger without its bias filter over the parts of a recording."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
-    probe = native.Instance(native.image_from_json(json.dumps(_without_filter(data))), kinematics_source=source)
+    probe = native.Instance.from_description(without_detection(data, "forget_rate", "entry_load"), source)
     start = probe.save_state()
     torque, jump, angle, speed = (np.full((samples, joints), np.nan) for _ in range(4))
     slack = np.zeros((samples, tendons), dtype=bool)
@@ -63,14 +61,6 @@ def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torqu
         return 0.0
     arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
     return np.asarray(torque - arrays["tendon_force"] @ arms)
-
-
-def _without_filter(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description with a bias that only jumps move, and without contact detection."""
-    bias = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
-    still = {**bias, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * len(data["joints"])}
-    never = {"threshold": [_NEVER] * len(data["joints"])}
-    return {**data, "bias": still, "contact": never, "sensor_fault": None}
 
 
 # --- the bias filter --------------------------------------------------------------------------------------------------

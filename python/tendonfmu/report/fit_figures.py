@@ -17,6 +17,7 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.drawing import DIVERGING, Band, Curve, Dots, Heat, Interval, Panel, Sheet, pooled
 from tendonfmu.estimate import FitPicture, FitSeries, identifiability
 from tendonfmu.files import are, counted
+from tendonfmu.model import part_of
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
 from tendonfmu.report.numbers import rms, torque_unit
@@ -36,7 +37,6 @@ _KINDS = {
     "edge_friction": "edge",
 }
 _ORDER = ("static", "coulomb", "stribeck_velocity", "viscous")
-_PLACE = re.compile(r"(joints|tendons)\[(\d+)\]")
 _FEWEST = 8  # samples in a bin; emptier bins are left out
 _TORQUE_KEYS = (
     ("measured", "measured joint torque"),
@@ -82,7 +82,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
         begin, end = float(series.time[shown][0]), float(series.time[shown][-1])
         if number == 1:
             first = begin - float(series.time[0])
-        joints, name = picture.joint_names, f"torque_{number}"
+        joints, name = picture.fitted.joint_names, f"torque_{number}"
         scale = unit_of([series])
         panels = [_torque_panel(series, shown, j, joint, scale, name) for j, joint in enumerate(joints)]
         yield Sheet(
@@ -171,7 +171,9 @@ def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str
     scale = unit_of(series)
     zoom = f"residual_{number}"
     panels = [
-        panel for j, name in enumerate(picture.joint_names) for panel in _residual_panels(series, j, name, scale, zoom)
+        panel
+        for j, name in enumerate(picture.fitted.joint_names)
+        for panel in _residual_panels(series, j, name, scale, zoom)
     ]
     held_out = any(one.held_out is not None for one in series)
     return Sheet(
@@ -353,17 +355,12 @@ def correlation(covariance: Numbers) -> Numbers:
     return np.asarray(np.clip(covariance * scale[:, None] * scale[None, :], -1.0, 1.0))
 
 
-def unknown_name(path: str, role: str) -> str:
-    """Return the path of an unknown in the fit's own form: the last part says its role."""
-    return path if role == "value" else f"{path.rsplit('.', 1)[0]}.{role}"
-
-
 def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
     """Return the pairs of unknowns whose errors are most strongly correlated, strongest first."""
     values = correlation(picture.covariance)
     rows, columns = np.triu_indices(len(values), 1)
     best = np.argsort(-np.abs(values[rows, columns]), kind="stable")[:count]
-    names = [unknown_name(unknown.path, unknown.role) for unknown in picture.unknowns]
+    names = [unknown.name for unknown in picture.unknowns]
     return [Pair(names[a], names[b], float(values[a, b])) for a, b in zip(rows[best], columns[best], strict=True)]
 
 
@@ -376,7 +373,7 @@ def correlation_sheet(picture: FitPicture) -> Sheet:
     above = int(np.count_nonzero(np.abs(np.triu(matrix, 1)) > 0.9))
     shown, (every, _) = pooled(np.round(100 * matrix).astype(np.int8), (_MOST_CELLS, _MOST_CELLS))
     more = f" and {every - 1} more" if every > 1 else ""
-    names = [unknown_name(picture.unknowns[k].path, picture.unknowns[k].role) + more for k in order[::every]]
+    names = [picture.unknowns[k].name + more for k in order[::every]]
     ticks = tuple((((begin + end - 1) / 2 + 0.5) / every - 0.5, name) for name, begin, end in groups)
     panel = Panel(
         title="Correlation of the estimates",
@@ -425,12 +422,12 @@ def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[s
 
 def _place(path: str) -> tuple[int, int]:
     """Return a sort key: joints before tendons before the rest, then the number of the joint or tendon."""
-    place = _PLACE.match(path)
-    return (2, 0) if place is None else ((0 if place[1] == "joints" else 1), int(place[2]))
+    place = part_of(path)
+    return (2, 0) if place is None else (("joints", "tendons").index(place[0]), place[1])
 
 
 def _place_name(picture: FitPicture, place: tuple[int, int]) -> str:
     kind, number = place
     if kind == 2:
         return "others"
-    return (picture.joint_names if kind == 0 else picture.tendon_names)[number - 1]
+    return (picture.fitted.joint_names if kind == 0 else picture.fitted.tendon_names)[number - 1]

@@ -26,13 +26,13 @@ _LAW_KEYS = (
 def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
     """Show the friction laws of a fit."""
     desk = _Desk(picture)
-    pairs = list(zip(effects(picture.start), effects(picture.fitted), strict=True))
+    pairs = list(zip(effects(picture.start.data), effects(picture.fitted.data), strict=True))
     drawn = pairs[:LAWS_DRAWN]
     more = len(pairs) - len(drawn)
     hidden = f" {counted(more, 'further law')} of the finger {are(more)} not drawn." if more else ""
     for tendon in sorted({fitted.tendon for _, fitted in drawn}):
         here = [(start, fitted) for start, fitted in drawn if fitted.tendon == tendon]
-        name = picture.tendon_names[tendon - 1] if tendon else ""
+        name = picture.fitted.tendon_names[tendon - 1] if tendon else ""
         yield Sheet(
             section="laws",
             name=f"laws_tendon_{tendon}" if tendon else "laws_joints",
@@ -67,7 +67,7 @@ def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str]
         first += [("slow", "at v_min"), ("slow_limit", "its 95 %")]
     if any(asymmetric(effect) for effect in points):
         first += [("negative", "negative direction")]
-    still = any(not effect.angles and velocity_threshold(picture.fitted, effect) for effect in drawn)
+    still = any(not effect.angles and velocity_threshold(picture.fitted.data, effect) for effect in drawn)
     rest = [("standstill", "below v_min: no friction acts, the bias takes its part")] if still else []
     return (*first, *_LAW_KEYS, *rest)
 
@@ -76,10 +76,10 @@ class _Motion:
     """Angles and velocities that the training visits, thinned."""
 
     def __init__(self, picture: FitPicture) -> None:
-        self._data = picture.fitted
+        self._data = picture.fitted.data
         training = [series for series in picture.series if series.role == "training"]
         every = max(1, sum(len(series.time) for series in training) // _LOOKED_AT)
-        none = np.empty((0, len(picture.fitted["joints"])))
+        none = np.empty((0, len(picture.fitted.data["joints"])))
         angle = np.concatenate([none, *(series.joint_angle[series.used][::every] for series in training)])
         speed = np.concatenate([none, *(series.joint_speed[series.used][::every] for series in training)])
         known = np.isfinite(angle).all(axis=1) & np.isfinite(speed).all(axis=1)
@@ -103,7 +103,7 @@ class _Desk:
         return self._over_angle(start, fitted) if fitted.angles else self._over_speed(start, fitted)
 
     def _title(self, effect: Effect) -> str:
-        joint = self._picture.joint_names[effect.joint - 1]
+        joint = self._picture.fitted.joint_names[effect.joint - 1]
         if effect.tendon == 0:
             return joint if effect.kind == "friction" else f"{joint}, load"
         return f"{'pulley' if effect.kind == 'pulley_friction' else 'edge'} {effect.joint} ({joint})"
@@ -116,7 +116,7 @@ class _Desk:
 
     def _over_speed(self, start: Effect, fitted: Effect) -> Panel:
         """Show both directions as in fig. 2b: 0 below v_min."""
-        threshold = velocity_threshold(self._picture.fitted, fitted)
+        threshold = velocity_threshold(self._picture.fitted.data, fitted)
         sliding, _ = self._motion.sliding(fitted)
         slowest = max(threshold, 1e-6)
         fastest = max(4.0 * slowest, float(np.quantile(np.abs(sliding), 0.995)) if sliding.size else 0.0)
@@ -151,7 +151,7 @@ class _Desk:
 
     def _over_angle(self, start: Effect, fitted: Effect) -> Panel:
         """Show a law at two speeds, or both directions at one speed where they differ."""
-        threshold = velocity_threshold(self._picture.fitted, fitted)
+        threshold = velocity_threshold(self._picture.fitted.data, fitted)
         sliding, visited = self._motion.sliding(fitted)
         median = float(np.median(np.abs(sliding))) if sliding.size else 4.0 * threshold
         margin = 0.04 * (fitted.angles[-1] - fitted.angles[0]) or 0.1
@@ -169,7 +169,7 @@ class _Desk:
             else:
                 bands.append(Band(f"{style}_confidence", angle, factor * curve.low, factor * curve.high))
             curves.append(Curve(style, angle, factor * curve.fitted))
-        before = self._picture.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
+        before = self._picture.fitted.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
         lowest, highest = factor * laws[-1].fitted.min(), factor * laws[-1].fitted.max()
         return Panel(
             title=self._title(fitted),

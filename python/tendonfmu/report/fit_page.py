@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from tendonfmu.estimate import FitPicture, verdicts
 from tendonfmu.files import write_text
+from tendonfmu.model import part_of
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
 from tendonfmu.report.fit_text import (
     ResidualTable,
@@ -25,7 +25,6 @@ from tendonfmu.report.page import Drawn, Tile, drawn, render, write_figures
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
-_GROUP = re.compile(r"(joints|tendons)\[(\d+)\]\.?(.*)")
 
 Entry = Mapping[str, Any]
 
@@ -48,7 +47,7 @@ def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:
         state=state_of(report),
         tiles_shown=_tiles(report, tables),
         sentences=list(summary_sentences(picture, tables)),
-        joint_names=picture.joint_names,
+        joint_names=picture.fitted.joint_names,
         residuals=[_residuals(table) for table in page_tables(picture)],
         consistency=list(consistency(picture)),
         uncertainty=list(_uncertainty(picture)),
@@ -101,7 +100,7 @@ def _uncertainty(picture: FitPicture) -> Iterator[Row]:
     uncertainty = picture.report.get("uncertainty")
     if not uncertainty:
         return
-    for j, joint in enumerate(picture.joint_names):
+    for j, joint in enumerate(picture.fitted.joint_names):
         row = [joint, _number(uncertainty["inflation"][j]), str(uncertainty["directions"][j])]
         row.append(f"{rounded(100 * uncertainty['captured'][j], 2)} %")
         for name in ("train", "held_out", "loaded"):
@@ -130,13 +129,12 @@ def _groups(picture: FitPicture) -> Iterator[dict[str, Any]]:
     """List all numbers by joint and tendon: (number, start, fitted, standard error, unit, identified)."""
     groups: dict[str, list[tuple[str, Entry]]] = {}
     for entry in picture.report["parameters"]:
-        match = _GROUP.fullmatch(entry["path"])
-        if match is None:
-            groups.setdefault("Others", []).append((entry["path"], entry))
-            continue
-        names = picture.joint_names if match[1] == "joints" else picture.tendon_names
-        number = int(match[2])
-        groups.setdefault(f"{match[1][:-1].capitalize()} {number}: {names[number - 1]}", []).append((match[3], entry))
+        name, path = "Others", entry["path"]
+        if place := part_of(path):
+            part, number, path = place
+            names = picture.fitted.joint_names if part == "joints" else picture.fitted.tendon_names
+            name = f"{part[:-1].capitalize()} {number}: {names[number - 1]}"
+        groups.setdefault(name, []).append((path, entry))
     for name, numbers in groups.items():
         yield {
             "name": name,

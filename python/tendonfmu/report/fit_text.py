@@ -62,7 +62,7 @@ def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
     sets += [(f"{_COMPARED}{run['label']}", run) for run in residual.get("comparisons") or []]
     for title, data in sets:
         if data and data.get("rms"):
-            yield _residual_table(title, data, picture.joint_names)
+            yield _residual_table(title, data, picture.fitted.joint_names)
 
 
 def _residual_table(title: str, data: Report, joints: Sequence[str]) -> ResidualTable:
@@ -79,12 +79,12 @@ def _residual_table(title: str, data: Report, joints: Sequence[str]) -> Residual
 def page_tables(picture: FitPicture) -> list[ResidualTable]:
     """List the residuals as the page shows them: those of a finger with one joint are joined, a row per set of data."""
     tables = list(residual_tables(picture))
-    if len(picture.joint_names) > 1:
+    if len(picture.fitted.joint_names) > 1:
         return tables
     by_unit: dict[str, list[ResidualRow]] = {}
     for table in tables:
         by_unit.setdefault(table.unit, []).append(replace(table.all, name=table.title))
-    return [ResidualTable(picture.joint_names[0], unit, rows, rows[0]) for unit, rows in by_unit.items()]
+    return [ResidualTable(picture.fitted.joint_names[0], unit, rows, rows[0]) for unit, rows in by_unit.items()]
 
 
 # --- sentences of the page --------------------------------------------------------------------------------------------
@@ -121,7 +121,9 @@ def _what(picture: FitPicture) -> Iterator[str]:
     used, held = (sum(recording[key] for recording in recordings) for key in ("used", "held_out"))
     one = len(recordings) == 1
     source = f"one recording of {seconds:.4g} s" if one else f"{len(recordings)} recordings of {seconds:.4g} s together"
-    finger = f"{counted(len(picture.joint_names), 'joint')}, {counted(len(picture.tendon_names), 'tendon')}"
+    finger = (
+        f"{counted(len(picture.fitted.joint_names), 'joint')}, {counted(len(picture.fitted.tendon_names), 'tendon')}"
+    )
     sentence = (
         f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
         f"from {source}: {_thousands(used)} samples"
@@ -191,7 +193,7 @@ def consistency(picture: FitPicture) -> Iterator[str]:
         )
     strong = [
         f"{name} {value:.2f}"
-        for name, value in zip(picture.joint_names, lag_one, strict=True)
+        for name, value in zip(picture.fitted.joint_names, lag_one, strict=True)
         if value is not None and abs(value) > 0.1
     ]
     if strong:

@@ -148,7 +148,6 @@ def _sheet(history: History, names: Names) -> Sheet:
         section="history",
         name="history",
         title=f"{history.finger}: {headline(history).rstrip('.')}",
-        caption="",
         keys=(
             ("after_dots", "named by the diagnosis of that recording"),
             ("before_dots", "not named"),

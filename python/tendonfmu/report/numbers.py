@@ -1,9 +1,10 @@
-"""Numbers as tables and sentences show them, and what several of them give together."""
+"""Numbers as tables and sentences show them, what several of them give together, and tables as HTML."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -98,3 +99,23 @@ def with_ends(estimates: Iterable[Any], factor: float = 1.0) -> tuple[Numbers, N
 def column(values: Sequence[float | None]) -> list[float]:
     """Return numbers with NaN where one is unknown."""
     return [math.nan if value is None else float(value) for value in values]
+
+
+def html_of(title: str, tables: Iterable[Table], lines: Iterable[str], warnings: Iterable[str] = ()) -> str:
+    """Return tables and sentences as an HTML element, as a notebook shows them."""
+    parts = [f"<p><b>{escape(title)}</b></p>"]
+    for caption, headings, rows in tables:
+        parts += [
+            "<table>",
+            f'<caption style="text-align: left">{escape(caption)}</caption>',
+            _html_row("th", headings),
+        ]
+        parts += [*(_html_row("td", row) for row in rows), "</table>"]
+    parts += [f"<p>{escape(line)}</p>" for line in lines if line]
+    remarks = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)
+    parts += [f"<p>Warnings:</p><ul>{remarks}</ul>"] if remarks else []
+    return f'<div style="font-size: 13px">{"".join(parts)}</div>'
+
+
+def _html_row(cell: str, texts: Row) -> str:
+    return "<tr>" + "".join(f"<{cell}>{escape(text)}</{cell}>" for text in texts) + "</tr>"

@@ -1,4 +1,4 @@
-"""The page of a run, `tendonfmu run --report`: torques by joint, contact and slack, motion, numbers."""
+"""What a run gives: its numbers (`tendonfmu run --json`), and its page (`--report`): torques, contact, motion."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet, line_of
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
+from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import Row, rms, torque_unit
 from tendonfmu.report.page import Tile, drawn, render
 
 Table = Mapping[str, NDArray[Any]]
 
+FORMAT = "tendonfmu-run-1"
 PAGE = "run.html"
 ZOOM = "time"  # all panels are zoomed together
 _TIME = "time (s)"
@@ -128,18 +130,16 @@ def run_sheets(
             section="joints",
             name=f"joint_{j}",
             title=name,
-            caption="",
-            keys=tuple(_keys_of(table, j)),
-            panels=tuple(_torque_panels(table, j, name, factor, unit)),
+            keys=list(_keys_of(table, j)),
+            panels=list(_torque_panels(table, j, name, factor, unit)),
         )
     yield _events_sheet(table, joints, tendons, label)
     yield Sheet(
         section="motion",
         name="motion",
         title="Joint angles and speeds",
-        caption="",
         keys=(("fitted", "angle"), ("slow", "speed")),
-        panels=tuple(_motion_panels(table, joints)),
+        panels=list(_motion_panels(table, joints)),
         folded=True,
     )
 
@@ -238,3 +238,57 @@ def _motion_panels(table: Table, joints: Sequence[str]) -> Iterator[Panel]:
                 curves=(Curve(style, time, np.asarray(table[f"joint_{key}[{j}]"], dtype=np.float64)),),
                 zoom=ZOOM,
             )
+
+
+# --- the numbers ------------------------------------------------------------------------------------------------------
+
+
+def run_report(
+    model: Path, recording: Path, table: Table, finger: Finger | None, *, kinematics: int, output: str
+) -> dict[str, Any]:
+    """Return the results of a run in numbers."""
+    # table: [N]
+    time = table["time"]
+    joints, tendons = _count(table, "joint_torque"), _count(table, "slack")
+    joint_names = [f"joint {j}" for j in range(1, joints + 1)] if finger is None else finger.joint_names
+    tendon_names = [f"tendon {i}" for i in range(1, tendons + 1)] if finger is None else finger.tendon_names
+    return {
+        "format": FORMAT,
+        "model": str(model),
+        "finger": None if finger is None else finger.name,
+        "recording": str(recording),
+        "kinematics": kinematics,
+        "output": output,
+        "samples": len(time),
+        "duration": float(time[-1] - time[0]),
+        "contact": {
+            "samples": int(table["contact"].sum()),
+            "share": _share(table["contact"]),
+            "intervals": flagged_stretches(time, table["contact"]),
+        },
+        "joints": [_joint(table, j, name) for j, name in enumerate(joint_names, start=1)],
+        "tendons": [
+            {"name": name, "slack_share": _share(table[f"slack[{i}]"])} for i, name in enumerate(tendon_names, start=1)
+        ],
+    }
+
+
+def _joint(table: Table, j: int, name: str) -> dict[str, Any]:
+    torques = {key: table[f"{key}_torque[{j}]"] for key in ("joint", "friction", "compensated")}
+    angle, free = table[f"joint_angle[{j}]"], ~np.asarray(table["contact"], dtype=bool)
+    return {
+        "name": name,
+        "angle": [float(angle.min()), float(angle.max())],
+        **{f"{key}_torque_rms": rms(values) for key, values in torques.items()},
+        **{f"free_{key}_torque_rms": rms(values[free]) if free.any() else None for key, values in torques.items()},
+        "largest_compensated_torque": float(np.abs(torques["compensated"]).max()),
+        "contact_share": _share(table[f"joint_contact[{j}]"]),
+    }
+
+
+def _count(table: Table, name: str) -> int:
+    return sum(column.startswith(f"{name}[") for column in table)
+
+
+def _share(flags: NDArray[Any]) -> float:
+    return float(np.mean(np.asarray(flags, dtype=np.float64)))

@@ -52,10 +52,6 @@ def score_sheets(scored: Scored) -> Iterator[Sheet]:
         yield delay_sheet(scored)
 
 
-def _sheet(name: str, title: str, keys: Sequence[tuple[str, str]], panels: Sequence[Panel]) -> Sheet:
-    return Sheet("score", name, title, "", tuple(keys), tuple(panels))
-
-
 # --- over time --------------------------------------------------------------------------------------------------------
 
 
@@ -116,7 +112,7 @@ def contact_sheet(scored: Scored) -> Sheet:
     keys = [(f"joint_{k}", names[j]) for k, j in enumerate(joints, start=1)]
     keys += [("sensor", "reference sensor")] if sensor else []
     keys += [(style, meaning) for style, meaning, _ in bars]
-    return _sheet("contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", keys, panels)
+    return Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", keys, panels)
 
 
 def _detection(
@@ -223,7 +219,7 @@ def event_sheet(scored: Scored) -> Sheet:
         note=f"white: 0, dark blue: {float(np.nanquantile(torque, 0.99)):.3g} mN·m and more",
     )
     keys = (("first_alarm", "first alarm"), ("onset", "onset, and end of the event"))
-    return _sheet("events", f"{scored.subject.finger.name}: {counted(count, 'event')}", keys, [panel])
+    return Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", keys, [panel])
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -297,7 +293,7 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
         ("share", "missed: in alarm before"),
     )
     title = f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time"
-    return _sheet("roc", title, keys, [against, over])
+    return Sheet("score", "roc", title, keys, [against, over])
 
 
 def _named(points: Sequence[RocPoint]) -> list[int]:
@@ -363,7 +359,7 @@ def delay_sheet(scored: Scored) -> Sheet:
         ("ninety", f"90 % within {1e3 * ninety:.0f} ms"),
     )
     title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
-    return _sheet("delays", title, keys, [shared, histogram])
+    return Sheet("score", "delays", title, keys, [shared, histogram])
 
 
 def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:

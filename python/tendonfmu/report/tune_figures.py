@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +31,6 @@ def write_tune_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
     """Write the figures of a tuning as PNG files."""
     sheets = drawn([tail_sheet(tuning), bound_sheet(tuning), worst_sheet(tuning)])
     return {file: _WORDS[file.stem] for file in write_figures(sheets, folder)}
-
-
-def _sheet(name: str, title: str, keys: Sequence[tuple[str, str]], panels: Sequence[Panel]) -> Sheet:
-    return Sheet("tune", name, title, "", tuple(keys), tuple(panels))
 
 
 def tail_sheet(tuning: ContactTuning) -> Sheet:
@@ -79,7 +74,7 @@ def tail_sheet(tuning: ContactTuning) -> Sheet:
         ("dark_dots", f"chosen level: at most {limit:.3g} per hour ({100 * tuning.confidence:g} %)"),
     )
     title = f"{tuning.description_.name}: {60 * tuning.hours_:.0f} min of free motion, {tuning.method}"
-    return _sheet("tail", title, keys, [panel])
+    return Sheet("tune", "tail", title, keys, [panel])
 
 
 def _main(tuning: ContactTuning) -> str:
@@ -126,7 +121,7 @@ def bound_sheet(tuning: ContactTuning) -> Sheet:
         ("dark_dots", "rms of the residual"),
         *others,
     )
-    return _sheet("bounds", f"{tuning.description_.name}: bounds, {tuning.method}", keys, panels)
+    return Sheet("tune", "bounds", f"{tuning.description_.name}: bounds, {tuning.method}", keys, panels)
 
 
 def worst_sheet(tuning: ContactTuning) -> Sheet:
@@ -144,7 +139,7 @@ def worst_sheet(tuning: ContactTuning) -> Sheet:
         if len(panels) == WORST:
             break
     keys = (("negative", name), ("threshold", "threshold alone"), ("bound", "bound with H and J"))
-    return _sheet("worst", f"{tuning.description_.name}: nearest to an alarm", keys, panels)
+    return Sheet("tune", "worst", f"{tuning.description_.name}: nearest to an alarm", keys, panels)
 
 
 def _moment(tuning: ContactTuning, name: str, run: FreeRun, at: float) -> Panel:

@@ -11,8 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .fmu_packaging import build_plant_fmu
     from .plant import INTEGRATORS, require_plant
-    from .rig import description_files, is_rig, read_rig
-    from .rig_summary import describe_rig
+    from .rig import describe_rig, description_files, is_rig, read_rig
     from .simulation import simulate
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

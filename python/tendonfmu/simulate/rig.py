@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu.arrays import Data
 from tendonfmu.errors import InputError
-from tendonfmu.files import Node, Refusal, read_json
-from tendonfmu.model import Finger, native, read_finger
-from tendonfmu.simulate.motion_plan import Joints, Motion, expand_motion
-from tendonfmu.simulate.pushes import Segment, expand_pushes
+from tendonfmu.files import Node, Refusal, counted, read_json
+from tendonfmu.model import Finger, count, native, read_finger
+from tendonfmu.simulate.motion_plan import Joints, Motion, Segment, expand_motion, expand_pushes
+from tendonfmu.simulate.plant import Plant, refused_by
 from tendonfmu.statistics import LARGEST_SEED
 
 FORMAT = "tendonfmu-rig-1"
@@ -43,39 +44,17 @@ PATHS = (("finger",), ("motion", "file"))  # keys that hold a path, relative to 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig that has been read and expanded, but not yet checked by the plant (see `Plant`).
+    """A rig that has been read and expanded, but not yet checked by the plant (see `Plant`)."""
 
-    Attributes
-    ----------
-    path
-        The file that it was read from.
-    files
-        All files that it was made from, its own first.
-    data
-        Its keys, merged with those of its bases.
-    finger
-        Its finger description.
-    motion
-        Its motion with knots.
-    expanded
-        The rig as the plant takes it.
-    rate
-        Samples per second.
-    duration
-        Duration of the recording (s), or None.
-    columns
-        Columns that the recording has in addition to the tendons' columns.
-    """
-
-    path: Path
-    files: list[Path]
-    data: Mapping[str, Any]
+    path: Path  # the file that it was read from
+    files: list[Path]  # all files that it was made from, its own first
+    data: Mapping[str, Any]  # its keys, merged with those of its bases
     finger: Finger
-    motion: Motion
-    expanded: Mapping[str, Any]
-    rate: float
-    duration: float | None
-    columns: list[str]
+    motion: Motion  # with knots
+    expanded: Mapping[str, Any]  # the rig as the plant takes it
+    rate: float  # samples per second
+    duration: float | None  # of the recording (s)
+    columns: list[str]  # columns that the recording has in addition to the tendons' columns
 
     @property
     def name(self) -> str:
@@ -98,28 +77,11 @@ class Rig:
         return len(self.finger.tendon_names)
 
     def json(self) -> str:
-        """Return the expanded rig as the plant reads it.
-
-        Returns
-        -------
-        str
-            JSON. The same rig gives the same text.
-        """
+        """Return the expanded rig as the plant reads it, as JSON: the same text for the same rig."""
         return json.dumps(self.expanded, allow_nan=False)
 
     def times(self) -> NDArray[np.float64]:
-        """Return the times of the recording's samples.
-
-        Returns
-        -------
-        ndarray
-            [N] (s): 0, 1/rate, ... below the duration.
-
-        Raises
-        ------
-        InputError
-            The rig has no recording.
-        """
+        """Return [N] (s) the times of the recording's samples: 0, 1/rate, ... below the duration."""
         if self.duration is None:
             raise InputError(f"{self.path}: recording: missing; expected an object with duration, s")
         samples = _sample_count(self.duration, self.rate)
@@ -321,3 +283,106 @@ def _recording(recording: Node, rate: float) -> tuple[float | None, list[str]]:
 def _sample_count(duration: float, rate: float) -> int:
     """Count the samples 0, 1/rate, ... below the duration, independent of rounding of the product."""
     return max(1, math.ceil(duration * rate - 1e-6))
+
+
+# --- what a rig has, in lines of text for `tendonfmu check` -----------------------------------------------------------
+
+
+def plant_of(rig: Rig) -> Plant:
+    """Return the plant of a rig. Raise InputError with the rig's file and the key path."""
+    with refused_by(rig.path):
+        return Plant(rig.json())
+
+
+def describe_rig(path: Path) -> list[str]:
+    """Read a rig, let the plant check it, and describe it."""
+    rig = read_rig(path)
+    return _lines(rig, plant_of(rig))
+
+
+def _lines(rig: Rig, plant: Plant) -> list[str]:
+    physics: Data = rig.expanded["physics"]
+    finger = count(rig.finger)
+    masses = [float(link["mass"]) for link in physics["links"]]
+    contacts = finger.pulleys + finger.edges + finger.laws["friction"] + finger.laws["load_friction"]
+    counts = {"pulley": finger.pulleys, "edge": finger.edges, "joint": finger.laws["friction"]}
+    kinds = ", ".join(counted(number, kind) for kind, number in counts.items())
+    settings = plant.settings
+    accuracy = (
+        f"relative tolerance {settings.relative_tolerance:g}"
+        if settings.integrator == "cvode"
+        else f"step {1e3 * settings.step:g} ms"
+    )
+    lines = {
+        "joints": f"{rig.joints}: {', '.join(rig.finger.joint_names)}",
+        "tendons": f"{rig.tendons}: {', '.join(rig.finger.tendon_names)}",
+        "masses": f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} g, together {1e3 * sum(masses):g} g",
+        "contacts": f"{contacts}: {kinds}, {finger.laws['load_friction']} of load; {plant.order} continuous states",
+        "effects": "; ".join(effects(physics)) or "none beyond the base model",
+        "motion": f"{rig.motion.says}; {_pretension(rig)}",
+        "pushes": str(len(rig.expanded["pushes"])),
+        "sensors": "; ".join(_sensors(rig)),
+        "integration": f"{settings.integrator}, {accuracy}",
+        "recording": _recording_words(rig),
+    }
+    head = f"{rig.name}, version {rig.version}: a valid rig of {finger.name}, seed {rig.expanded['seed']}"
+    return [head, *(f"{key:<18} {text}" for key, text in lines.items())]
+
+
+def effects(physics: Data) -> Iterator[str]:
+    """Name the effects of the physics that are switched on: those of docs/reference/rig.md beyond the base model."""
+    links, tendons = physics["links"], physics.get("tendons") or []
+    friction: Data = physics.get("friction") or {}
+    if physics.get("gravity") is None or any(physics["gravity"]):
+        yield "gravity"
+    if any(link.get("limits") for link in links):
+        yield "joint limits"
+    yield from _named(
+        {
+            "hardening covers": any(link.get("cover_hardening") for link in links),
+            "joint damping": any(link.get("damping") for link in links),
+            "joint coupling": any(physics.get("joint_coupling") or []),
+            "progressive springs": any(tendon.get("hardening") for tendon in tendons),
+            "tendon damping": any(tendon.get("damping") for tendon in tendons),
+            "moment arms off the description": any(
+                tendon.get("moment_arm_scale") not in (None, 1) for tendon in tendons
+            ),
+            "moment arms that vary": any(
+                any(tendon.get(key) or []) for tendon in tendons for key in ("moment_arm_slope", "eccentricity")
+            ),
+            "bristle damping": friction.get("bristle_damping"),
+            "friction beside the load": friction.get("preload"),
+            "asymmetric friction": friction.get("asymmetry"),
+            "capstan tension loss": friction.get("tension_loss") == "capstan",
+            "edges by angle of diversion": friction.get("edges"),
+            "friction drift": (friction.get("drift") or {}).get("amplitude"),
+            "friction by heat": (friction.get("heat") or {}).get("coefficient"),
+            "wrist": physics.get("wrist"),
+            "obstacle": physics.get("obstacle"),
+        }
+    )
+
+
+def _named(switches: Mapping[str, Any]) -> Iterator[str]:
+    yield from (name for name, on in switches.items() if on)
+
+
+def _pretension(rig: Rig) -> str:
+    values = rig.motion.pretension["value"]
+    low, high = min(values), max(values)
+    return f"pretension {low:g} N" if low == high else f"pretension {low:g} to {high:g} N"
+
+
+def _sensors(rig: Rig) -> Iterator[str]:
+    sensors: Data = rig.expanded.get("sensors") or {}
+    yield f"{rig.rate:g} Hz"
+    for name, sensor in sensors.items():
+        if name != "rate" and sensor:
+            yield f"{name} with {', '.join(sensor)}"
+
+
+def _recording_words(rig: Rig) -> str:
+    if rig.duration is None:
+        return "none"
+    beside = f" and {', '.join(rig.columns)}" if rig.columns else ""
+    return f"{rig.duration:g} s: tendon_force, tendon_position{beside}"

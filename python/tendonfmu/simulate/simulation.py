@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array
 from tendonfmu.files import counted
-from tendonfmu.simulate.plant import MEASURED, TRUE, Plant, Statistics, refused_by, require_plant
-from tendonfmu.simulate.rig import Rig
+from tendonfmu.simulate.plant import MEASURED, TRUE, Statistics, refused_by, require_plant
+from tendonfmu.simulate.rig import Rig, plant_of
 
 Table = dict[str, NDArray[np.float64]]
 
@@ -60,12 +60,6 @@ class Simulation:
             "steps": int(self.work.steps),
             **{name: str(file) for name, file in written.items()},
         }
-
-
-def plant_of(rig: Rig) -> Plant:
-    """Return the plant of a rig. Raise InputError with the rig's file and the key path."""
-    with refused_by(rig.path):
-        return Plant(rig.json())
 
 
 def simulate(

@@ -21,8 +21,7 @@ from tendonfmu.fmu import NOT_IN_XML, members, pack
 from tendonfmu.model import INPUTS
 from tendonfmu.simulate.fmu_packaging import DURATION, STEP, plant_members
 from tendonfmu.simulate.plant import refused_by
-from tendonfmu.simulate.rig import Rig, read_rig
-from tendonfmu.simulate.simulation import plant_of
+from tendonfmu.simulate.rig import Rig, plant_of, read_rig
 
 PLANT, FRICTION = "plant", "friction"
 PLANT_FMU, FRICTION_FMU = "TendonFinger.fmu", "friction.fmu"

@@ -1,8 +1,8 @@
 """How certain results are: statistics without any knowledge of fingers.
 
 Series are averaged over blocks, and parts are held out (`blocks`). Splines remove a slow bias (`splines`). Columns are
-judged by their Gram matrices (`block_grams`), noise is whitened (`whitening`), and counts and measurements get an
-interval (`intervals`, `paired_gain`, `effective_number`).
+judged by their Gram matrices (`block_grams`), noise is whitened and correlated samples are counted (`whitening`), and
+counts and measurements get an interval (`intervals`, `paired_gain`).
 """
 
 from typing import TYPE_CHECKING
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
         make_folds,
         regular_blocks,
     )
-    from .effective_number import effective_samples, sample_weights
-    from .intervals import Estimate, Interval
+    from .intervals import Interval
     from .paired_gain import BlockIndex, blocks_of, gain_interval
     from .random_numbers import LARGEST_SEED, Draws
     from .spectral_line import Line, find_lines
     from .splines import KNOTS, TRENDS, Span, Splines, basis, bias_splines, constant_bias, residual_of, without
-    from .whitening import Whitener, whitener
+    from .whitening import Whitener, effective_samples, sample_weights, whitener
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -25,62 +25,53 @@ _MOST = 500  # blocks; more are joined with their neighbours, so that memory sta
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval."""
-
-    value: float  # the value
-    low: float  # ends of the interval
-    high: float
-
-
-@dataclass(frozen=True)
-class Estimate:
     """A value and the 95 % interval of the true value."""
 
-    value: float  # the value
+    value: float
     low: float = math.nan  # ends of the interval; NaN if unknown
     high: float = math.nan
 
 
-def share(count: int, of: int) -> Estimate:
+def share(count: int, of: int) -> Interval:
     """Return a share with the exact binomial interval (Clopper and Pearson 1934)."""
     if not of:
-        return Estimate(math.nan)
+        return Interval(math.nan)
     low = float(betaincinv(count, of - count + 1, _TAIL)) if count else 0.0
     high = float(betaincinv(count + 1, of - count, 1 - _TAIL)) if count < of else 1.0
-    return Estimate(count / of, low, high)
+    return Interval(count / of, low, high)
 
 
-def rate(count: int, exposure: float) -> Estimate:
+def rate(count: int, exposure: float) -> Interval:
     """Return a rate with the exact Poisson interval (Garwood 1936)."""
     if not exposure > 0:
-        return Estimate(math.nan)
+        return Interval(math.nan)
     low = float(gammaincinv(count, _TAIL)) if count else 0.0
     high = float(gammaincinv(count + 1, 1 - _TAIL))
-    return Estimate(count / exposure, low / exposure, high / exposure)
+    return Interval(count / exposure, low / exposure, high / exposure)
 
 
-def quantile(values: Numbers, probability: float, seed: int) -> Estimate:
+def quantile(values: Numbers, probability: float, seed: int) -> Interval:
     """Return a quantile, with an interval from resampled events (percentiles)."""
     # values: [k]
     if not len(values):
-        return Estimate(math.nan)
+        return Interval(math.nan)
     value = float(np.quantile(values, probability))
     if len(values) < FEWEST:
-        return Estimate(value)
+        return Interval(value)
     drawn = np.random.default_rng(seed).integers(0, len(values), (RESAMPLES, len(values)))
-    return Estimate(value, *_percentiles(np.quantile(values[drawn], probability, axis=1)))
+    return Interval(value, *_percentiles(np.quantile(values[drawn], probability, axis=1)))
 
 
-def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Estimate]:
+def of_sums(sums: Numbers, statistic: Statistic, seed: int) -> list[Interval]:
     """Return a statistic of sums over events or blocks, with intervals from resampling these (percentiles)."""
     # sums: [b, k]; statistic: [r, k]; returns [n]. Without intervals for fewer than `FEWEST` events or blocks
     values = statistic(sums.sum(axis=0, keepdims=True))[0]
     if len(sums) < FEWEST:
-        return [Estimate(float(value)) for value in values]
+        return [Interval(float(value)) for value in values]
     units = _joined(sums)
     draws = np.random.default_rng(seed).multinomial(len(units), np.full(len(units), 1 / len(units)), RESAMPLES)
     drawn = statistic(draws @ units)
-    return [Estimate(float(value), *_percentiles(drawn[:, j])) for j, value in enumerate(values)]
+    return [Interval(float(value), *_percentiles(drawn[:, j])) for j, value in enumerate(values)]
 
 
 def _joined(sums: Numbers) -> Numbers:

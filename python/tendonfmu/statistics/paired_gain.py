@@ -65,10 +65,10 @@ def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
     # before, after: [B]
     total_before, total_after = float(before.sum()), float(after.sum())
     if total_before <= 0:
-        return Interval(0.0, math.nan, math.nan)
+        return Interval(0.0)
     value = 1 - math.sqrt(total_after / total_before)
     if total_after <= 0 or len(before) < FEWEST:
-        return Interval(value, math.nan, math.nan)
+        return Interval(value)
     pairs = _independent(np.column_stack([before, after]))
     low, high = _log_ratio_ends(pairs, seed)
     return Interval(value, 1 - math.exp(high), 1 - math.exp(low))

@@ -1,13 +1,14 @@
-"""How correlated noise is whitened: by an autoregressive model for each joint.
+"""How correlated noise is whitened, and how many independent samples it is worth.
 
-The model looks back over windows that grow with their distance (heterogeneous autoregression: Corsi, 2009). So a few
-numbers describe both the short memory of coloured noise and the long memory of a bias that changes faster than its
-splines. Schwarz's criterion chooses the number of windows. Filtering target and columns alike turns least squares into
-generalised least squares (Cochrane and Orcutt, 1949).
+Noise is whitened by an autoregressive model for each joint. The model looks back over windows that grow with their
+distance (heterogeneous autoregression: Corsi, 2009). So a few numbers describe both the short memory of coloured noise
+and the long memory of a bias that changes faster than its splines. Schwarz's criterion chooses the number of windows.
+Filtering target and columns alike turns least squares into generalised least squares (Cochrane and Orcutt, 1949).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ from tendonfmu.statistics.blocks import BlockSeries
 # the mean of these blocks, first to last before the present one, is a regressor
 WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), (65, 128))
 _ROOM = 20  # rows for each coefficient, at least
+CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
+FEWEST = 20  # pairs of a lag; lags with fewer are not used
 
 
 @dataclass(frozen=True)
@@ -110,3 +113,49 @@ def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
         if score < best:
             best, chosen = score, fit
     return np.asarray(chosen)
+
+
+# --- how many independent samples -------------------------------------------------------------------------------------
+#
+# A likelihood that counts each sample as new is correct for white residuals. Model errors last for many samples, so N
+# of them are worth N/τ independent ones. τ = 1 + 2 Σ ρ_k is their integrated autocorrelation time (Sokal 1997,
+# sect. 2). The sum ends before the first ρ_k that chance explains: white residuals have τ = 1 exactly, and noise at far
+# lags adds nothing.
+
+
+def correlation_time(values: Numbers) -> float:
+    """Return τ of a series in samples, at least 1."""
+    known = ~np.isnan(values)
+    count = int(known.sum())
+    filled = np.where(known, values, 0.0)
+    power = float(filled @ filled)
+    if count < FEWEST or power == 0.0:
+        return 1.0
+    pairs = np.round(_autocovariance(known.astype(np.float64)))
+    reach = int(np.argmax(pairs < FEWEST)) or len(pairs)
+    correlations = _autocovariance(filled)[1:reach] / pairs[1:reach] / (power / count)
+    ended = correlations <= CHANCE / np.sqrt(pairs[1:reach])
+    last = int(np.argmax(ended)) if ended.any() else len(correlations)
+    return min(1.0 + 2.0 * float(correlations[:last].sum()), float(count))
+
+
+def _autocovariance(values: Numbers) -> Numbers:
+    """Return Σ values_i·values_(i+k) for k = 0 .. N − 1 [N]."""
+    size = 1 << (2 * len(values) - 1).bit_length()
+    spectrum = np.fft.rfft(values, size)
+    return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(values)])
+
+
+def sample_weights(standardised: Numbers) -> Numbers:
+    """Return the share of an independent sample that each sample of a stretch counts for."""
+    # standardised: [N, n]; returns 1/τ of each joint [n]
+    return np.array([1.0 / correlation_time(column) for column in standardised.T])
+
+
+def effective_samples(standardised: Sequence[Numbers], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
+    """Count samples, and the independent samples that they are worth."""
+    # standardised: [N, n]; weights: [N, n]; returns samples of each joint [n], independent samples of each joint [n]
+    used = [~np.isnan(residuals) for residuals in standardised]
+    count = sum(flags.sum(axis=0) for flags in used)
+    worth = sum((flags * weight).sum(axis=0) for flags, weight in zip(used, weights, strict=True))
+    return np.asarray(count, dtype=np.float64), np.asarray(worth, dtype=np.float64)

@@ -1,7 +1,7 @@
 """How long computations show progress, end, resume and run in parallel.
 
-`phases` shows how far a computation is, `interruption` ends it at Ctrl-C and SIGTERM, `steps` keeps the results of each
-step in a folder, and `jobs` calls a function for many inputs, here or on the workers of a cluster.
+`phases` shows how far a computation is and ends it at Ctrl-C and SIGTERM, `steps` keeps the results of each step in a
+folder, and `jobs` calls a function for many inputs, here or on the workers of a cluster.
 """
 
 from typing import TYPE_CHECKING
@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .interruption import ended_by_signals, uninterrupted
     from .jobs import Job, rows_of, run_jobs, workers_of
-    from .phases import Phases, PhaseState, Step
+    from .phases import Phases, PhaseState, Step, ended_by_signals, uninterrupted
     from .steps import FOLDER, Steps, digest_of, digest_of_file, forget_steps
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

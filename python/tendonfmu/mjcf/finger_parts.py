@@ -1,16 +1,17 @@
-"""What MuJoCo computes at many angles, as numbers of a description: moment arms, links and their weight.
+"""What a finger takes of a MuJoCo model: its tendons and what drives them, moment arms, links and their weight.
 
-A pull shortens its tendon, so the moment arm is minus the change of the tendon's length with the joint angle:
-r_ij(q) = −∂L_i/∂q_j.
+MuJoCo computes them at many angles. A pull shortens its tendon, so the moment arm is minus the change of the tendon's
+length with the joint angle: r_ij(q) = −∂L_i/∂q_j.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from tendonfmu.arrays import Numbers
@@ -23,6 +24,7 @@ NO_ARM = 1e-6  # m; shorter arms are none
 NEGLIGIBLE = 0.01  # of the largest arm at the joint; a smaller constant is what the samples happen to average to
 WORTH = 0.8  # the line must leave no more than this share of the deviation from a constant
 WEIGHTLESS = 1e-9  # N·m
+RIGID = 1e9  # N/m; as of a machine with one joint, whose drive counts as rigid
 
 # --- moment arms ------------------------------------------------------------------------------------------------------
 
@@ -159,3 +161,85 @@ def gravity_rows(angles: Numbers, torques: Numbers, axes: Numbers | None) -> tup
         if felt:
             rows.append({"effect": "gravity", "joint": j + 1, **felt})
     return rows, missed
+
+
+# --- tendons ----------------------------------------------------------------------------------------------------------
+
+
+def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> NDArray[np.bool_]:
+    """Return which velocities of the model each tendon moves."""
+    # angles: [K, n] (rad); returns [tendons, velocities]
+    largest = np.zeros((len(model.tendons), 0))
+    for placed in angles[:: max(1, len(angles) // 32)]:
+        model.place(joints, placed)
+        size = np.abs(model.tendon_jacobian())
+        largest = np.maximum(largest, size) if largest.size else size
+    return np.array(largest >= NO_ARM, dtype=np.bool_)
+
+
+def choose_tendons(
+    model: CompiledModel, joints: Sequence[Joint], angles: Numbers, names: Sequence[str] | None
+) -> list[Tendon]:
+    """Return the tendons of a finger."""
+    # angles: [K, n] (rad)
+    velocities = [joint.velocity for joint in joints]
+    moves = np.array(moved_velocities(model, joints, angles)[:, velocities].any(axis=1), ndmin=1)
+    if names is None:
+        chosen = [tendon for tendon in model.tendons if moves[tendon.index] and is_driven(model, tendon)]
+        if chosen:
+            return chosen
+        others = ", ".join(tendon.name for tendon in model.tendons if moves[tendon.index]) or "none"
+        raise InputError(
+            f"{model.path}: no tendon with an actuator or a motor on a slide moves the joints "
+            f"{', '.join(joint.name for joint in joints)}; expected --tendons with some of: {others}"
+        )
+    chosen = [model.tendon_named(name) for name in names]
+    for tendon in chosen:
+        if list(names).count(tendon.name) > 1:
+            raise InputError(f"{model.path}: tendon {tendon.name}: given twice; expected once")
+        if not moves[tendon.index]:
+            raise InputError(
+                f"{model.path}: tendon {tendon.name}: moves none of the joints "
+                f"{', '.join(joint.name for joint in joints)}; expected one that does, or to leave it out"
+            )
+    return chosen
+
+
+def motors_of(model: CompiledModel, tendon: Tendon) -> list[Joint]:
+    """Return the slides with an actuator that pull a tendon."""
+    model.place([], np.empty(0))
+    row = np.abs(model.tendon_jacobian()[tendon.index])
+    driven = {actuator.joint for actuator in model.actuators}
+    return [
+        joint
+        for joint in model.joints
+        if joint.kind == "slide" and joint.index in driven and row[joint.velocity] >= NO_ARM
+    ]
+
+
+def is_driven(model: CompiledModel, tendon: Tendon) -> bool:
+    """Return whether an actuator acts on a tendon, or on a slide that pulls it."""
+    return any(actuator.tendon == tendon.index for actuator in model.actuators) or bool(motors_of(model, tendon))
+
+
+def stiffness_of(model: CompiledModel, tendon: Tendon, otherwise: float | None) -> tuple[float, str]:
+    """Return the stiffness of a tendon between its drive and the finger."""
+    # otherwise: (N/m); returns (N/m)
+    actuators = [actuator for actuator in model.actuators if actuator.tendon == tendon.index]
+    gains = [actuator.position_gain for actuator in actuators if actuator.position_gain]
+    if gains:
+        return sum(gains), f"{sum(gains):g} N/m, the gain of its position servo"
+    if tendon.stiffness and not actuators:
+        return tendon.stiffness, f"{tendon.stiffness:g} N/m, its own"
+    if otherwise is not None:
+        return otherwise, f"{otherwise:g} N/m, as given"
+    return RIGID, f"not in the model, taken as rigid ({RIGID:g} N/m); --stiffness sets another"
+
+
+def drives_of(model: CompiledModel, tendon: Tendon) -> Iterator[str]:
+    """Yield what to record of each drive of a tendon."""
+    for actuator in model.actuators:
+        if actuator.tendon == tendon.index:
+            yield f"tendon_force is {-actuator.gear:g} times the force of actuator {actuator.name}"
+    for joint in motors_of(model, tendon):
+        yield f"tendon_position is the motor's, joint {joint.name}"

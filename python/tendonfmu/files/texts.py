@@ -1,0 +1,42 @@
+"""Texts: a number with its noun and verb, for messages, and templates of HTML, each compiled once in a process."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Write a number with its noun."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+def are(number: int) -> str:
+    """Return the verb for a number of things: "is" for one, else "are"."""
+    return "is" if number == 1 else "are"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent with two digits, near 100 without decimals."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
+def html_template(name: str) -> jinja2.Template:
+    """Return a template of python/tendonfmu/templates. It escapes all texts, and refuses a variable it is not given."""
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("tendonfmu"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

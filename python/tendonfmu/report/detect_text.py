@@ -1,0 +1,188 @@
+"""How a tuning and a score read in the terminal and in a notebook: tables, and lines that `cli/detect.py` prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tendonfmu.detect import ContactTuning, Scored, Summary, rate_limit
+from tendonfmu.files import are, counted
+from tendonfmu.report.numbers import Row, Table
+from tendonfmu.statistics import Interval
+
+SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are printed
+
+
+# --- score ------------------------------------------------------------------------------------------------------------
+
+
+def score_tables(scored: Scored) -> Iterator[Table]:
+    """List the tables to print: torque by joint, with 95 % intervals in brackets."""
+    summary = scored.summary
+    headings = ["joint", "free residual\nrms, mN·m"]
+    columns = [[_estimate(value, 1e3) for value in summary.free_rms]]
+    if summary.contact is not None:
+        headings += ["in contact: error\nrms, mN·m", "correlation", "slope"]
+        columns += [
+            [_estimate(value, 1e3) for value in summary.contact.rms],
+            [_estimate(value) for value in summary.contact.correlation],
+            [_estimate(value) for value in summary.contact.slope],
+        ]
+        if summary.contact.within is not None:
+            headings.append("within\n2 std, %")
+            columns.append([_estimate(value, 100.0) for value in summary.contact.within])
+    if summary.external_at_alarm is not None:
+        headings.append("at the alarm: median\n|external|, mN·m")
+        columns.append([_estimate(value, 1e3) for value in summary.external_at_alarm])
+    names = scored.subject.finger.joint_names
+    yield (
+        f"{scored.subject.finger.name}: torque, with 95 % intervals",
+        tuple(headings),
+        list(zip(names, *columns, strict=True)),
+    )
+
+
+def score_lines(scored: Scored) -> Iterator[str]:
+    """List the lines to print: false alarms, events, delays, other thresholds."""
+    summary = scored.summary
+    if summary.events:
+        yield from _event_lines(summary)
+    yield (
+        f"false alarms: {summary.false_alarms} in {summary.free_minutes:.3g} min of free time, "
+        f"{_estimate(summary.false_alarms_per_minute)} per minute; "
+        f"in alarm {_estimate(summary.free_alarm_share, 100.0)} % of it"
+    )
+    shown = [point for point in scored.roc or [] if any(math.isclose(point.factor, factor) for factor in SHOWN)]
+    if shown and summary.free_minutes:
+        factors = ", ".join(f"{point.factor:g}" for point in shown)
+        some = ", ".join(f"{point.found}" for point in shown)
+        per_hour = ", ".join(_rate(point.false_alarms_per_hour.value) for point in shown)
+        hit = f"{some} of {summary.events} found, " if summary.events else ""
+        yield f"thresholds × {factors}: {hit}{per_hour} false alarms per hour"
+    if scored.no_roc:
+        yield f"no ROC: {scored.no_roc}"
+
+
+def _event_lines(summary: Summary) -> Iterator[str]:
+    missed = summary.events - summary.found
+    why = f", {summary.masked} of them in an alarm from before" if summary.masked else ""
+    share = _estimate(summary.found_share, 100.0)
+    yield f"events: {summary.found} of {summary.events} found, {share} %; {missed} missed{why}"
+    if not summary.found:
+        return
+    delay = summary.delay
+    yield (
+        f"delay: median {_estimate(delay['median'], 1e3)} ms, quartiles {_number(delay['lower_quartile'].value, 1e3)} "
+        f"and {_number(delay['upper_quartile'].value, 1e3)}, 90 % within {_number(delay['ninety_percent'].value, 1e3)}"
+    )
+    force = summary.force_at_alarm
+    felt = "" if force is None else f"; force at the alarm: median {_estimate(force)} N"
+    yield (
+        f"held to their end: {summary.held} of {summary.found}; "
+        f"alarms that outlast an event: {summary.overhang_events}, "
+        f"{summary.overhang_seconds:.3g} s, the longest {summary.longest_overhang:.3g} s{felt}"
+    )
+
+
+def _estimate(estimate: Interval, factor: float = 1.0) -> str:
+    """Format an estimate with its interval, such as `12 (8.1 to 19)`."""
+    value = _number(estimate.value, factor)
+    if math.isnan(estimate.low) or math.isnan(estimate.high):
+        return value
+    return f"{value} ({_number(estimate.low, factor)} to {_number(estimate.high, factor)})"
+
+
+def _number(value: float, factor: float) -> str:
+    """Format with three digits, and at most two decimals where that is enough."""
+    scaled = factor * value
+    if math.isnan(scaled):
+        return "-"
+    if abs(scaled) >= 99.95:
+        return f"{scaled:.0f}"
+    return f"{scaled:.1f}" if abs(scaled) >= 9.995 else f"{scaled:.2f}"
+
+
+def _rate(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+# --- tune -------------------------------------------------------------------------------------------------------------
+
+
+def tune_tables(tuning: ContactTuning) -> Iterator[Table]:
+    """List the tables to print: bounds by joint, then results by pretension."""
+    yield _bounds(tuning)
+    yield _pretensions(tuning)
+
+
+def _bounds(tuning: ContactTuning) -> Table:
+    headings, columns = ["joint"], []
+    for name, bound in reversed(tuning.bounds_.items()):
+        headings += [f"{name}\nmN·m", "+ per N\nmN·m/N"]
+        columns += [bound.base, bound.per_force]
+    headings += ["deviation\nmN·m", "+ per N\nmN·m/N"]
+    columns += [tuning.deviation_.base, tuning.deviation_.per_force]
+    main = list(tuning.bounds_.values())[-1]
+    also = f" + {main.stuck_share:g} of what sticks + {main.jump_share:g} of what jumped" if main.stuck_share else ""
+    if main.jump_share and not main.stuck_share:
+        also = f" + {main.jump_share:g} of what jumped"
+    rows = [
+        (joint, *(f"{1e3 * column[j]:.3g}" for column in columns))
+        for j, joint in enumerate(tuning.description_.joint_names)
+    ]
+    return f"{tuning.description_.name}: {tuning.method}, bounds{also}", tuple(headings), rows
+
+
+def _pretensions(tuning: ContactTuning) -> Table:
+    headings: Row = ("mean force, N", "minutes", "residual rms\nmN·m", "false alarms", "at most,\nper hour", "(r/std)²")
+    rows: list[Row] = [
+        (
+            f"{pretension.force:.3g}",
+            f"{60 * pretension.hours:.1f}",
+            ", ".join(f"{1e3 * value:.2g}" for value in pretension.rms),
+            str(pretension.alarms),
+            f"{pretension.limit:.3g}",
+            ", ".join(f"{value:.2g}" for value in square),
+        )
+        for pretension, square in zip(tuning.pretensions_, tuning.deviation_.square, strict=True)
+    ]
+    return "free motion", headings, rows
+
+
+def tune_lines(tuning: ContactTuning) -> Iterator[str]:
+    """List the lines to print: the rate of false alarms, and the data it was measured on."""
+    alarms = sum(loop.alarms for loop in tuning.loop_)
+    percent = 100 * tuning.confidence
+    held, limit = tuning.held_out_
+    yield (
+        f"as it runs: {counted(alarms, 'false alarm')} in {60 * tuning.hours_:.1f} min, at most "
+        f"{rate_limit(alarms, tuning.hours_, tuning.confidence):.3g} per hour ({percent:g} %)"
+    )
+    if alarms:
+        longest = max(loop.longest for loop in tuning.loop_)
+        share = sum(loop.alarm_seconds for loop in tuning.loop_) / sum(loop.seconds for loop in tuning.loop_)
+        yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
+    yield (
+        f"held out: {held} in blocks that the bounds were not chosen on, at most {limit:.3g} per hour; "
+        f"{tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g}"
+    )
+    low, high = tuning.forces_
+    yield f"chosen at mean tendon forces of {low:.3g} to {high:.3g} N; beyond them thresholds are extrapolated"
+    bias = tuning.bias_
+    yield (
+        f"bias: noise {1e3 * bias.noise_std:.3g} mN·m + {1e3 * bias.noise_std_per_force:.3g} mN·m per N, "
+        f"time constant {bias.time_constant:.3g} s at {bias.force:.3g} N"
+    )
+    sensors = tuning.sensors_
+    if sensors.keys is None:
+        yield f"sensor faults are not watched: {sensors.why}"
+    else:
+        yield (
+            f"sensor faults: forces differ from their springs by up to {sensors.largest:.2g} N in free motion, "
+            f"{sensors.keys['jump_margin']:.3g} N are allowed"
+        )
+    levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
+    if levels.max() > 1:
+        yield f"held-out halves need bounds {levels.max():.2f} times those that the data themselves need"
