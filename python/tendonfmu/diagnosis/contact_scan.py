@@ -23,8 +23,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.gain import residual_of
-from tendonfmu.diagnosis.remainder import Learner
 from tendonfmu.diagnosis.remainder_features import features, run_starts
+from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.series import Grid, Series
 from tendonfmu.diagnosis.view import bias_of, residual_alone, series_of

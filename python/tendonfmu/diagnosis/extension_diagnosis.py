@@ -153,14 +153,18 @@ class _Result:
 
     def _unexplained(self, left: Numbers, extended: Mapping[str, Any]) -> Unexplained:
         searched, view = self._searched, self._searched.last
-        force = searched.estimation.grid.forces(view.predicted)
-        remainder = measure_remainder(view.series, left, view.splines, force=force, seed=self._asked.seed)
-        looked_at = np.sum(left[self._series.used] ** 2, axis=0)
-        if not searched.only_sliding:
-            return unexplained_of(remainder, looked_at, looked_at, self._asked.least_gain)
-        series = series_of(extended, searched.everything, searched.estimation.grid)
-        everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
-        return unexplained_of(remainder, looked_at, everything, self._asked.least_gain)
+        grid, used = searched.estimation.grid, self._series.used
+        measured = grid.means([recording.target for recording in searched.estimation.recordings])
+        force, torque = grid.forces(view.predicted), measured - left  # the residual itself must be in neither
+        remainder = measure_remainder(
+            view.series, left, view.splines, force=force, torque=torque, seed=self._asked.seed
+        )
+        looked_at = everything = np.sum(left[used] ** 2, axis=0)
+        if searched.only_sliding:
+            series = series_of(extended, searched.everything, grid)
+            everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
+        torques = np.sum((measured[used] - measured[used].mean(axis=0)) ** 2)
+        return unexplained_of(remainder, looked_at, everything, self._asked.least_gain, float(torques))
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""

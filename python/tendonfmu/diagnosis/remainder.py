@@ -2,8 +2,8 @@
 
 Two methods look at it:
 
-- a flexible learner without physics on everything that is known of the motion and its past: ridge regression, judged
-  on unseen stretches;
+- flexible learners without physics on everything that is known of the motion and its past, judged on unseen
+  stretches (remainder_learner.py);
 - a search for steady oscillations in time (statistics/spectral_line.py).
 """
 
@@ -13,18 +13,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve
 from scipy.signal import welch
 from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Indices, Numbers
-from tendonfmu.diagnosis.remainder_features import GROUPS, Features, Finding, features
+from tendonfmu.diagnosis.remainder_features import GROUPS, LAW, Features, Finding, features, tree_states
+from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Unexplained
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import (
-    Folds,
     Interval,
-    Span,
     Splines,
     Whitener,
     find_lines,
@@ -36,7 +34,8 @@ from tendonfmu.statistics import (
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
 CERTAIN = 2.0  # standard errors over the stretches
-PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
+WAYS = 3  # of predicting, of which the best is taken for each joint
+LAW_ERROR = 0.1  # of the torque to be explained: laws of friction differ from each other by no more
 CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 
 
@@ -46,37 +45,44 @@ class Remainder:
 
     share: tuple[float, ...]  # per joint, share of the variance that is predicted on unseen stretches
     gain: Numbers  # the same by stretch, (N·m)² [stretches, n]
+    beyond: Numbers  # the part of `gain` that no friction law of another form would bring, (N·m)² [stretches, n]
     square: Numbers  # sum of squares of the residual, (N·m)² [n]
     p_value: float  # probability of such a result if nothing is predictable, over all joints
-    unknown: bool  # whether some part is certainly predictable
     description: str
     prediction: Numbers  # N·m [B, n], 0 where not used
     findings: tuple[Finding, ...]  # the parts that are certain
 
 
 def measure_remainder(
-    series: Series, residual: Numbers, splines: Splines, *, force: Numbers | None = None, seed: int = 0
+    series: Series,
+    residual: Numbers,
+    splines: Splines,
+    *,
+    force: Numbers | None = None,
+    torque: Numbers | None = None,
+    seed: int = 0,
 ) -> Remainder:
-    """Measure the predictable part of a residual [B, n], N·m."""
-    # splines: [B, s]; force: [B, m]
+    """Measure the predictable part of a residual [B, n], N·m; force [B, m] and torque [B, n] are the model's."""
     joints, folds = residual.shape[1], make_folds(series)
     residual = np.where(series.used[:, None], residual, 0.0)
     if not folds.enough:
         nothing = np.zeros((folds.stretches, joints))
-        return Remainder((0.0,) * joints, nothing, np.zeros(joints), 1.0, False, "", np.zeros_like(residual), ())
-    seen = features(series, force=force, seed=seed)
+        return Remainder((0.0,) * joints, nothing, nothing, np.zeros(joints), 1.0, "", np.zeros_like(residual), ())
+    seen = features(series, force=force, torque=torque, seed=seed)
     learner = Learner(seen, residual, splines, folds)
-    tried = choices(seen)
-    everything = learner.predicted(tried[0].columns)
-    prediction, findings, p_values = np.zeros_like(residual), [], []
+    everything, law = _predicted(
+        learner, seen, tree_states(series, series.force if force is None else force, torque), seed
+    )
+    prediction, law_alone, findings, p_values = np.zeros_like(residual), np.zeros_like(learner.target), [], []
     for joint in range(joints):
         gain = learner.gains(everything)[:, joint]
-        p_values.append(_p_value(gain))
-        if gain.sum() > CERTAIN * standard_error(gain):
+        p_values.append(WAYS * _p_value(gain))
+        if gain.sum() > CERTAIN * standard_error(gain) and joints * p_values[-1] < LEVEL:
             prediction[folds.rows, joint] = everything[:, joint]
+            law_alone[:, joint] = law[:, joint]
     large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
     if any(large):
-        named = _named(learner, tried[1:])
+        named = _named(learner, choices(seen)[1:])
         findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
     lines = _lines(series, residual, prediction, findings)
     p_value = min([1.0, *(joints * p_value for p_value in p_values), *lines])
@@ -85,7 +91,30 @@ def measure_remainder(
     certain = [finding for finding in findings if share[finding.joint - 1] >= LEAST_SHARE]
     text = described(series, residual, prediction, certain, share) if certain else ""
     square = np.sum(learner.target**2, axis=0)
-    return Remainder(share, gain, square, p_value, bool(certain), text, prediction, tuple(certain))
+    beyond = gain - learner.gains(law_alone)
+    return Remainder(share, gain, beyond, square, p_value, text, prediction, tuple(certain))
+
+
+def _predicted(learner: Learner, seen: Features, states: tuple[Numbers, Numbers], seed: int) -> tuple[Numbers, Numbers]:
+    """Return what all that was recorded predicts on unseen stretches, and what a friction law's states do [R, n]."""
+    groups = list(dict.fromkeys(seen.group.tolist()))
+    sets = [np.flatnonzero(seen.group == group) for group in groups]
+    of_law = [k for k, group in enumerate(groups) if group in LAW]
+    everything, law = learner.mixed(sets, [range(len(sets)), of_law])
+    for joint in range(everything.shape[1]):
+        target = learner.target[:, joint]
+        trees = learner.by_trees(states[0], joint, seed)
+        splines = everything[:, joint].copy()
+        best = _best(target, splines, trees)
+        everything[:, joint] = best
+        if best is not splines:
+            law[:, joint] = _best(target, law[:, joint], learner.by_trees(states[1], joint, seed))
+    return everything, law
+
+
+def _best(target: Numbers, splines: Numbers, trees: Numbers) -> Numbers:
+    """Return the prediction [R] of both learners, or their mean, that leaves least on unseen stretches."""
+    return min([splines, trees, 0.5 * (splines + trees)], key=lambda way: float(np.sum((target - way) ** 2)))
 
 
 def _share(target: Numbers, prediction: Numbers) -> float:
@@ -120,7 +149,7 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
     return p_values
 
 
-# --- the learner -----------------------------------------------------------------------------------------------------
+# --- sets of columns -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -144,45 +173,6 @@ def choices(seen: Features) -> list[Choice]:
         if subject
     ]
     return listed
-
-
-class Learner:
-    """Residuals of all joints and the columns that may predict them, both without the slow bias."""
-
-    def __init__(self, seen: Features, residual: Numbers, splines: Splines, folds: Folds) -> None:
-        """Prepare the residual [B, n], N·m, with the splines [B, s] of the bias."""
-        span = Span(splines[folds.rows])
-        table = span.without(seen.values[folds.rows]).astype(np.float32)
-        spread = table.std(axis=0)
-        self._table = table / np.where(spread > 1e-4, spread, np.inf)
-        self.target = span.without(residual[folds.rows])
-        self.folds = folds
-        self.columns = np.arange(table.shape[1])
-        own = [folds.fold == number for number in range(folds.folds)]
-        self._rows = own
-        self._gram = [(self._table[rows].T @ self._table[rows]).astype(np.float64) for rows in own]
-        self._score = [self._table[rows].T.astype(np.float64) @ self.target[rows] for rows in own]
-
-    def predicted(self, columns: Indices) -> Numbers:
-        """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""
-        gram, score = np.sum(self._gram, axis=0)[np.ix_(columns, columns)], np.sum(self._score, axis=0)[columns]
-        predictions = np.zeros((len(PENALTIES), *self.target.shape))
-        for rows, own, part in zip(self._rows, self._gram, self._score, strict=True):
-            inner, right = gram - own[np.ix_(columns, columns)], score - part[columns]
-            seen = self._table[rows][:, columns]
-            for k, penalty in enumerate(PENALTIES):
-                ridge = penalty * float((~rows).sum()) * np.eye(len(columns))
-                weights = solve(inner + ridge, right, assume_a="pos", check_finite=False)
-                predictions[k, rows] = seen @ weights.astype(np.float32)
-        best = np.argmin(np.sum((predictions - self.target) ** 2, axis=1), axis=0)
-        return np.stack([predictions[best[j], :, j] for j in range(self.target.shape[1])], axis=1)
-
-    def gains(self, prediction: Numbers) -> Numbers:
-        """Return by how much a prediction [R, n] lowers the squares, (N·m)² [stretches, n]."""
-        change = self.target**2 - (self.target - prediction) ** 2
-        return np.stack(
-            [np.bincount(self.folds.stretch, values, minlength=self.folds.stretches) for values in change.T], axis=1
-        )
 
 
 # --- in words --------------------------------------------------------------------------------------------------------
@@ -269,16 +259,30 @@ def _stretch(coordinate: Numbers, power: Numbers) -> tuple[float, float] | None:
 # --- what is unknown -------------------------------------------------------------------------------------------------
 
 
-def unexplained_of(left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float) -> Unexplained:
-    """Return the share of the remaining variance that unseen stretches show to be no noise."""
-    # looked_at, everything: [n] (N·m)
+def unexplained_of(
+    left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float, explained: float
+) -> Unexplained:
+    """Return the share of the remaining variance that unseen stretches show to be no noise, and whether it matters.
+
+    It matters where it is material and more than a friction law of another form would bring, or larger than such a law
+    may be off.
+    """
+    # looked_at, everything: sums of squares [n] of what is left, (N·m)²; explained: the same of the torque, all joints
     part = np.divide(looked_at, everything, out=np.zeros_like(looked_at), where=everything > 0.0)
     shares = np.clip(np.array(left.share), 0.0, 1.0) * part
     whole = float(everything.sum())
     share = float(shares @ everything) / whole if whole > 0.0 else 0.0
     square = float(left.square.sum()) * (whole / float(looked_at.sum()) if looked_at.any() else 1.0)
-    half = CERTAIN * standard_error(left.gain.sum(axis=1)) / square if square > 0.0 else 0.0
-    gain = Interval(*(1.0 - float(np.sqrt(1.0 - min(end, 1.0))) for end in (share, share - half, share + half)))
-    unknown = left.unknown and gain.value >= least_gain and gain.low > 0.0
-    description = left.description if unknown else ""
-    return Unexplained(share, description, tuple(shares.tolist()), left.p_value, bool(unknown), gain)
+    gain = _rms_gain(left.gain.sum(axis=1), share, square)
+    beyond = left.beyond.sum(axis=1)
+    apart = _rms_gain(beyond, float(beyond.sum()) / square if square > 0.0 else 0.0, square)
+    large = float(left.gain.sum()) > LAW_ERROR**2 * explained
+    certain = bool(left.findings) and gain.value >= least_gain and gain.low > 0.0
+    unknown = certain and (large or (apart.value >= least_gain and apart.low > 0.0))
+    return Unexplained(share, left.description if unknown else "", tuple(shares.tolist()), left.p_value, unknown, gain)
+
+
+def _rms_gain(gain: Numbers, share: float, square: float) -> Interval:
+    """Return 1 − rms ratio of a share of the variance, from what each stretch [K] gains of a sum of squares."""
+    half = CERTAIN * standard_error(gain) / square if square > 0.0 else 0.0
+    return Interval(*(1.0 - float(np.sqrt(1.0 - min(end, 1.0))) for end in (share, share - half, share + half)))

@@ -64,12 +64,18 @@ GROUPS = {
     "time": "the time since the start, with the direction of motion (slow change of friction)",
     "rubbing": "the motion of two tendons against each other (rubbing)",
     "tendon": "the velocity of a tendon",
+    "torque": "the torque of another joint",
     "interaction": "several of angle, velocity, force and history together",
 }
+# What a friction law depends on: the motion and load of its own place. Every real law differs a little from every
+# description in these, also where nothing is missing.
+LAW = ("velocity", "friction over force", "acceleration", "travel", "memory of direction", "rest", "tendon")
+HISTORY = (0.1, 1.0, 10.0)  # s, for the trees
 
 
-def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> Features:
+def features(series: Series, *, force: Numbers | None = None, torque: Numbers | None = None, seed: int = 0) -> Features:
     """Compute all columns for the blocks of a series, standardised; constant columns are left out."""
+    # torque: of the model, N·m [B, n]; a measured torque or force would carry the residual
     series = replace(series, force=_without_torque(series) if force is None else force)
     columns: list[Numbers] = []
     group: list[str] = []
@@ -89,6 +95,10 @@ def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> 
             columns.append(values)
             group += [name] * values.shape[1]
             subject += [who] * values.shape[1]
+    for joint, values in enumerate(() if torque is None else torque.T):
+        columns.append(np.stack([values, np.abs(values), values * states.side[:, joint]], axis=1))
+        group += ["torque"] * 3
+        subject += [_joint(joint)] * 3
     values = _interactions(series, states, np.random.default_rng(seed))
     columns.append(values)
     group += ["interaction"] * values.shape[1]
@@ -98,6 +108,21 @@ def features(series: Series, *, force: Numbers | None = None, seed: int = 0) -> 
     spread = table.std(axis=0)
     kept = spread > 1e-9 * max(1.0, float(spread.max(initial=0.0)))
     return Features(table[:, kept] / spread[kept], np.array(group)[kept], np.array(subject)[kept])
+
+
+def tree_states(series: Series, force: Numbers, torque: Numbers | None = None) -> tuple[Numbers, Numbers]:
+    """Return all recorded signals and their history [B, f], and those of them that a friction law depends on."""
+    states, starts = _states(series), run_starts(series.segment)
+    ratio = series.velocity / states.speed
+    law = [ratio, states.side, states.moving, states.rest, series.travel]
+    law += [_filtered(states.side, memory, series.step, starts) for memory in HISTORY]
+    law += [states.side[:, joint, None] * force for joint in range(ratio.shape[1])]
+    others = [series.angle, force, series.time[:, None], *([] if torque is None else [torque])]
+    for memory in HISTORY:
+        others.append(_filtered(np.abs(ratio), memory, series.step, starts))
+        others.append(series.angle - _filtered(series.angle - series.angle[0], memory, series.step, starts))
+    own = np.concatenate(law, axis=1)
+    return np.concatenate([own, *others], axis=1), own
 
 
 def _without_torque(series: Series) -> Numbers:
