@@ -16,6 +16,7 @@ from tendonfmu.calibrate.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.remainder import Remainder, unexplained_of
+from tendonfmu.diagnosis.remainder_features import Finding
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
 from tendonfmu.model.description import read_finger
@@ -84,11 +85,19 @@ def test_the_fitted_time_stays_if_no_other_is_better() -> None:
 def test_what_is_left_is_measured_by_the_error_of_all_samples() -> None:
     """Half of a residual that holds a hundredth of the squared error: 0.25 % of the rms, which is not material."""
     gain = np.full((10, 1), 0.05)
-    left = Remainder((0.5,), gain, np.array([1.0]), 1e-9, True, "over the angle", np.zeros((4, 1)), ())
-    alone, all_of_it = (unexplained_of(left, np.array([1.0]), np.array([each]), 0.03) for each in (1.0, 100.0))
+    found = (Finding(1, "angle", "joint 1"),)
+    left = Remainder((0.5,), gain, gain, np.array([1.0]), 1e-9, "over the angle", np.zeros((4, 1)), found)
+    alone, all_of_it = (unexplained_of(left, np.array([1.0]), np.array([whole]), 0.03, 1e9) for whole in (1.0, 100.0))
     assert (alone.share, alone.unknown, alone.description) == (0.5, True, "over the angle")
     assert (all_of_it.share, all_of_it.unknown, all_of_it.description) == (0.005, False, "")
     assert all_of_it.gain.high == pytest.approx(1.0 - np.sqrt(1.0 - 0.005), rel=1e-9)
+
+
+def test_a_friction_law_of_another_form_is_not_unknown_unless_it_is_large() -> None:
+    gain, found = np.full((10, 1), 0.05), (Finding(1, "velocity", "joint 1"),)
+    left = Remainder((0.5,), gain, 0 * gain, np.array([1.0]), 1e-9, "the velocity", np.zeros((4, 1)), found)
+    unknown = [unexplained_of(left, np.ones(1), np.ones(1), 0.03, torque).unknown for torque in (1000.0, 10.0)]
+    assert unknown == [False, True]
 
 
 # --- a calibration's fit to all motion ---

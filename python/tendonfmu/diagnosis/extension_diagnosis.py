@@ -20,6 +20,7 @@ from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.remainder import measure_remainder, unexplained_of
+from tendonfmu.diagnosis.remainder_map import remainder_map
 from tendonfmu.diagnosis.result import Diagnosis, Event, Invisible, Unexplained
 from tendonfmu.diagnosis.search import Search, search
 from tendonfmu.diagnosis.selection import invisible_effects
@@ -164,7 +165,11 @@ class _Result:
             series = series_of(extended, searched.everything, grid)
             everything = np.sum(residual_alone(extended, series)[series.used] ** 2, axis=0)
         torques = np.sum((measured[used] - measured[used].mean(axis=0)) ** 2)
-        return unexplained_of(remainder, looked_at, everything, self._asked.least_gain, float(torques))
+        result = unexplained_of(remainder, looked_at, everything, self._asked.least_gain, float(torques))
+        finger = self._given.finger
+        parts = (view.series, left, remainder.prediction, finger.joint_names, finger.tendon_names)
+        shown = remainder_map(*parts) if result.unknown else None
+        return replace(result, map=shown)
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy.signal import welch
@@ -34,7 +35,6 @@ from tendonfmu.statistics import (
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
 CERTAIN = 2.0  # standard errors over the stretches
-WAYS = 3  # of predicting, of which the best is taken for each joint
 LAW_ERROR = 0.1  # of the torque to be explained: laws of friction differ from each other by no more
 CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
 
@@ -76,8 +76,8 @@ def measure_remainder(
     prediction, law_alone, findings, p_values = np.zeros_like(residual), np.zeros_like(learner.target), [], []
     for joint in range(joints):
         gain = learner.gains(everything)[:, joint]
-        p_values.append(WAYS * _p_value(gain))
-        if gain.sum() > CERTAIN * standard_error(gain) and joints * p_values[-1] < LEVEL:
+        p_values.append(_p_value(gain))
+        if gain.sum() > CERTAIN * standard_error(gain):
             prediction[folds.rows, joint] = everything[:, joint]
             law_alone[:, joint] = law[:, joint]
     large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
@@ -100,21 +100,20 @@ def _predicted(learner: Learner, seen: Features, states: tuple[Numbers, Numbers]
     groups = list(dict.fromkeys(seen.group.tolist()))
     sets = [np.flatnonzero(seen.group == group) for group in groups]
     of_law = [k for k, group in enumerate(groups) if group in LAW]
-    everything, law = learner.mixed(sets, [range(len(sets)), of_law])
-    for joint in range(everything.shape[1]):
-        target = learner.target[:, joint]
-        trees = learner.by_trees(states[0], joint, seed)
-        splines = everything[:, joint].copy()
-        best = _best(target, splines, trees)
-        everything[:, joint] = best
-        if best is not splines:
-            law[:, joint] = _best(target, law[:, joint], learner.by_trees(states[1], joint, seed))
-    return everything, law
+    mixtures = learner.mixed(sets, [range(len(sets)), of_law])
+    together = [learner.predicted(columns) for columns in (learner.columns, np.flatnonzero(np.isin(seen.group, LAW)))]
+    best = [np.zeros_like(learner.target) for _ in mixtures]
+    for joint in range(learner.target.shape[1]):
+        for k in range(len(best)):
+            trees = learner.by_trees(states[k], joint, seed)
+            best[k][:, joint] = _best(learner.target[:, joint], mixtures[k][:, joint], together[k][:, joint], trees)
+    return best[0], best[1]
 
 
-def _best(target: Numbers, splines: Numbers, trees: Numbers) -> Numbers:
-    """Return the prediction [R] of both learners, or their mean, that leaves least on unseen stretches."""
-    return min([splines, trees, 0.5 * (splines + trees)], key=lambda way: float(np.sum((target - way) ** 2)))
+def _best(target: Numbers, *predictions: Numbers) -> Numbers:
+    """Return the prediction [R], or the mean of two, that leaves least on unseen stretches."""
+    ways = [0.5 * (one + other) for one, other in combinations_with_replacement(predictions, 2)]
+    return min(ways, key=lambda way: float(np.sum((target - way) ** 2)))
 
 
 def _share(target: Numbers, prediction: Numbers) -> float:

@@ -60,6 +60,7 @@ GROUPS = {
     "travel": "the travel since the last reversal (hysteresis)",
     "memory of direction": "the directions of motion of the last seconds (a long hysteresis)",
     "memory of speed": "how fast the hand moved in the last seconds (friction that remembers)",
+    "memory of angle": "where the joint was in the last seconds (creep)",
     "rest": "the time at rest before the motion",
     "time": "the time since the start, with the direction of motion (slow change of friction)",
     "rubbing": "the motion of two tendons against each other (rubbing)",
@@ -295,6 +296,9 @@ def _of_memory(series: Series, states: _States) -> _Made:
         yield "memory of direction", _joint(joint), past[:, 0]
         quick = [past[:, 1] * side[:, None], past[:, 1] * moving[:, None]]
         yield "memory of speed", _joint(joint), np.concatenate(quick, axis=1)
+        angle = series.angle[:, joint, None] - series.angle[:, joint].mean()
+        kept = [angle - _filtered(angle, memory, series.step, starts) for memory in MEMORY[:5]]
+        yield "memory of angle", _joint(joint), np.concatenate(kept, axis=1)
         rested = np.log1p(states.rest[:, joint] / 0.1)
         fresh = np.exp(-travel / (0.3 * stroke))
         columns = [rested, rested * side, rested * moving, rested * side * fresh]

@@ -21,6 +21,7 @@ from tendonfmu.diagnosis.remainder_features import Features
 from tendonfmu.statistics import Folds, Span, Splines
 
 PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column with a smaller weight is noise
+FEWEST_FOLDS = 3  # weights are learned without two of them
 FLAT = 0.02  # of the mean power of the predictions: keeps weights of predictions that are alike from running apart
 MOST_ROWS = 1000  # that a tree sees: blocks of 10 ms are much alike
 TREES = {"learning_rate": 0.1, "max_iter": 60, "max_leaf_nodes": 8, "min_samples_leaf": 10, "l2_regularization": 1.0}
@@ -57,6 +58,8 @@ class Learner:
     def mixed(self, sets: Sequence[Indices], choices: Sequence[Sequence[int]]) -> list[Numbers]:
         """Return for each choice of sets of columns the mixed predictions of unseen folds [R, n], N·m."""
         folds = range(self.folds.folds)
+        if len(folds) < FEWEST_FOLDS:
+            return [self.predicted(np.concatenate([sets[k] for k in choice])) for choice in choices]
         without = {pair: self._fitted(sets, pair) for pair in combinations(folds, 2)}
         mixtures = [np.zeros_like(self.target) for _ in choices]
         for fold in folds:
@@ -115,8 +118,9 @@ class Learner:
 
 
 def mixing_weights(table: Numbers, target: Numbers) -> Numbers:
-    """Return weights of predictions [R, c] of a target [R]; none is negative."""
+    """Return weights of predictions [R, c] of a target [R]: none below 0, their sum at most 1."""
     gram = table.T @ table
     gram += max(FLAT * float(np.trace(gram)) / len(gram), 1e-300) * np.eye(len(gram))
     root = cholesky(gram)  # upper
-    return np.asarray(nnls(root, solve_triangular(root, table.T @ target, trans="T"))[0])
+    weights = nnls(root, solve_triangular(root, table.T @ target, trans="T"))[0]
+    return np.asarray(weights / max(1.0, float(weights.sum())))

@@ -58,6 +58,16 @@ class SteadyLoad:
 
 
 @dataclass(frozen=True)
+class RemainderMap:
+    """Mean of what is left at a joint over the two signals that it follows best."""
+
+    joint: int  # number from 1
+    labels: tuple[str, str]  # of the signals, with their units
+    edges: tuple[Numbers, Numbers]  # of the cells [c + 1], [r + 1]
+    torque: Numbers  # N·m [r, c]; NaN where there are too few data
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """What no effect explains."""
 
@@ -67,6 +77,7 @@ class Unexplained:
     p_value: float = 1.0  # of there being nothing to explain, family-wise
     unknown: bool = False  # whether something material and certain is left
     gain: Interval = NO_GAIN  # on unseen stretches: 1 − rms without what can be predicted / rms with it
+    map: RemainderMap | None = None  # if something is unknown
 
 
 @dataclass(frozen=True)
