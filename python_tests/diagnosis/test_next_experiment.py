@@ -90,7 +90,8 @@ def test_load_and_plain_friction_are_told_by_the_pretension(planned: Experiments
     assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].swing
     assert answer.distance > 3 * answer.now and answer.distance > 0.33
     assert planned.best.separates and planned.best.separates[0][0].effect == "joint_friction"
-    assert "tension" in planned.sentence(0) and "joint load friction" in planned.sentence(0)
+    assert planned.sentence(0) == answer.entry.sentence and answer.entry.tension in planned.sentence(0)
+    assert all(name in planned.best.sentence for name in (JOINT.candidate.title, LOAD.candidate.title, "joint 2 (tip)"))
     gain = planned.answers[1]
     assert gain.separates and (gain.entry.tension or gain.entry.load) and gain.distance > 2 * gain.now
 

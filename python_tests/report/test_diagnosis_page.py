@@ -20,6 +20,7 @@ import diagnosis_examples as examples
 from real_browser import Elements, figures_of, framed, measure, needs_nothing_else, visit
 from repetitions import repeated
 from tendonfmu.diagnosis.cause import CausePlace
+from tendonfmu.diagnosis.names import title_of
 from tendonfmu.diagnosis.reported import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
 from tendonfmu.diagnosis.sizes import size_of
@@ -31,7 +32,6 @@ from tendonfmu.report.diagnosis_text import (
     lines,
     names_of,
     tables,
-    title_of,
     unit_of,
 )
 from tendonfmu.report.numbers import percent, percent_interval, probability

@@ -9,15 +9,9 @@ import numpy as np
 from tendonfmu.diagnosis.cause import Cause, Where
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis.effects.words import quantity
+from tendonfmu.diagnosis.names import CONTACT, LOAD, TITLES, UNKNOWN
 from tendonfmu.diagnosis.result import Diagnosis
 
-CONTACT, UNKNOWN = "contact", "unknown"
-LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
-TITLES = {
-    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
-    CONTACT: "something touches the finger, or stops it",
-    UNKNOWN: "something that no effect on the list explains",
-}
 _EXPLANATIONS = {
     LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
     "cannot cause that. Look whether something touches or pulls the finger, and what the sensors show without a "

@@ -11,15 +11,17 @@ from tendonfmu.diagnosis import (
     Cause,
     DetectionGain,
     Diagnosis,
+    Names,
+    at_place,
     reported_causes,
     size_at,
     thresholds,
+    title_of,
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
+from tendonfmu.report.diagnosis_finger import finger_figure
 from tendonfmu.report.diagnosis_text import (
-    Names,
-    at_place,
     change_rows,
     confusion_sentence,
     error_rows,
@@ -34,7 +36,6 @@ from tendonfmu.report.diagnosis_text import (
     next_sentence,
     place_rows,
     tested_sentence,
-    title_of,
     too_small_sentence,
     unit_of,
     unseen,
@@ -69,6 +70,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         words=words_of(diagnosis.kind),
         unit=unit,
         first=_first_screen(diagnosis, names),
+        finger=finger_figure(diagnosis),
         fall=waterfall_of(diagnosis, names),
         cards=cards_of(diagnosis, names),
         too_small=_too_small(diagnosis, names),

@@ -18,9 +18,13 @@ from tendonfmu.diagnosis import (
     CausePlace,
     Diagnosis,
     Invisible,
-    Where,
+    Names,
+    at_place,
+    names_in,
+    numbered,
     quantity,
     reported_causes,
+    title_of,
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_words import words_of
@@ -44,53 +48,9 @@ _PLACED = 4  # of which so many are listed with their places
 _FALLEN = math.exp(-1.0)  # a correlation that has fallen to this is over, as that of one time constant
 
 
-@dataclass(frozen=True)
-class Names:
-    """Names of joints and tendons."""
-
-    joints: tuple[str, ...]  # as in the description; empty where it has none
-    tendons: tuple[str, ...]
-
-    def place(self, where: Where) -> str:
-        """Name a place, such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
-        parts = (("joint", where.joint, self.joints), ("tendon", where.tendon, self.tendons))
-        return ", ".join(_numbered(kind, number, names) for kind, number, names in parts if number is not None)
-
-    def joint(self, number: int) -> str:
-        """Name a joint by its number (from 1), such as "joint 2 (pip)"."""
-        return _numbered("joint", number, self.joints)
-
-    def places(self, cause: Cause) -> str:
-        """Name the place of a cause, or count its places; "everywhere" for the whole finger."""
-        place = self.place(cause.where)
-        several = counted(len(cause.places), "place") if len(cause.places) > 1 else ""
-        return ", ".join(each for each in (place, several) if each) or "everywhere"
-
-
-def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
-    name = names[number - 1] if 0 < number <= len(names) else ""
-    plain = f"{kind} {number}"
-    return plain if name.replace("_", " ").lower() in ("", plain, str(number)) else f"{plain} ({name})"
-
-
 def names_of(diagnosis: Diagnosis) -> Names:
     """Return the names of joints and tendons from the fitted description."""
-    kinds = (diagnosis.nominal_data["joints"], diagnosis.nominal_data["tendons"])
-    return Names(*(tuple(str(part.get("name") or "") for part in parts) for parts in kinds))
-
-
-def title_of(effect: str) -> str:
-    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
-    from tendonfmu.diagnosis import CANDIDATES
-
-    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
-    return titles.get(effect, effect.replace("_", " "))
-
-
-def at_place(title: str, where: Where, names: Names) -> str:
-    """Add the place to a title, such as "friction grows with the force, at joint 1 (mcp)"."""
-    place = names.place(where)
-    return f"{title}, at {place}" if place else title
+    return names_in(diagnosis.nominal_data)
 
 
 def unit_of(diagnosis: Diagnosis) -> tuple[float, str]:
@@ -425,7 +385,7 @@ def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[s
 def _at(kind: str, place: CausePlace, names: Names) -> str:
     number, all_names = (place.joint, names.joints) if kind == "joint" else (place.tendon, names.tendons)
     if number is not None:
-        return _numbered(kind, number, all_names).removeprefix(f"{kind} ")
+        return numbered(kind, number, all_names).removeprefix(f"{kind} ")
     return "all" if place.joint is None and place.tendon is None else "–"
 
 

@@ -37,7 +37,7 @@ class Discrimination:
         """Yield what the recording distinguishes, how long it takes, and which known load applies at which time."""
         time, load = self.performed.time, self.performed.load
         yield self.sentence
-        yield f"{time[-1]:.0f} s: {self.entry.words}"
+        yield f"motion file: {time[-1]:.0f} s of {self.entry.words}"
         if load.any():
             edges = np.flatnonzero(np.any(np.diff(load, axis=0) != 0, axis=1)) + 1
             for begin, end in zip([0, *edges], [*edges, len(time)], strict=True):
@@ -72,7 +72,7 @@ def discriminating_motion(
     experiment = report.get("experiment") or {}
     motion = experiment.get("motion") or {}
     if not motion:
-        said = report.get("next_experiment") or "nothing is left to distinguish"
+        said = report.get("next_experiment") or "nothing is left to find out"
         raise InputError(f"{folder / REPORT}: no further experiment to plan: {said}")
     try:
         performed = performed_of(data, motion, rate)
