@@ -18,8 +18,8 @@ _EXPLANATIONS = {
     "tendon. At run time the bias follows it.",
     CONTACT: "In some stretches a torque appears and disappears that no friction explains. They are left out of the "
     "fit. The gain is the share of the error on the training recordings that leaving them out removes.",
-    UNKNOWN: "Part of the remaining error can be predicted from what was recorded, but it has the shape of no effect "
-    "on the list. The gain is the share of the error in unseen stretches that predicting it removes.",
+    UNKNOWN: "Part of the remaining error follows the recorded signals, but no effect on the list has its shape. The "
+    "gain is how much smaller the error on test data would be without it.",
 }
 LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found
 LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves

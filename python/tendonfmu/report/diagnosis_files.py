@@ -134,7 +134,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
         folder / REPORT: "the same numbers",
         folder / EXTENDED: f"the finger with {added}, fitted",
         folder / EXTENDED_FMU: "the same as an FMU",
-        folder / NOMINAL: "the given structure, fitted",
+        folder / NOMINAL: "the given model, fitted",
     }
     write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
     return files

@@ -39,7 +39,7 @@ def _sentences(diagnosis: Diagnosis, causes: Sequence[tuple[int, Cause]]) -> Ite
     one = words_of(diagnosis.kind).one
     yield "The base is on the left."
     if any(_is_marked(cause) for _, cause in causes):
-        yield f"Each black number is a {one} in the list below."
+        yield f"Each filled number is a {one} in the list below."
     elsewhere: dict[str, list[str]] = {}
     for number, cause in causes:
         if not _is_marked(cause):
