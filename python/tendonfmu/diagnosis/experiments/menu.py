@@ -15,12 +15,13 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.span import Span
 from tendonfmu.errors import InputError
+from tendonfmu.excite import Variation
 from tendonfmu.files import listed
 from tendonfmu.model import moment_arms, pretension_vector
 
 LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded
-SWING = 0.7  # Hz, of tensions; splines of a slow bias follow up to a third of it
+EVERY = 2.0  # s, between changes of the tensions
 WIDER = 1.6  # times the range that was recorded
 SECONDS = 80.0  # s, of an entry
 LONG = 600.0  # s
@@ -41,10 +42,7 @@ class Section:
     max_speed: float  # rad/s
     seconds: float  # duration, s
     pretension: float  # mean, N
-    # frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions
-    swing: float | None = None
-    lowest: float = 0.0  # limits of swinging tensions, N
-    highest: float = 0.0
+    vary: Variation | None = None  # how the tensions change, other for each tendon; None for constant tensions
     load: tuple[float, ...] = ()  # known load at the joints, N·m [n]
     max_acceleration: float = 10.0  # rad/s²
 
@@ -85,6 +83,7 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
                     **section,
                     "ranges": tuple((float(low), float(high)) for low, high in section["ranges"]),
                     "load": tuple(float(torque) for torque in section.get("load") or ()),
+                    "vary": Variation(**section["vary"]) if section.get("vary") else None,
                 }
             )
             for section in value["sections"]
@@ -221,8 +220,8 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
     low, high = levels[0], levels[-2]
     yield replace(
         entry,
-        sections=tuple(replace(section, swing=SWING, lowest=low, highest=high) for section in entry.sections),
-        tension=f"while the tendon forces swing between {low:.3g} and {high:.3g} N about every {1 / SWING:.2g} s",
+        sections=tuple(replace(section, vary=Variation(low, high, EVERY)) for section in entry.sections),
+        tension=f"while the tendon forces change every {EVERY:.2g} s between {low:.3g} and {high:.3g} N",
     )
 
 
@@ -230,7 +229,7 @@ def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """Yield the entry with a known load at the joints, on one side and on the other."""
     first = entry.sections[0]
     own = first.pretension * own_tension(data)
-    least = own if first.swing is None else np.minimum(own, first.lowest)
+    least = own if first.vary is None else np.minimum(own, first.vary.lowest)
     largest = known_load(data, least, recorded)
     if not largest.any():
         return

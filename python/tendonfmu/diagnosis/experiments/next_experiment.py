@@ -16,9 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.sparse import identity
-from scipy.sparse.linalg import splu
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
@@ -33,7 +30,8 @@ from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
 from tendonfmu.model import NativeError, moment_arms
 from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
-from tendonfmu.statistics import KNOTS, regular_blocks
+from tendonfmu.statistics import Span as SplineSpan
+from tendonfmu.statistics import regular_blocks, spline_basis
 
 Progress = Callable[[int, int], None]
 
@@ -298,16 +296,9 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
 
 def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
     """Return values [B, n, c] without a slow bias: a constant, or cubic splines with the knots of the diagnosis."""
-    flat = values.reshape(len(values), -1)
-    if constant:
-        return np.asarray((flat - flat.mean(axis=0)).reshape(values.shape))
-    span = float(time[-1] - time[0])
-    inner = np.linspace(time[0] - 1e-9, time[-1] + 1e-9, max(1, round(span / KNOTS)) + 1)
-    outer = (inner[1] - inner[0]) * np.arange(1, 4)
-    knots = np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer])
-    splines = BSpline.design_matrix(time, knots, 3)
-    known = splu((splines.T @ splines + 1e-12 * identity(splines.shape[1])).tocsc())
-    return np.asarray((flat - splines @ known.solve(splines.T @ flat)).reshape(values.shape))
+    splines = np.ones((len(time), 1)) if constant else spline_basis(time, float(time[-1] - time[0]))
+    flat = SplineSpan(splines).without(values.reshape(len(values), -1))
+    return flat.reshape(values.shape)
 
 
 def _asked(questions: Sequence[Question]) -> list[Term]:
