@@ -43,8 +43,7 @@ from tendonfmu.statistics import Interval
 
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 _MOST_PLACES = 4  # listed at most
-_TOLD = 2  # invisible effects described one by one; more share a sentence
-_PLACED = 4  # of which so many are listed with their places
+_PLACED = 4  # so many invisible effects are listed with their places
 _FALLEN = math.exp(-1.0)  # a correlation that has fallen to this is over, as that of one time constant
 
 
@@ -198,8 +197,7 @@ class Hidden:
 
     title: str  # the effect and its places, in plain words
     places: str
-    why: str  # sentence: what hides it where it comes nearest to being visible
-    # there: the share that survives the refit, and what an ordinary size would raise the error by; None for a change
+    # at its first place: the share that survives the refit, and the change of the error at its ordinary size
     share: float
     gain: float | None
     absorbed: bool  # whether refitting absorbs it everywhere
@@ -219,37 +217,23 @@ def hidden(diagnosis: Diagnosis, names: Names) -> list[Hidden]:
         if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
         share, gain = best.surviving_share, best.ordinary_gain
-        effects.append(Hidden(best.title, text, _why_hidden(best), share, gain, best.absorbed, best.experiment))
+        effects.append(Hidden(best.title, text, share, gain, best.absorbed, best.experiment))
     return effects
 
 
-def _why_hidden(effect: Invisible) -> str:
-    if effect.absorbed or effect.ordinary_gain is None:
-        return f"Other numbers of the model imitate it: after a fit, {percent(effect.surviving_share)} of it remains."
-    gain = percent(effect.ordinary_gain)
-    limit = "" if effect.needed_gain is None else f"; a cause must change it by at least {percent(effect.needed_gain)}"
-    return f"At its ordinary size it changes the error by only {gain}{limit}."
-
-
 def hidden_sentences(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
-    """Describe what these data cannot show: up to `_TOLD` effects with an experiment each, more in one sentence."""
+    """Describe what these data cannot show: what refitting absorbs, and what would have to be larger than usual."""
     effects = hidden(diagnosis, names)
-    if len(effects) > _TOLD:
-        change = diagnosis.kind == "change"
-        hides = "what both recordings share hides" if change else "other numbers of the model imitate"
-        absorbed = [effect for effect in effects if effect.absorbed]
-        small = [effect for effect in effects if not effect.absorbed]
-        if absorbed:
-            because = f"because {hides} {'it' if len(absorbed) == 1 else 'them'}"
-            yield f"These recordings cannot show {counted(len(absorbed), 'effect')}, {because}: {_listed(absorbed)}."
-        if small:
-            what = f"{counted(len(small), 'effect')} only if larger than usual{_limit(diagnosis)}"
-            yield f"These recordings can show {what}: {_listed(small)}."
-        return
-    for effect in effects:
-        place = f", at {effect.places}" if effect.places else ""
-        experiment = f" {capital(effect.experiment.rstrip('.'))}." if effect.experiment else ""
-        yield f"These recordings cannot show this: {effect.title}{place}. {effect.why}{experiment}"
+    change = diagnosis.kind == "change"
+    hides = "what both recordings share hides" if change else "other numbers of the model imitate"
+    absorbed = [effect for effect in effects if effect.absorbed]
+    small = [effect for effect in effects if not effect.absorbed]
+    if absorbed:
+        because = f"because {hides} {'it' if len(absorbed) == 1 else 'them'}"
+        yield f"These recordings cannot show {counted(len(absorbed), 'effect')}, {because}: {_listed(absorbed)}."
+    if small:
+        what = f"{counted(len(small), 'effect')} only if larger than usual{_limit(diagnosis)}"
+        yield f"These recordings can show {what}: {_listed(small)}."
 
 
 def _limit(diagnosis: Diagnosis) -> str:
@@ -359,7 +343,7 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"too small to matter: {'; '.join(small)}"
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
-        yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
+        yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
     yield f"estimated from {diagnosis.signals}"
     yield f"next: {next_sentence(diagnosis)}"
 
