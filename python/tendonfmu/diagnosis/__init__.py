@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .cause import Cause, CausePlace, ChangedSize, Evidence, Where
     from .contact_scan import events_of, without_blocks
     from .diagnosis import diagnose
-    from .effects import CANDIDATES
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion

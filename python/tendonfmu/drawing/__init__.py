@@ -3,7 +3,7 @@
 - `panel`: what a figure shows, with its colours and sizes
 - `figures`: makes it as a Plotly figure, which pages embed; `grid`: several in one, for notebooks
 - `png`: draws the Plotly figures of a sheet as a PNG file
-- `finger_picture`: draws what an FMU carries, with Pillow; `finger_svg`: a finger for pages, with marks
+- `finger_picture`: draws what an FMU carries, with Pillow
 """
 
 from typing import TYPE_CHECKING
@@ -13,12 +13,10 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .figures import dark_colours, figures_json, figures_of, packed_plotly, pooled
     from .finger_picture import draw_finger, draw_terminal
-    from .finger_svg import Mark, finger_html, finger_svg
     from .grid import SeriesRow, series_figure, sheets_figure
     from .panel import (
         BLUE,
         DIVERGING,
-        EDGE_RED,
         GREY,
         ORANGE,
         SKY,

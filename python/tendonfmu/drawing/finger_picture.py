@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
-from tendonfmu.drawing.panel import BLUE, DARK, EDGE_RED, GREY, LIGHT, SKIN, TENDON_COLOURS
+from tendonfmu.drawing.panel import BLUE, DARK, GREY, LIGHT, SKIN
 from tendonfmu.errors import InternalError
-from tendonfmu.model import DrawnTendon, FingerDrawing
+from tendonfmu.model import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing
 
 PICTURE_DPI, ICON_DPI = 130, 26
 TERMINAL_PIXELS = 32

@@ -20,8 +20,6 @@ Size = Literal["small", "medium", "large", "wide"]
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 DARK, GREY, LIGHT, SKIN = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC"
-EDGE_RED = "#CC1F1A"
-TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
 
 DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
 # Replacements on a dark page. The other colours are visible on both.
@@ -35,7 +33,7 @@ IN_DARK = {
     "#5A5A5A": "#B9BFC6",
     "#332288": "#A495F5",
     "#999933": "#C4C45A",
-    EDGE_RED: "#FF6B62",
+    "#CC1F1A": "#FF6B62",
 }
 
 SIZES: Mapping[Size, tuple[int, int]] = {  # CSS pixels

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data
-from tendonfmu.model.friction_places import moment_arms
 
 JOINT_SPACING = 2.5
 HUB_RADIUS = 0.32  # of the disc that stands for a joint
@@ -26,6 +25,8 @@ MARGIN = 0.2  # of the finger's outline around its tendons
 SPRING_LENGTH = 0.9
 BASE = 1.9  # from the springs to the first joint
 LABEL_SPACING = 0.3
+EDGE_RED = "#CC1F1A"
+TENDON_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#5A5A5A", "#332288", "#999933")
 
 Points = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ class FingerDrawing:
 
 def finger_drawing(data: Data) -> FingerDrawing:
     """Compute the geometry of a finger from its description."""
-    R = moment_arms(data)
+    R = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
     joint_names, tendon_names = (_names(data[f"{kind}s"], kind) for kind in ("joint", "tendon"))
     heights = _heights(R)
     x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from tendonfmu.diagnosis import Cause, Diagnosis, reported_causes
-from tendonfmu.drawing import EDGE_RED, GREY, Mark, finger_svg
+from tendonfmu.drawing import GREY
 from tendonfmu.files import are, counted, listed
-from tendonfmu.model import FingerDrawing, finger_drawing
+from tendonfmu.model import EDGE_RED, FingerDrawing, Mark, finger_drawing, finger_svg
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.numbers import capital
 

@@ -12,9 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from tendonfmu.drawing.panel import EDGE_RED, TENDON_COLOURS
+from tendonfmu.arrays import Data
 from tendonfmu.files import html_template
-from tendonfmu.model import DrawnTendon, FingerDrawing
+from tendonfmu.model.routing_geometry import (
+    EDGE_BEFORE,
+    EDGE_RED,
+    TENDON_COLOURS,
+    DrawnTendon,
+    FingerDrawing,
+    finger_drawing,
+)
 
 ALONG, ACROSS = 32.0, 46.0  # per unit of the drawing
 ROW = 14.0  # of names of joints
@@ -22,7 +29,6 @@ LETTER = 7.0  # width of a letter of a name
 LONGEST = 14  # letters of a name that are shown
 SHOWN = 1.25  # times as large on a page
 MARK = 8.0  # radius of a mark
-EDGE_BEFORE = 0.6  # how far before its joint an edge is drawn, in units of the drawing
 _STEPS = (0, 1, -1, 2, -2, 3, -3)  # where a mark may be beside its place, in diameters along its tendon or link
 
 Point = tuple[float, float]
@@ -61,10 +67,12 @@ def finger_svg(drawing: FingerDrawing, marks: Iterable[Mark] = ()) -> Markup:
     return Markup(text)
 
 
-def finger_html(lines: Sequence[str], drawing: FingerDrawing) -> str:
+def finger_html(lines: Sequence[str], data: Data) -> str:
     """Return a finger and its properties as an HTML element."""
     rows = [(name.rstrip(), value.strip()) for name, _, value in (line.partition("  ") for line in lines[1:])]
-    return html_template("finger.html.jinja").render(title=lines[0], rows=rows, drawing=finger_svg(drawing))
+    return html_template("finger.html.jinja").render(
+        title=lines[0], rows=rows, drawing=finger_svg(finger_drawing(data))
+    )
 
 
 def _short(name: str) -> str:

@@ -9,9 +9,8 @@ import re
 import pytest
 
 from repository_paths import ROOT
-from tendonfmu.drawing import Mark, finger_svg
-from tendonfmu.drawing.finger_svg import MARK
-from tendonfmu.model import finger_drawing
+from tendonfmu.model.routing_geometry import finger_drawing
+from tendonfmu.model.routing_svg import MARK, Mark, finger_svg
 
 INDEX_FINGER = json.loads((ROOT / "examples" / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
 
