@@ -341,7 +341,7 @@ def perform(hand: Hand, motion: Mapping[str, Any], seed: int) -> Made:
 
     _, plan = performed_of(hand.nominal, motion, hand.rate)
     rng = np.random.default_rng([seed, 66])
-    made = recorded(hand, plan.time, plan.position, plan.tension, plan.load, rng, hand.noise)
+    made = recorded(hand, plan.time, plan.joint_position, plan.tension, plan.load, rng, hand.noise)
     if plan.load.any():
         made.columns.update({f"external_torque[{j + 1}]": torque for j, torque in enumerate(plan.load.T)})
     return made

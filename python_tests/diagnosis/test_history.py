@@ -17,9 +17,9 @@ from real_browser import Elements
 from tendonfmu.diagnosis import history as change_history
 from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.history import History, Line, Size, diagnose_history, share_of, slope, times_of
+from tendonfmu.diagnosis.names import Names
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import finite
-from tendonfmu.report.diagnosis_text import Names
 from tendonfmu.report.history import headline, history_report, trend_sentence, write_history
 from tendonfmu.statistics.intervals import Interval
 from tendonfmu.tasks.jobs import workers_of

@@ -87,10 +87,11 @@ def test_load_and_plain_friction_are_told_by_the_pretension(planned: Experiments
     """At one pretension friction that grows with the load is constant, as plain friction is."""
     answer = planned.answers[0]
     assert answer.separates and answer.entry.tension != ""
-    assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].swing
+    assert len({section.pretension for section in answer.entry.sections}) > 1 or answer.entry.sections[0].vary
     assert answer.distance > 3 * answer.now and answer.distance > 0.33
     assert planned.best.separates and planned.best.separates[0][0].effect == "joint_friction"
-    assert "tension" in planned.sentence(0) and "joint load friction" in planned.sentence(0)
+    assert planned.sentence(0) == answer.entry.sentence and answer.entry.tension in planned.sentence(0)
+    assert all(name in planned.best.sentence for name in (JOINT.candidate.title, LOAD.candidate.title, "joint 2 (tip)"))
     gain = planned.answers[1]
     assert gain.separates and (gain.entry.tension or gain.entry.load) and gain.distance > 2 * gain.now
 
@@ -131,16 +132,16 @@ def test_a_motion_stays_where_it_was_recorded(entry: Entry) -> None:
     for j in range(2):
         ends = [section.ranges[j] for section in entry.sections]
         low, high = min(low for low, _ in ends), max(high for _, high in ends)
-        assert low - 1e-9 <= found.position[:, j].min() and found.position[:, j].max() <= high + 1e-9
+        assert low - 1e-9 <= found.joint_position[:, j].min() and found.joint_position[:, j].max() <= high + 1e-9
         wider = WIDER if "times the range" in entry.motion else 1.0
         assert wider * RANGES[j][0] - 1e-9 <= low and high <= wider * RANGES[j][1] + 1e-9
-    lowest = min(section.pretension if section.swing is None else section.lowest for section in entry.sections)
+    lowest = min(section.pretension if section.vary is None else section.vary.lowest for section in entry.sections)
     assert found.tension.min() >= lowest * min(pretension_vector(FINGER)) * (1 - 1e-9)
     fastest = max(section.max_speed for section in entry.sections)
-    assert np.abs(found.velocity).max() <= fastest * (1 + 1e-9)
-    middle = (found.position[2:] - found.position[:-2]) * rate / 2
-    assert np.abs(middle - found.velocity[1:-1]).max() < 0.05 * fastest
-    assert not found.velocity[[0, -1]].any() and not found.acceleration[[0, -1]].any()
+    assert np.abs(found.joint_velocity).max() <= fastest * (1 + 1e-9)
+    middle = (found.joint_position[2:] - found.joint_position[:-2]) * rate / 2
+    assert np.abs(middle - found.joint_velocity[1:-1]).max() < 0.05 * fastest
+    assert not found.joint_velocity[[0, -1]].any() and not found.joint_acceleration[[0, -1]].any()
     np.testing.assert_allclose(np.diff(found.time), 1 / rate)
     # the tensions hold themselves, and every tendon stays taut under them, its friction and the known load
     np.testing.assert_allclose(found.tension @ moment_arms(FINGER), 0.0, atol=1e-9)
@@ -204,7 +205,7 @@ def test_the_motion_can_be_run(planned: Experiments, tmp_path: Path) -> None:
     )
     levels = np.array(motion.pretension["value"])
     for section in found.entry.sections:
-        assert section.swing is not None or np.isclose(levels, section.pretension).any()
+        assert section.vary is not None or np.isclose(levels, section.pretension).any()
     assert found.sentence == planned.best.sentence
     assert any(found.entry.words in line for line in found.lines())
 

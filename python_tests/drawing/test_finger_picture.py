@@ -12,7 +12,7 @@ from PIL import Image
 
 from repository_paths import ROOT
 from tendonfmu.drawing import draw_finger, draw_terminal
-from tendonfmu.model import finger_drawing, read_finger
+from tendonfmu.model import finger_drawing
 
 INDEX_FINGER = json.loads((ROOT / "examples" / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
 RED, BLUE = (0xCC, 0x1F, 0x1A), (0x00, 0x72, 0xB2)
@@ -26,7 +26,7 @@ def pixels(stream: io.BytesIO) -> Pixels:
 def drawn(description: dict[str, Any]) -> tuple[Pixels, Pixels]:
     """Return the pixels [height, width, 3] of the picture and of the icon."""
     picture, icon = io.BytesIO(), io.BytesIO()
-    draw_finger(finger_drawing(read_finger(description)), picture, icon)
+    draw_finger(finger_drawing(description), picture, icon)
     return pixels(picture), pixels(icon)
 
 

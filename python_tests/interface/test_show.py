@@ -127,7 +127,7 @@ def test_a_cause_has_a_short_text_and_its_gain_is_explained() -> None:
     found = Diagnosis(examples.three_causes())
     for cause in found.causes:
         assert len(repr(cause)) < 160 and repr(cause).startswith(f"<Cause {cause.effect}") and cause.size in repr(cause)
-    assert "; the other causes kept" in found._repr_html_()
+    assert "with the other causes" in found._repr_html_()
     assert "lacks only" not in Diagnosis(examples.adequate())._repr_html_()
 
 

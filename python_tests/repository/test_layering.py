@@ -139,7 +139,10 @@ def test_few_modules_print() -> None:
 # What draws takes arrays that others made. Of the model it has what an FMU's picture consists of, and numpy is its only
 # mathematics. The binding knows the names of signals alone.
 FEW_IMPORTS = {
-    "drawing/*.py": r"tendonfmu\.(arrays|drawing|errors|files|lazy_exports|model\.(DrawnTendon|FingerDrawing)$)",
+    "drawing/*.py": (
+        r"tendonfmu\.(arrays|drawing|errors|files|lazy_exports"
+        r"|model\.(DrawnTendon|EDGE_RED|FingerDrawing|TENDON_COLOURS)$)"
+    ),
     "report/*_figures.py": (
         r"tendonfmu\.(arrays|detect|diagnosis|drawing|estimate|files|report|statistics"
         r"|model\.part_of$|recordings\.flagged_stretches$)"

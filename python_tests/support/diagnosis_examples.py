@@ -183,7 +183,7 @@ INVISIBLE = (
         Where("cover_hardening", joint=1),
         "the cover gets stiffer the more it is bent",
         0.002,
-        "move joint 1 (mcp) over at least -0.9 to 1.2 rad",
+        "Record 80 s of the same kind of motion over 1.6 times the range, if the joints can.",
         ordinary_gain=0.0004,
         needed_gain=0.03,
     ),
@@ -191,7 +191,7 @@ INVISIBLE = (
         Where("tendon_nonlinearity", tendon=3),
         "the tendon gets stiffer the more it is stretched",
         0.32,
-        "record at a pretension of 30 N as well",
+        "Record 80 s of the same kind of motion, at pretensions of 5, 10, 20 and 40 N.",
         ordinary_gain=0.011,
         needed_gain=0.03,
     ),
@@ -202,8 +202,9 @@ STALL = Event(
 )
 
 EXPERIMENT = Experiment(
-    sentence="Record 60 s at a pretension of 25 N with slow strokes of joint 2 (pip) over its whole range: the weight "
-    "of a link stays, a wrong moment arm grows with the force.",
+    sentence="Record 80 s of the same kind of motion, at pretensions of 5, 10, 20 and 40 N. It distinguishes two "
+    "causes that look alike in the present recordings: the link's weight, at joint 2 (pip); and a moment arm is off, "
+    "at joint 2 (pip), tendon 1 (fdp).",
     separates=((Where("gravity", joint=2), Where("moment_arm", joint=2, tendon=1)),),
     makes_visible=(Where("tendon_nonlinearity", tendon=3),),
     distance=6.4,
@@ -251,9 +252,7 @@ def adequate() -> Diagnosis:
         invisible=INVISIBLE[:1],
         events=(),
         unexplained=Unexplained(0.0, "", (0.0, 0.0)),
-        experiment=replace(
-            NO_EXPERIMENT, sentence=f"{INVISIBLE[0].experiment[0].upper()}{INVISIBLE[0].experiment[1:]}."
-        ),
+        experiment=replace(NO_EXPERIMENT, sentence=INVISIBLE[0].experiment),
         views=(*views_of(1, 1.2e-3, {}), *views_of(2, 0.98e-3, {})),
         whiteness=((0.08, 0.08), (0.05, 0.05)),
         detection=None,
@@ -341,7 +340,7 @@ def three_causes() -> Diagnosis:
         warnings=(
             "train_1.parquet: joint 2 (pip) turns round 7 times only; expected at least 10 for presliding",
             "the bias adapts in 0.2 s: any model looks adequate to it",
-            "only 6 stretches of 2 s: 6 parts are held out in place of 8, so a cause has to be larger to be certain",
+            "only 12 s of motion: a cause must be larger to be certain; record a minute or more",
         ),
     )
 
@@ -419,7 +418,7 @@ def changed() -> Diagnosis:
         ),
         unexplained=Unexplained(0.0, "", (0.0, 0.0)),
         floor_source="what remains on unseen stretches without the errors that both recordings share",
-        experiment=Experiment("Make the motions of the reference again, exactly, at the same load and pretension."),
+        experiment=Experiment("Repeat the motions of the reference exactly, at the same load and pretension."),
         detection=None,
         extended_data=extended,
         repeated=1,

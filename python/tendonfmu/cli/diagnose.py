@@ -102,11 +102,11 @@ def _history(
     """Run `diagnose --history`."""
     from contextlib import nullcontext
 
-    from tendonfmu.diagnosis import diagnose_history
+    from tendonfmu.diagnosis import Names, diagnose_history
     from tendonfmu.estimate import check_given_once
     from tendonfmu.files import check_output_folder
     from tendonfmu.model import read_finger
-    from tendonfmu.report import Names, headline, history_report, rows_of_lines, write_history
+    from tendonfmu.report import headline, history_report, rows_of_lines, write_history
     from tendonfmu.tasks import workers_of
 
     check_given_once(recordings, reference, "the reference")

@@ -16,14 +16,13 @@ from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, 
 from tendonfmu.demo.figures import calibration_sheet, fit_sheets, push_sheet, run_sheet
 from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES, RecordingResult
 from tendonfmu.detect import DetectionScore
-from tendonfmu.diagnosis import Diagnosis
+from tendonfmu.diagnosis import Diagnosis, at_place
 from tendonfmu.files import write_text
 from tendonfmu.report import (
     ResidualTable,
     Row,
     Table,
     Tile,
-    at_place,
     cards_of,
     confusion_sentence,
     diagnosis_page,

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from .cause import Cause, CausePlace, ChangedSize, Evidence, Where
     from .contact_scan import events_of, without_blocks
     from .diagnosis import diagnose
-    from .effects import CANDIDATES
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion
     from .extension_fit import FitSettings, learn_numbers
     from .gain import residual_of, squared_residual
     from .history import History, Line, diagnose_history, share_of
-    from .reported import CONTACT, TITLES, UNKNOWN, reported_causes
+    from .names import CONTACT, TITLES, UNKNOWN, Names, at_place, names_in, numbered, title_of
+    from .reported import reported_causes
     from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
     from .series import make_grid
     from .signal_choice import estimation_recordings

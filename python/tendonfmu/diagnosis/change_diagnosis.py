@@ -20,6 +20,7 @@ from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
 from tendonfmu.diagnosis.extension_fit import fit_numbers
 from tendonfmu.diagnosis.gain import Gain, measure_gain
+from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.result import Diagnosis, Experiment, SteadyLoad, Unexplained
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
@@ -35,7 +36,7 @@ LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by 
 LEVEL = 0.001  # significance level of this difference
 SPREAD = 2.0  # standard deviations over the stretches of the reference: other motions have another error
 FEWEST = 4  # least number of stretches on either side
-REPEAT = "Make the motions of the reference again, exactly, at the same load and pretension"
+REPEAT = "Repeat the motions of the reference exactly, at the same load and pretension."
 
 
 def diagnose_change(asked: Asked, chosen: Estimation) -> Diagnosis:
@@ -276,9 +277,8 @@ class _Changes:
             spread = float(np.sqrt(sum(np.var(level[s, worst], ddof=1) / s.sum() for s in (is_now, ~is_now))))
             ends = [1.0 - (1.0 - float(worse[worst])) * np.exp(sign * 1.96 * spread) for sign in (1.0, -1.0)]
             gain = Interval(float(worse[worst]), float(ends[0]), float(ends[1]))
-        words = (
-            f"at joint {worst + 1} the new recordings are explained worse than the reference, and the cause is unknown"
-        )
+        joint = names_in(search.data).joint(worst + 1)
+        words = f"the model fits {joint} worse in the new recordings than in the reference; no known change explains it"
         whole = float(np.array(share) @ now**2 / max(float((now**2).sum()), 1e-300))
         return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
 
@@ -304,9 +304,9 @@ class _Changes:
         pulls = any(not tendon.get("bidirectional") for tendon in self._given.finger.data["tendons"])
         if any(cause.confusable_with for cause in causes) and pulls:
             return (
-                f"{REPEAT}, once as it was and once at half and at twice the pretension: what grows with the force is "
-                "then distinguished from what does not"
+                f"{REPEAT} Then repeat them at half and at twice the pretension: what grows with the tendon force "
+                "differs there from what does not."
             )
         if not search.repeated and (causes or absorbed_effects(search.selection, REPEAT)):
-            return f"{REPEAT}: then only the change is left of their difference"
+            return f"{REPEAT} Then their difference shows the change alone."
         return ""

@@ -29,7 +29,6 @@ from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import residual_alone, series_of
-from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
@@ -96,12 +95,10 @@ class _Result:
         if self._searched.only_sliding:
             warnings.append(self._stuck(verified, left))
         if not folds.enough:
-            warnings.append("less than 8 s of motion: nothing can be held out, so no cause is named; record a minute")
+            warnings.append("less than 8 s of motion: too short to name a cause; record a minute or more")
         elif folds.folds < 8:
             warnings.append(
-                f"only {counted(folds.stretches, 'stretch', 'stretches')} of 2 s: "
-                f"{folds.folds} parts are held out in place of 8, so a cause "
-                "has to be larger to be certain; record a minute"
+                f"only {2 * folds.stretches} s of motion: a cause must be larger to be certain; record a minute or more"
             )
         return warnings
 
@@ -118,9 +115,9 @@ class _Result:
             1e3 * float(np.sqrt(np.mean(residual[used] ** 2))) for residual in (self._left(searched.nominal.data), left)
         )
         return (
-            f"something is stuck in {100 * (1 - sliding / everything):.0f} % of the samples, in which "
-            f"friction balances the load and misleads a fit: {fitted} where everything slides. There the error falls "
-            f"from {before:.3g} to {after:.3g} mN·m rms (means of 10 ms, without the slow bias); the gain of all "
+            f"a joint or tendon sticks in {100 * (1 - sliding / everything):.0f} % of the samples, where "
+            f"friction takes any value that balances the load: {fitted} only where everything slides. There the error "
+            f"falls from {before:.3g} to {after:.3g} mN·m rms (means of 10 ms, without the slow bias); the gain of all "
             "causes together counts all samples"
         )
 
@@ -181,11 +178,11 @@ class _Result:
         ]
         known = [*verified.causes, *verified.dropped, *self._searched.small]
         unseen = invisible_effects(self._searched.last.selection, verified.causes, known, self._asked.least_gain)
-        nearest: dict[str, Term] = {}
-        for cause, _ in unseen:
+        nearest: dict[str, Question] = {}
+        for cause, hidden in unseen:
             if self._is_in_nominal(cause.terms[0]):
-                nearest.setdefault(cause.effect, cause.terms[0].ordinary)
-        questions = [*rivals, *(Question(term) for term in nearest.values())]
+                nearest.setdefault(cause.effect, Question(cause.terms[0].ordinary, absorbed=hidden.absorbed))
+        questions = [*rivals, *nearest.values()]
         noise = self._left(self._searched.extended.data)[self._series.used].std(axis=0)
         with self._asked.phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(

@@ -122,7 +122,7 @@ def _require_motion(recordings: Sequence[FitRecording]) -> None:
         name = str(recordings[0].path) if len(recordings) == 1 else f"{len(recordings)} recordings"
         raise InputError(
             f"{name}: {seconds:.2g} s of free motion; expected at least {least:g} s, better a minute: causes are "
-            "judged on parts that are held out in turn"
+            "judged on parts that they were not fitted to"
         )
 
 

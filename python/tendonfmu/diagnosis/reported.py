@@ -9,23 +9,17 @@ import numpy as np
 from tendonfmu.diagnosis.cause import Cause, Where
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis.effects.words import quantity
+from tendonfmu.diagnosis.names import CONTACT, LOAD, TITLES, UNKNOWN
 from tendonfmu.diagnosis.result import Diagnosis
 
-CONTACT, UNKNOWN = "contact", "unknown"
-LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
-TITLES = {
-    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
-    CONTACT: "something touches the finger, or stops it",
-    UNKNOWN: "something that no effect on the list explains",
-}
 _EXPLANATIONS = {
     LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
     "cannot cause that. Look whether something touches or pulls the finger, and what the sensors show without a "
     "tendon. At run time the bias follows it.",
     CONTACT: "In some stretches a torque appears and disappears that no friction explains. They are left out of the "
     "fit. The gain is the share of the error on the training recordings that leaving them out removes.",
-    UNKNOWN: "Part of the remaining error can be predicted from what was recorded, but it has the shape of no effect "
-    "on the list. The gain is the share of the error in unseen stretches that predicting it removes.",
+    UNKNOWN: "Part of the remaining error follows the recorded signals, but no effect on the list has its shape. The "
+    "gain is how much smaller the error on test data would be without it.",
 }
 LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found
 LEAST_PEAK = 6.0  # least peak of a contact, in rms of what the extended model leaves

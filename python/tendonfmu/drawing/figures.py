@@ -90,6 +90,7 @@ def dark_colours() -> Markup:
             for use in ("stroke", "fill")
         ]
         rules.append(f'.keys [style*="{light}"] {{ color: {dark} !important; }}')
+        rules += [f'.finger [{use}="{light}"] {{ {use}: {dark}; }}' for use in ("stroke", "fill")]
     return Markup("\n".join(rules))
 
 

@@ -17,12 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
-from tendonfmu.drawing.panel import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, PURPLE, SKIN, SKY
+from tendonfmu.drawing.panel import BLUE, DARK, GREY, LIGHT, SKIN
 from tendonfmu.errors import InternalError
-from tendonfmu.model import DrawnTendon, FingerDrawing
-
-EDGE_RED = "#CC1F1A"
-TENDON_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#5A5A5A", "#332288", "#999933")
+from tendonfmu.model import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing
 
 PICTURE_DPI, ICON_DPI = 130, 26
 TERMINAL_PIXELS = 32

@@ -30,6 +30,10 @@ IN_DARK = {
     VERMILION: "#F0803C",
     GREEN: "#2FC79B",
     "#BDBDBD": "#7C858E",
+    "#5A5A5A": "#B9BFC6",
+    "#332288": "#A495F5",
+    "#999933": "#C4C45A",
+    "#CC1F1A": "#FF6B62",
 }
 
 SIZES: Mapping[Size, tuple[int, int]] = {  # CSS pixels

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -64,9 +64,12 @@ class Excitation:
     tension: Numbers  # tensions [N, m] (N) that balance each other
     pretension: Numbers  # their mean [N] (N)
     tendon_position: Numbers  # motor side x0 [N, m] (m) that holds the posture at that tension without friction
-    knots: list[Numbers]  # for each joint [k, 4]: time, position, velocity, acceleration
-    strokes: list[list[Stroke]]  # strokes of each joint
-    blocks: list[tuple[float, float, float]]  # begin (s), end (s) and pretension (N) of each block
+    # for each joint [k, 4]: time, position, velocity, acceleration
+    knots: list[Numbers] = field(default_factory=list)
+    strokes: list[list[Stroke]] = field(default_factory=list)  # strokes of each joint
+    # begin (s), end (s) and pretension (N) of each block
+    blocks: list[tuple[float, float, float]] = field(default_factory=list)
+    load: Numbers = field(default_factory=lambda: np.zeros((0, 0)))  # known load at the joints [N, n] (N·m)
 
     def columns(self) -> dict[str, Numbers]:
         """Return the columns of the motion's file."""

@@ -163,7 +163,7 @@ def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
     from tendonfmu.model import finger_drawing
 
     picture, icon = io.BytesIO(), io.BytesIO()
-    draw_finger(finger_drawing(finger), picture, icon)
+    draw_finger(finger_drawing(finger.data), picture, icon)
     return {"model.png": picture.getvalue()}, icon.getvalue()
 
 

@@ -18,7 +18,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.files import counted, write_text
 from tendonfmu.model import native
 from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
-from tendonfmu.model.routing_geometry import finger_drawing, finger_html
+from tendonfmu.model.routing_svg import finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
 FORMAT = "tendonfmu-finger-1"
@@ -144,7 +144,7 @@ class Finger:
         return _summary_lines(count(self))
 
     def _repr_html_(self) -> str:
-        return finger_html(self.summary(), finger_drawing(self))
+        return finger_html(self.summary(), self.data)
 
 
 FingerSource = Finger | Mapping[str, Any] | str | os.PathLike[str]

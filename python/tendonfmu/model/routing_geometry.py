@@ -7,14 +7,13 @@ early run inside, so that they do not cross those that continue.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.files import html_template
+from tendonfmu.arrays import Data
 
 JOINT_SPACING = 2.5
 HUB_RADIUS = 0.32  # of the disc that stands for a joint
@@ -26,26 +25,10 @@ MARGIN = 0.2  # of the finger's outline around its tendons
 SPRING_LENGTH = 0.9
 BASE = 1.9  # from the springs to the first joint
 LABEL_SPACING = 0.3
-# of the small picture in a notebook: px per unit of the drawing, and the colours of the tendons in their order
-_SCALE = 26.0
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#5A5A5A", "#332288", "#999933")
+EDGE_RED = "#CC1F1A"
+TENDON_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#5A5A5A", "#332288", "#999933")
 
 Points = NDArray[np.float64]
-
-
-class Described(Protocol):
-    """What is read here of a `Finger`."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def joint_names(self) -> list[str]: ...
-    @property
-    def tendon_names(self) -> list[str]: ...
-    @property
-    def moment_arms(self) -> list[list[float]]: ...
-    @property
-    def data(self) -> Mapping[str, Any]: ...
 
 
 @dataclass(frozen=True)
@@ -74,7 +57,6 @@ class DrawnTendon:
 class FingerDrawing:
     """Geometry of a whole finger."""
 
-    name: str  # name of the finger
     joints: list[DrawnJoint]  # what is drawn of them
     links: Points  # [n, 2] x of begin and end of the link behind each joint
     outline: Points  # [k, 3] x, lower and upper side of the finger around its tendons
@@ -84,21 +66,21 @@ class FingerDrawing:
     height: float
 
 
-def finger_drawing(description: Described) -> FingerDrawing:
-    """Compute the geometry of a finger."""
-    R: Points = np.array(description.moment_arms)
+def finger_drawing(data: Data) -> FingerDrawing:
+    """Compute the geometry of a finger from its description."""
+    R = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
+    joint_names, tendon_names = (_names(data[f"{kind}s"], kind) for kind in ("joint", "tendon"))
     heights = _heights(R)
     x: Points = JOINT_SPACING * np.arange(float(R.shape[1]))
     starts = _starts(heights)
     tip = float(x[-1] + 0.75 * JOINT_SPACING)
     outline = _outline(x, heights, tip)
-    joints = [DrawnJoint(name, float(x[j]), HUB_RADIUS) for j, name in enumerate(description.joint_names)]
+    joints = [DrawnJoint(name, float(x[j]), HUB_RADIUS) for j, name in enumerate(joint_names)]
     tendons = [
         _tendon(tendon, name, x, R[i], heights[i], float(starts[i]))
-        for i, (tendon, name) in enumerate(zip(description.data["tendons"], description.tendon_names, strict=True))
+        for i, (tendon, name) in enumerate(zip(data["tendons"], tendon_names, strict=True))
     ]
     return FingerDrawing(
-        name=description.name,
         joints=joints,
         links=np.column_stack([x, np.append(x[1:], tip - 2.0 * MARGIN)]),
         outline=outline,
@@ -107,6 +89,10 @@ def finger_drawing(description: Described) -> FingerDrawing:
         right=tip + MARGIN,
         height=float(max(np.abs(outline[:, 1:]).max(), np.abs(starts).max() + LABEL_SPACING)),
     )
+
+
+def _names(parts: Sequence[Data], kind: str) -> list[str]:
+    return [str(part.get("name") or f"{kind} {k}") for k, part in enumerate(parts, start=1)]
 
 
 def _outline(x: Points, heights: Points, tip: float) -> Points:
@@ -200,45 +186,3 @@ def _spring(height: float) -> Points:
     share = np.linspace(0.0, 1.0, 12)
     swing = np.array([0.0, 0.0, *[0.07, -0.07] * 4, 0.0, 0.0])
     return np.column_stack([-BASE - SPRING_LENGTH * (1.0 - share), height + swing])
-
-
-# --- in a notebook ---------------------------------------------------------------------------------------------------
-
-
-def finger_html(lines: Sequence[str], drawing: FingerDrawing) -> str:
-    """Return a finger as an HTML element."""
-    rows = [(name.rstrip(), value) for name, _, value in (line.partition("  ") for line in lines[1:])]
-    tendons = [
-        {
-            "name": tendon.name,
-            "colour": _COLOURS[i % len(_COLOURS)],
-            "line": _path(drawing, (*tendon.spring[:1], *tendon.line)),
-            "dashed": tendon.bidirectional,
-            "marks": [*_marks(drawing, tendon.pulleys, "white"), *_marks(drawing, tendon.edges, "#CC1F1A")],
-        }
-        for i, tendon in enumerate(drawing.tendons)
-    ]
-    joints = [(*_at(drawing, (joint.x, 0.0)), _SCALE * joint.radius, joint.name) for joint in drawing.joints]
-    outline = [(x, low) for x, low, _ in drawing.outline] + [(x, high) for x, _, high in drawing.outline[::-1]]
-    return html_template("finger.html.jinja").render(
-        title=lines[0],
-        rows=[(name, value.strip()) for name, value in rows],
-        width=round(_SCALE * (drawing.right - drawing.left)),
-        height=round(2 * _SCALE * drawing.height),
-        outline=_path(drawing, outline),
-        joints=joints,
-        tendons=tendons,
-    )
-
-
-def _at(drawing: FingerDrawing, point: Sequence[float]) -> tuple[float, float]:
-    """Return a point in px from the top left."""
-    return round(_SCALE * (point[0] - drawing.left), 1), round(_SCALE * (drawing.height - point[1]), 1)
-
-
-def _path(drawing: FingerDrawing, points: Iterable[Sequence[float]]) -> str:
-    return " ".join("{:g},{:g}".format(*_at(drawing, point)) for point in points if np.isfinite(point).all())
-
-
-def _marks(drawing: FingerDrawing, points: Points, colour: str) -> list[tuple[float, float, str]]:
-    return [(*_at(drawing, point), colour) for point in points]

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, ResidualView
+from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
 from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_text import Names, at_place, names_of, unit_of
+from tendonfmu.report.diagnosis_text import names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
 from tendonfmu.report.numbers import capital, unit_text, with_ends
 

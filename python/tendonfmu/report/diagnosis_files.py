@@ -25,6 +25,7 @@ from tendonfmu.diagnosis import (
     Experiment,
     ResidualView,
     Where,
+    at_place,
     reported_causes,
 )
 from tendonfmu.errors import OutputError, own_fault
@@ -40,7 +41,7 @@ from tendonfmu.files import (
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page
-from tendonfmu.report.diagnosis_text import at_place, names_of
+from tendonfmu.report.diagnosis_text import names_of
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import uninterrupted
@@ -133,7 +134,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
         folder / REPORT: "the same numbers",
         folder / EXTENDED: f"the finger with {added}, fitted",
         folder / EXTENDED_FMU: "the same as an FMU",
-        folder / NOMINAL: "the given structure, fitted",
+        folder / NOMINAL: "the given model, fitted",
     }
     write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
     return files

@@ -11,15 +11,17 @@ from tendonfmu.diagnosis import (
     Cause,
     DetectionGain,
     Diagnosis,
+    Names,
+    at_place,
     reported_causes,
     size_at,
     thresholds,
+    title_of,
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
+from tendonfmu.report.diagnosis_finger import finger_figure
 from tendonfmu.report.diagnosis_text import (
-    Names,
-    at_place,
     change_rows,
     confusion_sentence,
     error_rows,
@@ -34,7 +36,6 @@ from tendonfmu.report.diagnosis_text import (
     next_sentence,
     place_rows,
     tested_sentence,
-    title_of,
     too_small_sentence,
     unit_of,
     unseen,
@@ -69,6 +70,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         words=words_of(diagnosis.kind),
         unit=unit,
         first=_first_screen(diagnosis, names),
+        finger=finger_figure(diagnosis),
         fall=waterfall_of(diagnosis, names),
         cards=cards_of(diagnosis, names),
         too_small=_too_small(diagnosis, names),
@@ -109,22 +111,21 @@ def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
 def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
     words, (factor, unit) = words_of(diagnosis.kind), unit_of(diagnosis)
     before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
-    data = "held-out parts" if diagnosis.held_out else "unseen data"
     if diagnosis.causes:
         yield Tile(
             f"{before} → {after}",
             unit,
-            f"error on {data}, all joints, with the {words.nominal} and the {words.extended}",
+            f"error on test data, all joints, with the {words.nominal} and the {words.extended}",
         )
         low, high = percent(diagnosis.gain.low).split("\u00a0")[0], percent(diagnosis.gain.high)
         yield Tile(percent(diagnosis.gain.value), "", f"less error, 95 % interval {low} to {high}")
     else:
-        yield Tile(before, unit, f"error on {data}, all joints")
+        yield Tile(before, unit, "error on test data, all joints")
     if left := left_of(diagnosis):
-        noise = "that nothing recorded predicts" if left.memory else "is noise: nothing recorded predicts it"
-        yield Tile(left.text(left.noise), unit, f"of what is left {noise}")
+        noise = ":" if left.memory else " is noise:"
+        yield Tile(left.text(left.noise), unit, f"of what remains{noise} no recorded signal predicts it")
         if left.predictable > 0.0:
-            yield Tile(left.text(left.predictable), unit, f"of what is left {words.no_name}")
+            yield Tile(left.text(left.predictable), unit, f"of what remains {words.no_name}")
 
 
 def _untold(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
@@ -138,14 +139,14 @@ def _experiment(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
     plan = diagnosis.experiment
     for one, other in plan.separates[:_MOST]:
         first, second = (at_place(title_of(each.effect), each, names) for each in (one, other))
-        yield f"Distinguishes: {first}; from {second}."
+        yield f"It distinguishes: {first}; and {second}."
     if len(plan.separates) > _MOST:
         yield f"And {counted(len(plan.separates) - _MOST, 'more pair')}."
     if plan.makes_visible:
         titles = dict.fromkeys(title_of(where.effect) for where in plan.makes_visible)
-        yield f"Makes visible: {'; '.join(titles)}."
+        yield f"It shows: {'; '.join(titles)}."
     if plan.distance > 0:
-        yield f"Each of them then stands out by {plan.distance:.2g} times the noise or more."
+        yield f"Each is expected to be at least {plan.distance:.2g} times as large as the noise."
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -235,7 +236,7 @@ def _detection(gain: DetectionGain, factor: float, unit: str) -> dict[str, Any]:
 def _recordings(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     """List the recordings as (name, what it was used for)."""
     now = "now, " if diagnosis.kind == "change" else ""
-    training = "training, parts held out" if diagnosis.held_out else "training"
+    training = "training, and parts of it for testing" if diagnosis.held_out else "training"
     yield from ((name, "reference") for name in diagnosis.references)
     yield from ((name, now + training) for name in diagnosis.recordings)
     yield from ((name, "test") for name in diagnosis.tests)
@@ -249,7 +250,7 @@ def _method(diagnosis: Diagnosis) -> Iterator[str]:
         yield text
     if diagnosis.repeated:
         yield f"{counted(diagnosis.repeated, 'motion')} of the reference, made again, were compared sample by sample."
-    yield f"The gain was measured on {unseen(diagnosis)}, by running both models. Seed {diagnosis.seed}."
+    yield f"The gain was measured on {unseen(diagnosis)}, by running both models there. Seed {diagnosis.seed}."
 
 
 # --- how much error each cause takes away -----------------------------------------------------------------------------
@@ -315,7 +316,7 @@ def _steps(diagnosis: Diagnosis, names: Names, steps: list[float], widest: float
     parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
     if noise is not None:
         parts = (part("noise", 0.0, noise), part("predictable", noise, steps[-1]))
-    label = "what is left" if diagnosis.causes else "error of the model"
+    label = "what remains" if diagnosis.causes else "error of the model"
     yield Step(label, f"{shown[-1]:.{digits}f}", parts)
 
 

@@ -18,9 +18,13 @@ from tendonfmu.diagnosis import (
     CausePlace,
     Diagnosis,
     Invisible,
-    Where,
+    Names,
+    at_place,
+    names_in,
+    numbered,
     quantity,
     reported_causes,
+    title_of,
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_words import words_of
@@ -39,58 +43,13 @@ from tendonfmu.statistics import Interval
 
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 _MOST_PLACES = 4  # listed at most
-_TOLD = 2  # invisible effects described one by one; more share a sentence
-_PLACED = 4  # of which so many are listed with their places
+_PLACED = 4  # so many invisible effects are listed with their places
 _FALLEN = math.exp(-1.0)  # a correlation that has fallen to this is over, as that of one time constant
-
-
-@dataclass(frozen=True)
-class Names:
-    """Names of joints and tendons."""
-
-    joints: tuple[str, ...]  # as in the description; empty where it has none
-    tendons: tuple[str, ...]
-
-    def place(self, where: Where) -> str:
-        """Name a place, such as "joint 2 (pip), tendon 1 (fdp)"; empty for the whole finger."""
-        parts = (("joint", where.joint, self.joints), ("tendon", where.tendon, self.tendons))
-        return ", ".join(_numbered(kind, number, names) for kind, number, names in parts if number is not None)
-
-    def joint(self, number: int) -> str:
-        """Name a joint by its number (from 1), such as "joint 2 (pip)"."""
-        return _numbered("joint", number, self.joints)
-
-    def places(self, cause: Cause) -> str:
-        """Name the place of a cause, or count its places; "everywhere" for the whole finger."""
-        place = self.place(cause.where)
-        several = counted(len(cause.places), "place") if len(cause.places) > 1 else ""
-        return ", ".join(each for each in (place, several) if each) or "everywhere"
-
-
-def _numbered(kind: str, number: int, names: Sequence[str]) -> str:
-    name = names[number - 1] if 0 < number <= len(names) else ""
-    plain = f"{kind} {number}"
-    return plain if name.replace("_", " ").lower() in ("", plain, str(number)) else f"{plain} ({name})"
 
 
 def names_of(diagnosis: Diagnosis) -> Names:
     """Return the names of joints and tendons from the fitted description."""
-    kinds = (diagnosis.nominal_data["joints"], diagnosis.nominal_data["tendons"])
-    return Names(*(tuple(str(part.get("name") or "") for part in parts) for parts in kinds))
-
-
-def title_of(effect: str) -> str:
-    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
-    from tendonfmu.diagnosis import CANDIDATES
-
-    titles = {candidate.name: candidate.title for candidate in CANDIDATES} | TITLES
-    return titles.get(effect, effect.replace("_", " "))
-
-
-def at_place(title: str, where: Where, names: Names) -> str:
-    """Add the place to a title, such as "friction grows with the force, at joint 1 (mcp)"."""
-    place = names.place(where)
-    return f"{title}, at {place}" if place else title
+    return names_in(diagnosis.nominal_data)
 
 
 def unit_of(diagnosis: Diagnosis) -> tuple[float, str]:
@@ -131,7 +90,7 @@ def _memory(diagnosis: Diagnosis) -> str:
     if not times:
         return ""
     longest = max(times)
-    return f"{1e3 * longest:.2g} ms" if longest < math.inf else f"{views[0].x[-1]:.2g} s or more"
+    return f"{float(f'{1e3 * longest:.2g}'):g} ms" if longest < math.inf else f"{views[0].x[-1]:.2g} s or more"
 
 
 def _time_to_fall(lag: Numbers, correlation: Numbers) -> float:
@@ -168,19 +127,16 @@ def error_sentence(diagnosis: Diagnosis) -> str:
     """Return a sentence on the error on unseen data."""
     factor, unit = unit_of(diagnosis)
     nominal, extended = (together(each.test_rms) for each in (diagnosis.nominal, diagnosis.extended))
-    where = unseen(diagnosis)
+    text = f"On {unseen(diagnosis)} the error{words_of(diagnosis.kind).error}"
     if diagnosis.causes:
-        text = (
-            f"On {where} the error{words_of(diagnosis.kind).error} falls from {rounded(factor * nominal)} to "
-            f"{rounded(factor * extended)} {unit} rms, "
-            f"by {percent_interval(diagnosis.gain)}"
-        )
+        fall = f"from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} (rms)"
+        text += f" falls {fall}, by {percent_interval(diagnosis.gain)}."
     else:
-        text = f"On {where} the error{words_of(diagnosis.kind).error} is {rounded(factor * nominal)} {unit} rms"
+        text += f" is {rounded(factor * nominal)} {unit} (rms)."
     bias = together(diagnosis.bias_only_rms)
     if math.isfinite(bias):
-        text += f"; without any friction model it would be {rounded(factor * bias)}"
-    return f"{text}."
+        text += f" Without any friction model it would be {rounded(factor * bias)} {unit}."
+    return text
 
 
 def left_sentence(diagnosis: Diagnosis) -> str:
@@ -188,15 +144,14 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     left, (_, unit) = left_of(diagnosis), unit_of(diagnosis)
     if left is None:
         return ""
-    whole = f"{left.text(left.whole)} {unit} are left" + (f", correlated over {left.memory}" if left.memory else "")
+    noise = f"although it is correlated over {left.memory}" if left.memory else "so it is noise to these sensors"
     if left.predictable <= 0.0:
-        noise = "" if left.memory else ": to these sensors it is noise"
-        return f"{whole}. Nothing that was recorded predicts any of it{noise}."
-    rest = "nothing that was recorded predicts" if left.memory else "is noise to these sensors"
-    little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else ", and is too little to matter"
+        return f"{left.text(left.whole)} {unit} remain. No recorded signal predicts any of it, {noise}."
+    little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else "; it is too small to matter"
     return (
-        f"{whole}. {left.text(left.predictable)} of it {words_of(diagnosis.kind).no_name}{little}; "
-        f"the rest, {left.text(left.noise)}, {rest}."
+        f"{left.text(left.whole)} {unit} remain. {left.text(left.predictable)} {unit} of it "
+        f"{words_of(diagnosis.kind).no_name}{little}. No recorded signal predicts the other {left.text(left.noise)} "
+        f"{unit}, {noise}."
     )
 
 
@@ -214,8 +169,8 @@ def too_small_sentence(diagnosis: Diagnosis) -> str:
 def unseen(diagnosis: Diagnosis) -> str:
     """Name the data on which the gain was measured."""
     if diagnosis.held_out:
-        return "parts of the recordings that were held out"
-    return "a recording that it has not seen" if len(diagnosis.tests) == 1 else "recordings that it has not seen"
+        return "parts of the recordings that were kept for testing"
+    return "the test recording" if len(diagnosis.tests) == 1 else "the test recordings"
 
 
 def tested_sentence(diagnosis: Diagnosis) -> str:
@@ -223,8 +178,8 @@ def tested_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.tested:
         return ""
     return (
-        f"{diagnosis.tested} candidate causes were tested. A p-value is the probability that the strongest of them "
-        "looks like this by chance if nothing is missing."
+        f"{diagnosis.tested} candidate causes were tested. p is the probability that chance alone makes the strongest "
+        "of them look like this."
     )
 
 
@@ -233,7 +188,7 @@ def confusion_sentence(cause: Cause, names: Names) -> str:
     if not cause.confusable_with:
         return ""
     others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
-    return f"These data cannot distinguish it from: {'; '.join(others)}."
+    return f"These recordings cannot distinguish it from: {'; '.join(others)}."
 
 
 @dataclass(frozen=True)
@@ -242,8 +197,7 @@ class Hidden:
 
     title: str  # the effect and its places, in plain words
     places: str
-    why: str  # sentence: what hides it where it comes nearest to being visible
-    # there: the share that survives the refit, and what an ordinary size would raise the error by; None for a change
+    # at its first place: the share that survives the refit, and the change of the error at its ordinary size
     share: float
     gain: float | None
     absorbed: bool  # whether refitting absorbs it everywhere
@@ -263,47 +217,28 @@ def hidden(diagnosis: Diagnosis, names: Names) -> list[Hidden]:
         if len(places) > _MOST_PLACES:
             text = f"{len(places)} places, such as {places[0]}"
         share, gain = best.surviving_share, best.ordinary_gain
-        effects.append(Hidden(best.title, text, _why_hidden(best), share, gain, best.absorbed, best.experiment))
+        effects.append(Hidden(best.title, text, share, gain, best.absorbed, best.experiment))
     return effects
 
 
-def _why_hidden(effect: Invisible) -> str:
-    if effect.absorbed or effect.ordinary_gain is None:
-        return f"Refitting absorbs it; {percent(effect.surviving_share)} would be left."
-    gain = percent(effect.ordinary_gain)
-    limit = "" if effect.needed_gain is None else f": it takes {percent(effect.needed_gain)}"
-    return f"One of ordinary size would raise the error by {gain}, too little to be a cause{limit}."
-
-
 def hidden_sentences(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
-    """Describe what these data cannot show: up to `_TOLD` effects with an experiment each, more in one sentence."""
+    """Describe what these data cannot show: what refitting absorbs, and what would have to be larger than usual."""
     effects = hidden(diagnosis, names)
-    if len(effects) > _TOLD:
-        absorbs = "what is shared with the reference" if diagnosis.kind == "change" else "refitting"
-        absorbed = [effect for effect in effects if effect.absorbed]
-        small = [effect for effect in effects if not effect.absorbed]
-        if absorbed:
-            since = f"since {absorbs} absorbs {'it' if len(absorbed) == 1 else 'them'}"
-            yield f"{_effects_are(absorbed)} not visible in these data, {since}: {_listed(absorbed)}."
-        if small:
-            yield f"{_effects_are(small)} visible only if larger than usual{_limit(diagnosis)}: {_listed(small)}."
-        return
-    for effect in effects:
-        place = f", at {effect.places}" if effect.places else ""
-        what, _, _ = effect.experiment.partition(":")  # what to do; the table on the page says what it shows
-        experiment = f" To see it: {what[0].lower()}{what[1:].rstrip('.')}." if what else ""
-        if what.startswith("No "):
-            experiment = f" {what.rstrip('.')}."
-        yield f"Not visible in these data: {effect.title}{place}. {effect.why}{experiment}"
+    change = diagnosis.kind == "change"
+    hides = "what both recordings share hides" if change else "other numbers of the model imitate"
+    absorbed = [effect for effect in effects if effect.absorbed]
+    small = [effect for effect in effects if not effect.absorbed]
+    if absorbed:
+        because = f"because {hides} {'it' if len(absorbed) == 1 else 'them'}"
+        yield f"These recordings cannot show {counted(len(absorbed), 'effect')}, {because}: {_listed(absorbed)}."
+    if small:
+        what = f"{counted(len(small), 'effect')} only if larger than usual{_limit(diagnosis)}"
+        yield f"These recordings can show {what}: {_listed(small)}."
 
 
 def _limit(diagnosis: Diagnosis) -> str:
     needed = [each.needed_gain for each in diagnosis.invisible if each.needed_gain is not None and not each.absorbed]
-    return f" (a cause has to lower the error by {percent(max(needed))})" if needed else ""
-
-
-def _effects_are(effects: Sequence[Hidden]) -> str:
-    return f"{counted(len(effects), 'effect')} {'is' if len(effects) == 1 else 'are'}"
+    return f" (each must change the error by at least {percent(max(needed))})" if needed else ""
 
 
 def _listed(effects: Sequence[Hidden]) -> str:
@@ -315,8 +250,7 @@ def _listed(effects: Sequence[Hidden]) -> str:
 def next_sentence(diagnosis: Diagnosis) -> str:
     """Say what to record next."""
     sentence = diagnosis.experiment.sentence.rstrip(".")
-    what = "recording" if diagnosis.kind == "change" else "experiment"
-    return f"{sentence}." if sentence else f"No further {what} is needed: nothing is left to distinguish."
+    return f"{sentence}." if sentence else "No further recording is needed: nothing is left to find out."
 
 
 def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
@@ -330,17 +264,17 @@ def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
         )
     if cause.where.effect == UNKNOWN:
         return "less error if the predictable part were known"
-    return words.own_gain + (f"; the other {words.one}s kept" if len(diagnosis.causes) > 1 else "")
+    return words.own_gain + (f", with the other {words.one}s in the model" if len(diagnosis.causes) > 1 else "")
 
 
 def own_gain_sentences(diagnosis: Diagnosis) -> Iterator[str]:
-    """Explain the column "own gain" of `tables`: one sentence for all causes whose gain has the same meaning."""
+    """Explain the column "gain" of `tables`: one sentence for all causes whose gain has the same meaning."""
     meanings: dict[str, list[str]] = {}
     for k, cause in enumerate(reported_causes(diagnosis), start=1):
         meanings.setdefault(meaning_of_gain(diagnosis, cause), []).append(str(k))
     for meaning, numbers in meanings.items():
         of = f" of {', '.join(numbers)}" if len(meanings) > 1 else ""
-        yield f"own gain{of}: {meaning}"
+        yield f"gain{of}: {meaning}"
 
 
 # --- printed ----------------------------------------------------------------------------------------------------------
@@ -350,7 +284,7 @@ def tables(diagnosis: Diagnosis) -> Iterator[Table]:
     """List the tables to print: the causes, and the errors by joint."""
     names, causes = names_of(diagnosis), reported_causes(diagnosis)
     if causes:
-        headings: Row = (words_of(diagnosis.kind).one, "place", "size", "own gain", "may also be")
+        headings: Row = (words_of(diagnosis.kind).one, "place", "size", "gain", "may also be")
         rows: list[Row] = [
             (
                 f"{k}. {cause.where.effect}",
@@ -365,8 +299,8 @@ def tables(diagnosis: Diagnosis) -> Iterator[Table]:
     factor, unit = unit_of(diagnosis)
     words = words_of(diagnosis.kind)
     before, after = words.nominal_column, words.extended_column
-    headings = ("joint", "bias only", before, after, f"{before}, test", f"{after}, test", "noise floor")
-    yield f"residual before the bias learns from it, rms in {unit}", headings, error_rows(diagnosis, names, factor)
+    headings = ("joint", "no friction", before, after, f"{before}, test", f"{after}, test", "noise floor")
+    yield f"error by joint, rms in {unit}", headings, error_rows(diagnosis, names, factor)
 
 
 def error_rows(diagnosis: Diagnosis, names: Names, factor: float) -> list[Row]:
@@ -405,11 +339,11 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
         if sentence:
             yield sentence
     if diagnosis.too_small:
-        small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in diagnosis.too_small)
+        small = dict.fromkeys(at_place(each.title, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
-        yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
+        yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
     yield f"estimated from {diagnosis.signals}"
     yield f"next: {next_sentence(diagnosis)}"
 
@@ -425,7 +359,7 @@ def place_rows(cause: Cause, names: Names, sizes: Sequence[str]) -> list[tuple[s
 def _at(kind: str, place: CausePlace, names: Names) -> str:
     number, all_names = (place.joint, names.joints) if kind == "joint" else (place.tendon, names.tendons)
     if number is not None:
-        return _numbered(kind, number, all_names).removeprefix(f"{kind} ")
+        return numbered(kind, number, all_names).removeprefix(f"{kind} ")
     return "all" if place.joint is None and place.tendon is None else "–"
 
 

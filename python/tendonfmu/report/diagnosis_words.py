@@ -36,51 +36,51 @@ class Words:
 
 MODEL = Words(
     one="cause",
-    nominal="nominal model",
+    nominal="given model",
     extended="extended model",
-    nominal_column="nominal",
+    nominal_column="given",
     extended_column="extended",
     headlines={
         "adequate": (
-            "The model is adequate: these data show nothing that it lacks.",
+            "The model is adequate: these recordings show nothing that it lacks.",
             "The model is adequate: one cause was found, but what it explains hardly matters.",
             "The model is adequate: {many} were found, but what they explain hardly matters.",
         ),
         "explained": (
-            "The model is adequate: these data show nothing that it lacks.",
+            "The model is adequate: these recordings show nothing that it lacks.",
             "One cause explains what the model gets wrong.",
             "{Many} together explain what the model gets wrong.",
         ),
         "partly explained": (
-            "The model gets something wrong, and no effect that is known explains it.",
+            "The model gets something wrong, and none of the known effects explains it.",
             "One cause explains part of what the model gets wrong.",
             "{Many} together explain part of what the model gets wrong.",
         ),
         "unexplained": (
-            "The model gets something wrong, and no effect that is known explains it.",
+            "The model gets something wrong, and none of the known effects explains it.",
             "One cause was found, but it explains little of what the model gets wrong.",
             "{Many} were found, but they explain little of what the model gets wrong.",
         ),
     },
     error="",
-    no_name="can be predicted from what was recorded, but has no name",
-    left="left: can be predicted, has no name",
-    small="These effects are visible in the recordings, but on unseen data each removes less than {least} of the "
-    "error, or its gain is not certain. They are not in the extended model.",
+    no_name="follows the recorded signals in a way that no known effect explains",
+    left="remains: follows the signals, not explained",
+    small="These effects are in the recordings, but on test data each lowers the error by less than {least}, or its "
+    "gain is not certain. They are not in the extended model.",
     source="Where the error comes from",
     cause="The cause",
     causes="The causes, in order of gain",
-    method="The given model was fitted first. A cause is an effect that this fit cannot absorb. Every effect was then "
-    "tested at every place where the model lacks it. A cause must remove at least {least} of the error that is left "
-    "without it, on data that it was not fitted to, and its 95 % interval must lie above 0.",
-    residual="Nominal: the given structure with its own numbers refitted.",
-    floor="Noise floor: the part of the extended model's error on {unseen} that a flexible learner without physics "
-    "cannot predict from the recorded signals.",
-    views="The residual at each joint, of the refitted nominal model{and_extended}.",
-    hidden="Nothing: these data would show every effect that was tested, and no cause can be mistaken for another.",
-    own_gain="less error in means of 10 ms, without the slow bias",
+    method="The numbers of the given model were fitted first. A cause is an effect that this fit cannot imitate. Every "
+    "effect was then tested at every place where the model lacks it. A cause must lower the error by at least {least} "
+    "on data that it was not fitted to, and the 95 % interval of this gain must lie above 0.",
+    residual="Given: the model as described, with its numbers refitted.",
+    floor="Noise floor: the part of the extended model's error on {unseen} that no recorded signal predicts. A "
+    "flexible regression without physics measures it.",
+    views="The residual at each joint, of the refitted given model{and_extended}.",
+    hidden="Nothing: these recordings show every effect that was tested, and no cause can be mistaken for another.",
+    own_gain="less error (means of 10 ms, without the slow bias)",
     taken="removed by a cause",
-    refitted="nominal model, refitted",
+    refitted="given model, refitted",
 )
 
 CHANGE = Words(
@@ -101,34 +101,34 @@ CHANGE = Words(
             "{Many} together explain what is different.",
         ),
         "partly explained": (
-            "Something is different, and no effect that is known explains it.",
+            "Something is different, and none of the known effects explains it.",
             "One change explains part of what is different.",
             "{Many} together explain part of what is different.",
         ),
         "unexplained": (
-            "Something is different, and no effect that is known explains it.",
+            "Something is different, and none of the known effects explains it.",
             "One change was found, but it explains little of what is different.",
             "{Many} were found, but they explain little of what is different.",
         ),
     },
     error=" of the model of the reference",
     no_name="the model gets wrong in the reference as well",
-    left="left: wrong in the reference as well",
-    small="These changes are visible, but on unseen parts of the new recordings each removes less than {least} of what "
-    "is left, or its gain is not certain. They are not in the model of now.",
+    left="remains: wrong in the reference as well",
+    small="These changes are in the new recordings, but on test data each lowers the error by less than {least}, or "
+    "its gain is not certain. They are not in the model of now.",
     source="What the change is worth",
     cause="What has changed",
     causes="What has changed, in order of gain",
     method="The model was fitted to the reference. Errors that the reference and the new recordings share are not "
     "attributed to a change. Every number of the model, and every effect that it lacks, was then tested as a change of "
-    "the new recordings alone. A change must remove at least {least} of what is left without it, in parts of the new "
-    "recordings that it was not fitted to, and its 95 % interval must lie above 0. A number that varies as much from "
-    "stretch to stretch of the recordings has not changed.",
+    "the new recordings alone. A change must lower the error by at least {least}, in parts of the new recordings that "
+    "it was not fitted to, and the 95 % interval of this gain must lie above 0. A number that varies as much within "
+    "the reference has not changed.",
     residual="Model of the reference: fitted to the reference, run over the new recordings.",
     floor="Noise floor: the part of the error that the motion cannot predict, without the errors that both recordings "
     "share, in means of 10 ms.",
     views="The residual of the new recordings at each joint, of the model of the reference{and_extended}.",
-    hidden="Nothing: these data would show every change that was tested, and none can be mistaken for another.",
+    hidden="Nothing: these recordings show every change that was tested, and none can be mistaken for another.",
     own_gain="less of the error that only the new recordings have",
     taken="removed by a change",
     refitted="model of the reference",

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.diagnosis import NBSP, History, Line, quantity, share_of
+from tendonfmu.diagnosis import NBSP, History, Line, Names, at_place, quantity, share_of
 from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted, whole_file, write_text
-from tendonfmu.report.diagnosis_text import Names, at_place
 from tendonfmu.report.numbers import Row, capital, percent, unit_text, with_ends
 from tendonfmu.report.page import drawn, render, write_figures
 

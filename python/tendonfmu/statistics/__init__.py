@@ -26,7 +26,18 @@ if TYPE_CHECKING:
     from .paired_gain import BlockIndex, blocks_of, gain_interval
     from .random_numbers import LARGEST_SEED, Draws
     from .spectral_line import Line, find_lines
-    from .splines import KNOTS, TRENDS, Span, Splines, basis, bias_splines, constant_bias, residual_of, without
+    from .splines import (
+        KNOTS,
+        TRENDS,
+        Span,
+        Splines,
+        basis,
+        bias_splines,
+        constant_bias,
+        residual_of,
+        spline_basis,
+        without,
+    )
     from .whitening import Whitener, effective_samples, sample_weights, whitener
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -28,14 +28,16 @@ def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
     blocks = []
     for number in np.unique(series.segment):
         time = series.time[series.segment == number]
-        span = max(float(time[-1] - time[0]), series.step)
-        pieces = max(1, round(span / knots))
-        inner = np.linspace(time[0] - 1e-9, time[0] + span + 1e-9, pieces + 1)
-        width = inner[1] - inner[0]
-        outer = width * np.arange(1, 4)
-        knot = np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer])
-        blocks.append(BSpline.design_matrix(time, knot, 3))
+        blocks.append(spline_basis(time, max(float(time[-1] - time[0]), series.step), knots))
     return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+
+
+def spline_basis(time: Numbers, span: float, knots: float = KNOTS) -> Splines:
+    """Make cubic splines of one stretch without a gap, from its first sample on."""
+    # time: [B] (s); span, knots: (s); returns [B, s]
+    inner = np.linspace(time[0] - 1e-9, time[0] + span + 1e-9, max(1, round(span / knots)) + 1)
+    outer = (inner[1] - inner[0]) * np.arange(1, 4)
+    return BSpline.design_matrix(time, np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer]), 3)
 
 
 def constant_bias(series: BlockSeries) -> Splines:

@@ -12,8 +12,9 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.experiments.menu import Entry, entry_from_json
-from tendonfmu.diagnosis.experiments.motion import Performed, perform
+from tendonfmu.diagnosis.experiments.motion import perform
 from tendonfmu.errors import InputError
+from tendonfmu.excite import Excitation
 
 REPORT = "diagnosis.json"
 FORMAT = "tendonfmu-diagnosis-1"
@@ -27,7 +28,7 @@ class Discrimination:
 
     sentence: str  # what the recording distinguishes
     entry: Entry  # of the menu
-    performed: Performed  # the motion of the entry
+    performed: Excitation  # the motion of the entry
 
     def columns(self) -> dict[str, Numbers]:
         """Return name -> values [N], as `tendonfmu excite` writes a motion."""
@@ -37,7 +38,7 @@ class Discrimination:
         """Yield what the recording distinguishes, how long it takes, and which known load applies at which time."""
         time, load = self.performed.time, self.performed.load
         yield self.sentence
-        yield f"{time[-1]:.0f} s: {self.entry.words}"
+        yield f"motion file: {time[-1]:.0f} s of {self.entry.words}"
         if load.any():
             edges = np.flatnonzero(np.any(np.diff(load, axis=0) != 0, axis=1)) + 1
             for begin, end in zip([0, *edges], [*edges, len(time)], strict=True):
@@ -72,7 +73,7 @@ def discriminating_motion(
     experiment = report.get("experiment") or {}
     motion = experiment.get("motion") or {}
     if not motion:
-        said = report.get("next_experiment") or "nothing is left to distinguish"
+        said = report.get("next_experiment") or "nothing is left to find out"
         raise InputError(f"{folder / REPORT}: no further experiment to plan: {said}")
     try:
         performed = performed_of(data, motion, rate)
@@ -82,7 +83,7 @@ def discriminating_motion(
     return Discrimination(str(experiment.get("sentence") or report.get("next_experiment") or ""), *performed)
 
 
-def performed_of(data: Mapping[str, Any], motion: Mapping[str, Any], rate: float = RATE) -> tuple[Entry, Performed]:
+def performed_of(data: Mapping[str, Any], motion: Mapping[str, Any], rate: float = RATE) -> tuple[Entry, Excitation]:
     """Return the entry and its motion for `result.Experiment.motion`; raises InputError if it is not valid."""
     entry = entry_from_json(motion, len(data["joints"]))
     return entry, perform(data, entry, rate, int(motion.get("seed", 0)))
@@ -101,9 +102,9 @@ def _read_report(path: Path) -> dict[str, Any]:
     return dict(report)
 
 
-def _refuse_beyond(path: Path, performed: Performed, limits: Sequence[tuple[float, float]] | None) -> None:
+def _refuse_beyond(path: Path, performed: Excitation, limits: Sequence[tuple[float, float]] | None) -> None:
     for j, (low, high) in enumerate(limits or (), start=1):
-        least, most = float(performed.position[:, j - 1].min()), float(performed.position[:, j - 1].max())
+        least, most = float(performed.joint_position[:, j - 1].min()), float(performed.joint_position[:, j - 1].max())
         if not low <= least <= most <= high:
             raise InputError(
                 f"{path}: experiment.motion: joint {j} moves from {least:.3g} to {most:.3g} rad; expected within its "

@@ -15,11 +15,13 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.span import Span
 from tendonfmu.errors import InputError
+from tendonfmu.excite import Variation
+from tendonfmu.files import listed
 from tendonfmu.model import moment_arms, pretension_vector
 
 LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded
-SWING = 0.7  # Hz, of tensions; splines of a slow bias follow up to a third of it
+EVERY = 2.0  # s, between changes of the tensions
 WIDER = 1.6  # times the range that was recorded
 SECONDS = 80.0  # s, of an entry
 LONG = 600.0  # s
@@ -40,17 +42,14 @@ class Section:
     max_speed: float  # rad/s
     seconds: float  # duration, s
     pretension: float  # mean, N
-    # frequency at which the tensions swing, Hz, different from tendon to tendon; None for constant tensions
-    swing: float | None = None
-    lowest: float = 0.0  # limits of swinging tensions, N
-    highest: float = 0.0
+    vary: Variation | None = None  # how the tensions change, other for each tendon; None for constant tensions
     load: tuple[float, ...] = ()  # known load at the joints, N·m [n]
     max_acceleration: float = 10.0  # rad/s²
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One entry of the menu; `motion`, `tension` and `load` are words for a sentence, "" if as recorded."""
+    """One entry of the menu; `motion`, `tension` and `load` continue "Record 80 s of"; "" if as recorded."""
 
     motion: str
     sections: tuple[Section, ...]
@@ -65,6 +64,12 @@ class Entry:
     def words(self) -> str:
         return ", ".join(part for part in (self.motion, self.tension, self.load) if part)
 
+    @property
+    def sentence(self) -> str:
+        """What to record."""
+        length = f"{self.seconds:.0f} s" if self.seconds < 180.0 else f"{self.seconds / 60.0:.0f} min"
+        return f"Record {length} of {self.words}."
+
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
 
@@ -78,6 +83,7 @@ def entry_from_json(value: Mapping[str, Any], joints: int) -> Entry:
                     **section,
                     "ranges": tuple((float(low), float(high)) for low, high in section["ranges"]),
                     "load": tuple(float(torque) for torque in section.get("load") or ()),
+                    "vary": Variation(**section["vary"]) if section.get("vary") else None,
                 }
             )
             for section in value["sections"]
@@ -154,9 +160,7 @@ def motions(recorded: Recorded) -> Iterator[Entry]:
         f"the same kind of motion over {WIDER:g} times the range, if the joints can", (replace(usual, ranges=wide),)
     )
     long = max(LONG, 2 * recorded.seconds)
-    yield Entry(
-        f"the same kind of motion for {long / 60:.0f} min without a pause, from cold", (replace(usual, seconds=long),)
-    )
+    yield Entry("the same kind of motion without a pause, from cold", (replace(usual, seconds=long),))
 
 
 def _as_ranges(ranges: Numbers) -> tuple[tuple[float, float], ...]:
@@ -177,7 +181,11 @@ def _one_at_a_time(recorded: Recorded, usual: Section) -> Entry:
         ranges[j] = recorded.ranges[j]
         alone = replace(usual, ranges=_as_ranges(ranges), seconds=max(SECONDS / len(middle), 16.0))
         sections.append(_long_enough(alone))
-    what = "one joint at a time, the others at rest" if len(middle) > 1 else "the same kind of motion, in two halves"
+    what = (
+        "motion of one joint at a time, with the others at rest"
+        if len(middle) > 1
+        else "the same kind of motion, in two halves"
+    )
     return Entry(what, tuple(sections if len(middle) > 1 else [replace(sections[0], seconds=SECONDS / 2)] * 2))
 
 
@@ -190,7 +198,7 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
         middle = recorded.ranges[:, 0] + share * width
         ranges = np.column_stack([middle - stroke / 2, middle + stroke / 2])
         sections.append(replace(usual, ranges=_as_ranges(ranges), max_speed=speed, seconds=SECONDS / len(_POSTURES)))
-    return Entry(f"small strokes to and fro of {float(stroke.max()):.2g} rad at three postures", tuple(sections))
+    return Entry(f"small strokes of {float(stroke.max()):.2g} rad to and fro, at three postures", tuple(sections))
 
 
 # --- pretensions and loads --------------------------------------------------------------------------------------------
@@ -207,13 +215,13 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
         sections=tuple(
             _shortened(section, len(levels), pretension=level) for level in levels for section in entry.sections
         ),
-        tension="at pretensions of " + ", ".join(f"{level:.3g}" for level in levels[:-1]) + f" and {levels[-1]:.3g} N",
+        tension=f"at pretensions of {listed([f'{level:.3g}' for level in levels])} N",
     )
     low, high = levels[0], levels[-2]
     yield replace(
         entry,
-        sections=tuple(replace(section, swing=SWING, lowest=low, highest=high) for section in entry.sections),
-        tension=f"the tensions swinging about every {1 / SWING:.2g} s between {low:.3g} and {high:.3g} N",
+        sections=tuple(replace(section, vary=Variation(low, high, EVERY)) for section in entry.sections),
+        tension=f"while the tendon forces change every {EVERY:.2g} s between {low:.3g} and {high:.3g} N",
     )
 
 
@@ -221,25 +229,24 @@ def loads(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """Yield the entry with a known load at the joints, on one side and on the other."""
     first = entry.sections[0]
     own = first.pretension * own_tension(data)
-    least = own if first.swing is None else np.minimum(own, first.lowest)
+    least = own if first.vary is None else np.minimum(own, first.vary.lowest)
     largest = known_load(data, least, recorded)
     if not largest.any():
         return
     if _held_by_load(data, recorded):
         sides = [share * largest for share in _SHARES]
-        how = f"of {', '.join(f'{share:g}' for share in _SHARES)} times as much"
+        how = f"and {listed([f'{share:g}' for share in _SHARES if share != 1.0])} times as much"
     else:
         sides = [sign * largest for _ in range(_ALTERNATIONS) for sign in (1.0, -1.0)]
-        how = "on one side and on the other"
+        how = "first one way, then the other"
     sections = tuple(
         _shortened(section, len(sides), load=tuple(load.tolist())) for load in sides for section in entry.sections
     )
-    sizes = ", ".join(f"{value:.2g}" for value in largest)
-    where = "N·m at the joint" if len(largest) == 1 else "N·m at the joints"
+    sizes = listed([f"{value:.2g}" for value in largest])
     yield replace(
         entry,
         sections=sections,
-        load=f"with a known load of {sizes} {where}, {how} (column external_torque)",
+        load=f"with a known load of {sizes} N·m at the joint{'s' * (len(largest) > 1)}, {how} (column external_torque)",
     )
 
 

@@ -16,9 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.sparse import identity
-from scipy.sparse.linalg import splu
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
@@ -26,19 +23,22 @@ from tendonfmu.diagnosis.cause import Where
 from tendonfmu.diagnosis.effects import Candidate, Term
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.names import Names, at_place, names_in
 from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
-from tendonfmu.files import counted
 from tendonfmu.model import NativeError, moment_arms
 from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
-from tendonfmu.statistics import KNOTS, regular_blocks
+from tendonfmu.statistics import Span as SplineSpan
+from tendonfmu.statistics import regular_blocks, spline_basis
 
 Progress = Callable[[int, int], None]
 
 VISIBLE = 0.33  # rms of what is left over that of the noise: about a tenth of its variance, found in 49 of 50 cases
 SHARE = 0.01  # of a cause that survives the refit: a smaller share is not visible, however large the cause is
+NONE = "None of the available experiments can"
+LISTED = 2  # further effects that a sentence names
 _RATE = 50.0  # 1/s, of a predicted recording
 _LEAST_RATE, _MOST_SAMPLES = 10.0, 3200
 _BLOCK = 0.02  # s
@@ -55,6 +55,7 @@ class Question:
 
     cause: Term
     rival: Term | None = None
+    absorbed: bool = False  # whether other numbers of the model explain the cause in the present recordings
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,15 @@ class Experiments:
         return {**self.answers[number].entry.as_json(), "seed": self.seed} if separating else {}
 
     def sentence(self, number: int) -> str:
-        """Return the experiment for one question in plain words."""
-        return _sentence([self.answers[number]]) if self.answers else self.best.sentence
+        """Return what to record for one question; what to look at if no entry of the menu answers it."""
+        if not self.answers:
+            return self.best.sentence
+        answer = self.answers[number]
+        return (
+            answer.entry.sentence
+            if answer.separates
+            else f"{NONE} show it. {answer.question.cause.candidate.explanation}"
+        )
 
 
 def plan_experiments(
@@ -131,14 +139,15 @@ def plan_experiments(
         if progress is not None:
             progress(k + 1, len(first))
     if not scores:
-        return Experiments((), Experiment("No available motion is possible with this finger"))
+        return Experiments((), Experiment("This finger can make none of the available motions."))
     open_ = [q for q in range(len(questions)) if max(answers_of[q].distance for answers_of in scores) < VISIBLE]
     if open_:
         simple = [answers_of for answers_of in scores if not (answers_of[0].entry.tension or answers_of[0].entry.load)]
         motion = max(simple or scores, key=lambda answers_of: sum(answers_of[q].distance for q in open_))[0].entry
         scores += lab.answers_of(combined(data, motion, recorded))
     answers = tuple(_best([answers_of[q] for answers_of in scores]) for q in range(len(questions)))
-    return Experiments(answers, _first_of_all(answers, scores, seed), seed)
+    names = names_in(data)
+    return Experiments(answers, _first_of_all(answers, scores, names, seed), seed)
 
 
 # --- what a recording would show --------------------------------------------------------------------------------------
@@ -244,7 +253,9 @@ class _Laboratory:
             if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place
         ]
         if not proposals:
-            raise InternalError(f"{_described(cause)}: not possible at this place; expected a place of the candidate")
+            raise InternalError(
+                f"{cause.candidate.name}: not possible at this place; expected a place of the candidate"
+            )
         return proposals
 
     def _direction(self, cause: Term) -> Numbers:
@@ -285,16 +296,9 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
 
 def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
     """Return values [B, n, c] without a slow bias: a constant, or cubic splines with the knots of the diagnosis."""
-    flat = values.reshape(len(values), -1)
-    if constant:
-        return np.asarray((flat - flat.mean(axis=0)).reshape(values.shape))
-    span = float(time[-1] - time[0])
-    inner = np.linspace(time[0] - 1e-9, time[-1] + 1e-9, max(1, round(span / KNOTS)) + 1)
-    outer = (inner[1] - inner[0]) * np.arange(1, 4)
-    knots = np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer])
-    splines = BSpline.design_matrix(time, knots, 3)
-    known = splu((splines.T @ splines + 1e-12 * identity(splines.shape[1])).tocsc())
-    return np.asarray((flat - splines @ known.solve(splines.T @ flat)).reshape(values.shape))
+    splines = np.ones((len(time), 1)) if constant else spline_basis(time, float(time[-1] - time[0]))
+    flat = SplineSpan(splines).without(values.reshape(len(values), -1))
+    return flat.reshape(values.shape)
 
 
 def _asked(questions: Sequence[Question]) -> list[Term]:
@@ -364,7 +368,7 @@ def _best(answers: Sequence[Answer]) -> Answer:
     return next(answer for answer in able if answer.distance >= _SIMPLER * largest)
 
 
-def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], seed: int) -> Experiment:
+def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]], names: Names, seed: int) -> Experiment:
     """Return the entry that distinguishes most pairs of causes, then shows most effects, and is simplest."""
 
     def separated_by(answers_of: Sequence[Answer]) -> tuple[int, int]:
@@ -379,9 +383,9 @@ def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]],
             chosen, (pairs, count) = answers_of, separated_by(answers_of)
     separating = [answer for answer in chosen if answer.separates]
     if not separating:
-        return Experiment(_sentence([max(answers, key=lambda answer: answer.distance)]))
+        return Experiment(_sentence([max(answers, key=lambda answer: answer.distance)], names))
     return Experiment(
-        sentence=_sentence(separating),
+        sentence=_sentence(separating, names),
         separates=tuple(
             (answer.where, _where(answer.question.rival)) for answer in separating if answer.question.rival is not None
         ),
@@ -391,35 +395,28 @@ def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]],
     )
 
 
-def _sentence(separating: Sequence[Answer]) -> str:
-    """Put the first of the answers of one entry into words."""
-    first = separating[0]
-    cause, rival = _described(first.question.cause), first.question.rival
+def _sentence(separating: Sequence[Answer], names: Names) -> str:
+    """Say what to record for the first of the answers of one entry, and what one will know then."""
+    first, *others = separating
+    shown, rival = first.question.cause, first.question.rival
+    what = "; and ".join(_described(cause, names) for cause in (shown, rival) if cause is not None)
     if not first.separates:
-        what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
-        return (
-            f"No available experiment can distinguish {what}: at best {_times(first.distance)} the noise "
-            f"is left of it. {first.question.cause.candidate.explanation}"
-        )
-    what = f"{cause} from {_described(rival)}" if rival is not None else f"{cause} from the model's own numbers"
-    apart = "the predictions then differ by" if rival is not None else "an ordinary effect then leaves"
-    more = len(separating) - 1
-    others = f". It also answers {counted(more, 'more such question')}" if more else ""
-    return (
-        f"Record {first.entry.words}: it distinguishes {what}; {apart} {_times(first.distance)} the noise, now "
-        f"{_times(first.now)}{others}"
-    )
+        verb = "show this" if rival is None else "distinguish these two"
+        return f"{NONE} {verb}: {what}. {shown.candidate.explanation}"
+    if rival is not None:
+        purpose = f"It distinguishes two causes that look alike in the present recordings: {what}."
+    else:
+        hides = "other numbers of the model imitate it" if first.question.absorbed else "the noise hides it"
+        purpose = f"Then this would show: {what}. In the present recordings {hides}."
+    titles = dict.fromkeys(answer.question.cause.candidate.title for answer in others)
+    more = [title for title in titles if title not in what]
+    rest = [f"{len(more) - LISTED} more"] * (len(more) > LISTED)
+    also = f" It also helps with: {'; '.join([*more[:LISTED], *rest])}." if more else ""
+    return f"{first.entry.sentence} {purpose}{also}"
 
 
-def _times(distance: float) -> str:
-    return f"{distance:.2g} times"
-
-
-def _described(cause: Term) -> str:
-    joint, tendon = cause.place.joint, cause.place.tendon
-    parts = [f"tendon {tendon}"] * (tendon is not None) + [f"joint {joint}"] * (joint is not None)
-    name = cause.candidate.name.replace("_", " ")
-    return f"{name} of {' at '.join(parts)}" if parts else name
+def _described(cause: Term, names: Names) -> str:
+    return at_place(cause.candidate.title, _where(cause), names)
 
 
 def _where(cause: Term) -> Where:
