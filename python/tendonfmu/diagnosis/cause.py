@@ -114,6 +114,8 @@ class Cause:
         Pictures of the residual with and without the cause.
     changed
         For a change: the size in the reference and now.
+    experiment
+        Of an uncertain cause: the recording that would settle it.
     """
 
     where: Where
@@ -127,6 +129,7 @@ class Cause:
     places: tuple[CausePlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()
     changed: ChangedSize | None = None
+    experiment: str = ""
     # what it adds to a description, place by place; of a candidate, for magnitudes of 1; none for a number of its own
     terms: tuple[Term, ...] = ()
     direction: Direction = field(default=_NOWHERE, compare=False)

@@ -163,6 +163,9 @@ def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, A
         **_fields(diagnosis, "noise_floor", "gain"),
         "causes": [_cause(cause, diagnosis.kind) for cause in reported_causes(diagnosis)],
         "too_small": [_cause(cause, diagnosis.kind) for cause in diagnosis.too_small],
+        "uncertain": [
+            _cause(cause, diagnosis.kind) | {"experiment": cause.experiment} for cause in diagnosis.uncertain
+        ],
         "unexplained": _fields(diagnosis.unexplained, "share", "description", "by_joint", "gain"),
         "next_experiment": diagnosis.experiment.sentence,
         "waterfall": _waterfall(diagnosis),

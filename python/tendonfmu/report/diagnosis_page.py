@@ -72,6 +72,10 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         fall=waterfall_of(diagnosis, names),
         cards=cards_of(diagnosis, names),
         too_small=_too_small(diagnosis, names),
+        uncertain=[
+            (capital(cause.title), names.places(cause), percent_interval(cause.gain), capital(cause.experiment))
+            for cause in diagnosis.uncertain
+        ],
         errors=_errors(diagnosis, names, factor),
         events=_events(diagnosis, names, factor),
         detection=None if diagnosis.detection is None else _detection(diagnosis.detection, factor, unit),

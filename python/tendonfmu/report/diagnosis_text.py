@@ -407,6 +407,9 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.too_small:
         small = dict.fromkeys(at_place(each.where.effect, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
+    for cause in diagnosis.uncertain:
+        less = f"less error {percent_interval(cause.gain)}"
+        yield f"uncertain: {at_place(cause.title, cause.where, names)}, {less}; to settle it: {cause.experiment}"
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
         yield f"left out: {event.recording}, {event.start:.2f} to {event.end:.2f} s: {event.description}"

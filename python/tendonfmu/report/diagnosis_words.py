@@ -21,6 +21,7 @@ class Words:
     no_name: str  # the part of the remaining error that is not noise: in a sentence, and in a legend
     left: str
     small: str  # sentences
+    uncertain: str
     source: str  # headings
     cause: str
     causes: str
@@ -66,7 +67,9 @@ MODEL = Words(
     no_name="can be predicted from what was recorded, but has no name",
     left="left: can be predicted, has no name",
     small="These effects are visible in the recordings, but on unseen data each removes less than {least} of the "
-    "error, or its gain is not certain. They are not in the extended model.",
+    "error. They are not in the extended model.",
+    uncertain="These effects are visible in the recordings, but unseen data do not show whether they matter: their "
+    "gain may be 0. They are not in the extended model.",
     source="Where the error comes from",
     cause="The cause",
     causes="The causes, in order of gain",
@@ -115,7 +118,9 @@ CHANGE = Words(
     no_name="the model gets wrong in the reference as well",
     left="left: wrong in the reference as well",
     small="These changes are visible, but on unseen parts of the new recordings each removes less than {least} of what "
-    "is left, or its gain is not certain. They are not in the model of now.",
+    "is left. They are not in the model of now.",
+    uncertain="These changes are visible, but unseen parts of the new recordings do not show whether they matter: "
+    "their gain may be 0. They are not in the model of now.",
     source="What the change is worth",
     cause="What has changed",
     causes="What has changed, in order of gain",
