@@ -11,11 +11,12 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
+from tendonfmu.diagnosis.calibration import calibrated
 from tendonfmu.diagnosis.cause import Cause, Key
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.contact_gain import detection_gain
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
-from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects import CALIBRATION, Term
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.pictures import Compared
@@ -148,6 +149,8 @@ class _Result:
     def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
         cause, before = verified.causes[k], self._left(verified.without[k].data)
         compared = Compared(self._series, before, after, before - after, self._series.used)
+        if cause.effect == CALIBRATION:
+            return reported(calibrated(cause), compared)
         size = size_of(cause.effect, cause.places, thresholds(verified.extended_data))
         return reported(replace(cause, size=size), compared)
 
@@ -169,7 +172,7 @@ class _Result:
         rivals = [
             Question(cause.terms[0], rival)
             for cause in verified.causes
-            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS]]
+            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS] if other.effect != CALIBRATION]
             if all(self._is_in_nominal(term) for term in (cause.terms[0], rival))
         ]
         known = [*verified.causes, *verified.dropped, *self._searched.small]

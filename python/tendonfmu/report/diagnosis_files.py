@@ -24,6 +24,7 @@ from tendonfmu.diagnosis import (
     Diagnosis,
     Experiment,
     ResidualView,
+    Sensor,
     Where,
     reported_causes,
 )
@@ -236,8 +237,13 @@ def _cause(cause: Cause, kind: str) -> dict[str, Any]:
         **_numbers_of(cause.parameters),
         **(_changed(cause.changed) if kind == "change" else {}),
         "places": [_fields(place, "joint", "tendon") | _numbers_of(place.parameters) for place in cause.places],
+        **({"sensors": [_sensor(sensor) for sensor in cause.sensors]} if cause.sensors else {}),
         **_fields(cause, "size", "title", "explanation", "evidence"),
     }
+
+
+def _sensor(sensor: Sensor) -> dict[str, Any]:
+    return _where(sensor.where) | _fields(sensor, "correction", "unit")
 
 
 def _changed(changed: ChangedSize | None) -> dict[str, Any]:

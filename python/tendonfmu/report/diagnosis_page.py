@@ -176,7 +176,8 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
-        "places": place_rows(cause, names, sizes) if cause.parameters else [],
+        "places": place_rows(cause, names, sizes) if cause.parameters and not cause.sensors else [],
+        "sensors": [sensor.words for sensor in cause.sensors],
         "parameters": [(path, magnitude(*number)) for path, number in cause.parameters.items()],
         "sizes": change_rows(cause, diagnosis.recordings),
     }
