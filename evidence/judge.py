@@ -38,11 +38,13 @@ class Synonym:
     by_tendon: bool  # whether the tendon has to be the same
 
 
+CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")  # what `calibration` is made of
 # Every other alternative counts only where the report itself lists the hidden effect in `confusable_with`.
 SYNONYMS = (
     Synonym("edge_friction", "pulley_friction", -1, True),  # same velocity; the force differs by one friction, 2 %
     Synonym("pulley_friction", "edge_friction", 1, True),
     Synonym("joint_load_friction", "load_friction", 0, False),  # of the joint under load, by all tendons or one
+    *(Synonym(effect, "calibration", 0, True) for effect in CALIBRATED),
 )
 
 
@@ -104,7 +106,8 @@ def holds(cause: Cause, truth: Truth) -> bool:
 
 
 def is_truth(statement: Cause, truth: Truth) -> bool:
-    return statement["effect"] in truth.effects or any(_is_synonym(place, truth) for place in places(statement))
+    names = (*truth.effects, *CALIBRATED) if "calibration" in truth.effects else truth.effects
+    return statement["effect"] in names or any(_is_synonym(place, truth) for place in places(statement))
 
 
 def is_at_place(cause: Cause, truth: Truth) -> bool:
@@ -135,8 +138,8 @@ def _is_synonym(place: Cause, truth: Truth) -> bool:
     return any(
         synonym.hidden in truth.effects
         and synonym.named == place["effect"]
-        and truth.joint is not None
-        and place.get("joint") == truth.joint + synonym.joint_shift
+        and (truth.joint is not None or synonym.hidden in CALIBRATED)
+        and place.get("joint") == (None if truth.joint is None else truth.joint + synonym.joint_shift)
         and (not synonym.by_tendon or place.get("tendon") == truth.tendon)
         for synonym in truth.synonyms
     )

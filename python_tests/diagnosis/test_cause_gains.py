@@ -11,9 +11,12 @@ import pytest
 from fit_cases import small_finger
 from tendonfmu.diagnosis import cause_gains, gain
 from tendonfmu.diagnosis import extension_diagnosis as whole
+from tendonfmu.diagnosis.answer import not_taken
+from tendonfmu.diagnosis.cause import Cause, Where
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.effects.places import law_of
 from tendonfmu.diagnosis.least_sizes import LeastSizes
+from tendonfmu.statistics import Interval
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 
@@ -108,3 +111,22 @@ def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytes
     assert not in_nominal(nominal, Term(stribeck, Place(2), {}))  # no law at joint 2
     curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
     assert not in_nominal(curved, own)  # the law has what the effect would add
+
+
+def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
+    """Uncertain, it comes with what would settle it: more of the same motion, or another experiment."""
+    known = {"p_value": 1e-9, "terms": ()}
+    small, wide, none = (
+        Cause(Where(effect), gain=Interval(*gain), **known)
+        for effect, gain in (
+            ("inertia", (0.01, 0.005, 0.015)),
+            ("gravity", (0.14, -0.05, 0.42)),
+            ("backlash", (-0.1, -0.2, 0.0)),
+        )
+    )
+    parts = not_taken([small, wide, none], {none.key: "move slowly"}, 40.0)
+    assert [cause.effect for cause in parts["too_small"]] == ["inertia"]
+    assert [cause.experiment for cause in parts["uncertain"]] == [
+        "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s
+        "move slowly",
+    ]

@@ -56,6 +56,14 @@ def test_one_hidden_effect(name: str) -> None:
     assert judgement.unknown == (name == "unknown names nothing")
 
 
+def test_several_sensors_stand_for_one_at_its_place_and_one_for_several() -> None:
+    several = cause("calibration", places=[{"joint": None, "tendon": 2}, {"joint": 1, "tendon": 2}])
+    one = Truth(("force_gain",), tendon=2, synonyms=SYNONYMS)
+    assert judge([several], one).at_place and not judge([several], one).false
+    assert not judge([several], replace(one, tendon=3)).in_set
+    assert judge([cause("moment_arm", 1, 2)], Truth(("calibration",))).first
+
+
 def test_nothing_hidden() -> None:
     judgement = judge([cause("gravity", 1)], Truth())
     assert (judgement.in_set, judgement.first, judgement.at_place) == (None, None, None)

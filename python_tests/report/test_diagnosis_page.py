@@ -137,8 +137,16 @@ def test_a_change_is_reported_then_and_now() -> None:
 
 def test_what_is_too_small_has_no_numbers(full: Diagnosis) -> None:
     (entry,) = parsed(full)["too_small"]
-    assert entry["effect"] == "inertia" and entry["parameters"] == {} and entry["gain"]["interval"][0] < 0
+    assert entry["effect"] == "inertia" and entry["parameters"] == {} and entry["gain"]["interval"][0] > 0
     assert entry["places"] == [{"joint": 2, "tendon": None, "parameters": {}, "units": {}}]
+
+
+def test_what_is_uncertain_is_named_with_the_recording_that_would_settle_it(full: Diagnosis) -> None:
+    (entry,) = parsed(full)["uncertain"]
+    assert entry["effect"] == "gravity" and entry["gain"]["interval"][0] < 0 and "90 s" in entry["experiment"]
+    assert "Test on 90 s of such motion" in plain(diagnosis_page(full))
+    (line,) = (line for line in lines(full) if line.startswith("uncertain"))
+    assert "joint 1" in line and line.endswith(entry["experiment"])
 
 
 def test_contact_and_unknown_are_causes_only_where_their_gain_is_certain(full: Diagnosis) -> None:

@@ -3,8 +3,8 @@
 - `inputs` reads and checks recordings; `signal_choice` chooses signals, delay and presliding to start with.
 - `series` averages recordings over blocks of time; `view` turns a description and recordings into columns.
 - `cause` is what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates; `search` adds what a description lacks, `change_search` what has changed since a
-  reference.
+- `selection` judges candidates, `calibration` all corrections of sensors together; `search` adds what a description
+  lacks, `change_search` what has changed since a reference.
 - `extension_fit` fits the extended finger; `gain` and `cause_gains` measure on unseen data.
 - `extension_diagnosis` and `change_diagnosis` report; `diagnosis` begins.
 - `experiments` finds what to record next; `effects` holds the table of effects.
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .cause import Cause, CausePlace, ChangedSize, Evidence, Where
+    from .cause import Cause, CausePlace, ChangedSize, Evidence, Sensor, Where
     from .contact_scan import events_of, without_blocks
     from .diagnosis import diagnose
     from .effects.places import thresholds

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.cause import Cause, CausePlace
+from tendonfmu.diagnosis.cause import Cause, CausePlace, Key
 from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import Gain
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.pictures import Compared, evidence, residual_views, whiteness
 from tendonfmu.diagnosis.result import Diagnosis, Unexplained
+from tendonfmu.diagnosis.selection import SIGNIFICANCE
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.signal_choice import Estimation
+from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases
+
+MOST_LONGER = 10.0  # times the duration: beyond, another motion is the better advice
+MARGIN = 1.2  # times the duration at which the interval would just end at 0
+OTHER_MOTION = "repeat the test with another motion, at two pretensions"
 
 
 @dataclass(frozen=True)
@@ -87,9 +94,27 @@ def reported(cause: Cause, compared: Compared) -> Cause:
     )
 
 
-def too_small(cause: Cause) -> Cause:
-    """Return a cause that is certain but not material, or not confirmed on unseen data."""
-    return replace(cause, places=_places(cause), confusable_with=tuple(other.where for other in cause.alike))
+def not_taken(causes: Iterable[Cause], experiments: Mapping[Key, str], seconds: float) -> dict[str, Any]:
+    """Divide causes that are significant but were not taken into those that are too small and the uncertain ones."""
+    # `experiments` names those planned; `seconds` of unseen motion were judged
+    small, uncertain = list[Cause](), list[Cause]()
+    for cause in causes:
+        cause = replace(cause, places=_places(cause), confusable_with=tuple(other.where for other in cause.alike))
+        if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
+            small.append(cause)
+        else:
+            settling = _longer(cause.gain, seconds) or experiments.get(cause.key) or OTHER_MOTION
+            uncertain.append(replace(cause, experiment=settling))
+    return {"too_small": tuple(small), "uncertain": tuple(uncertain)}
+
+
+def _longer(gain: Interval, seconds: float) -> str:
+    """Return how long a recording would settle a gain: its error falls with the root of the duration."""
+    factor = ((gain.value - gain.low) / gain.value) ** 2 if gain.value > 0.0 else math.inf
+    if not factor <= MOST_LONGER:
+        return ""
+    needed = 10.0 * math.ceil(MARGIN * factor * seconds / 10.0)
+    return f"test on {needed:.0f} s of such motion, in place of {seconds:.0f} s"
 
 
 def _places(cause: Cause) -> tuple[CausePlace, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects.words import off_by
 from tendonfmu.statistics import Interval
 
 Key = tuple[str, int | None, int | None]  # effect, joint, tendon
@@ -73,6 +74,20 @@ class ChangedSize:
 
 
 @dataclass(frozen=True)
+class Sensor:
+    """By how much something that is measured or described is off."""
+
+    where: Where  # `force_gain`, `force_offset`, `moment_arm` or `time_delay`; `calibration` for gain and arm together
+    correction: Interval  # what the description has to add, with its 95 % interval
+    unit: str
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """Which sensor it is, and by how much it is off."""
+        return off_by(self.where.effect, self.where.joint, self.where.tendon, self.correction, self.unit)
+
+
+@dataclass(frozen=True)
 class Direction:
     """How a cause looks among all columns: what its magnitudes add."""
 
@@ -114,6 +129,10 @@ class Cause:
         Pictures of the residual with and without the cause.
     changed
         For a change: the size in the reference and now.
+    experiment
+        Of an uncertain cause: the recording that would settle it.
+    sensors
+        Of `calibration`: by how much each sensor is off.
     """
 
     where: Where
@@ -127,6 +146,8 @@ class Cause:
     places: tuple[CausePlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()
     changed: ChangedSize | None = None
+    experiment: str = ""
+    sensors: tuple[Sensor, ...] = ()
     # what it adds to a description, place by place; of a candidate, for magnitudes of 1; none for a number of its own
     terms: tuple[Term, ...] = ()
     direction: Direction = field(default=_NOWHERE, compare=False)

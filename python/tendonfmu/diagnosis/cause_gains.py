@@ -9,6 +9,7 @@ from typing import Any
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
 from tendonfmu.diagnosis.search import Search
@@ -98,16 +99,19 @@ def _names(causes: Sequence[Cause], gains: Sequence[Interval]) -> list[int]:
 def merged(causes: Sequence[Cause]) -> list[Cause]:
     """Merge the places of one effect into one cause."""
     by_effect: dict[str, Cause] = {}
-    for cause in causes:
-        known = by_effect.get(cause.effect)
+    calibrated = CALIBRATED if any(cause.effect == CALIBRATION for cause in causes) else ()
+    # a single sensor that was found beside several belongs to them
+    for cause in sorted(causes, key=lambda cause: cause.effect != CALIBRATION) if calibrated else causes:
+        effect = CALIBRATION if cause.effect in calibrated else cause.effect
+        known = by_effect.get(effect)
         if known is None:
-            by_effect[cause.effect] = cause
+            by_effect[effect] = cause
             continue
         joint = known.joint if known.joint == cause.joint else None
         tendon = known.tendon if known.tendon == cause.tendon else None
-        by_effect[cause.effect] = replace(
+        by_effect[effect] = replace(
             known,
-            where=Where(cause.effect, joint, tendon),
+            where=Where(effect, joint, tendon),
             terms=(*known.terms, *cause.terms),
             p_value=min(known.p_value, cause.p_value),
             alike=(*known.alike, *cause.alike),

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.answer import Asked, answered, reported, too_small
+from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
 from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
@@ -197,8 +197,10 @@ class _Changes:
             warnings=self._warnings(),
             noise_floor=tuple(float(value) for value in np.minimum(self._floor(), gain.extended.test_rms)),
             floor_source="what remains on unseen stretches without the errors that both recordings share",
-            too_small=tuple(
-                too_small(replace(change, terms=(), alike=(), size="")) for change in [*dropped, *search.refused]
+            **not_taken(
+                [replace(change, terms=(), alike=(), size="") for change in [*dropped, *search.refused]],
+                {},
+                sum(recording.duration for recording in given.tests or self._held),
             ),
             invisible=tuple(absorbed_effects(search.selection, REPEAT)),
             events=self._events,

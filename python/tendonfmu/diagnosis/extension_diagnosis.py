@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.answer import Asked, answered, reported, too_small
-from tendonfmu.diagnosis.cause import Cause
+from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
+from tendonfmu.diagnosis.calibration import calibrated
+from tendonfmu.diagnosis.cause import Cause, Key
 from tendonfmu.diagnosis.cause_gains import Verified, verify
 from tendonfmu.diagnosis.contact_gain import detection_gain
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
-from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects import CALIBRATION, Term
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.pictures import Compared
@@ -59,7 +60,7 @@ class _Result:
             left = self._left(verified.extended)
             before = searched.first.residual
             unexplained = self._unexplained(left, verified.extended)
-        experiments, invisible = self._experiments(verified)
+        experiments, settling, invisible = self._experiments(verified)
         gain, everything = verified.gain, [*given.training, *given.tests]
         floor = np.array(gain.extended.test_rms) * np.sqrt(np.clip(1.0 - np.array(unexplained.by_joint), 0.0, 1.0))
         named = {cause.effect for cause in verified.causes}
@@ -75,8 +76,10 @@ class _Result:
             load_at_joints=searched.estimation.grid.means(targets),
             noise_floor=tuple(float(value) for value in floor),
             floor_source="the part of the error on unseen stretches that nothing recorded predicts",
-            too_small=tuple(
-                too_small(cause) for cause in [*verified.dropped, *searched.small] if cause.effect not in named
+            **not_taken(
+                [cause for cause in [*verified.dropped, *searched.small] if cause.effect not in named],
+                settling,
+                sum(recording.duration for recording in given.tests or given.training),
             ),
             invisible=invisible,
             events=self._events,
@@ -144,6 +147,8 @@ class _Result:
     def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
         cause, before = verified.causes[k], self._left(verified.without[k].data)
         compared = Compared(self._series, before, after, before - after, self._series.used)
+        if cause.effect == CALIBRATION:
+            return reported(calibrated(cause), compared)
         size = size_of(cause.effect, cause.places, thresholds(verified.extended_data))
         return reported(replace(cause, size=size), compared)
 
@@ -168,12 +173,12 @@ class _Result:
         shown = remainder_map(*parts) if result.unknown else None
         return replace(result, map=shown)
 
-    def _experiments(self, verified: Verified) -> tuple[Experiments, tuple[Invisible, ...]]:
-        """Plan experiments for causes that cannot be distinguished and for effects that are not visible."""
+    def _experiments(self, verified: Verified) -> tuple[Experiments, dict[Key, str], tuple[Invisible, ...]]:
+        """Plan experiments for causes that cannot be distinguished or are uncertain, and for effects not visible."""
         rivals = [
             Question(cause.terms[0], rival)
             for cause in verified.causes
-            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS]]
+            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS] if other.effect != CALIBRATION]
             if all(self._is_in_nominal(term) for term in (cause.terms[0], rival))
         ]
         known = [*verified.causes, *verified.dropped, *self._searched.small]
@@ -182,7 +187,10 @@ class _Result:
         for cause, hidden in unseen:
             if self._is_in_nominal(cause.terms[0]):
                 nearest.setdefault(cause.effect, Question(cause.terms[0].ordinary, absorbed=hidden.absorbed))
+        dropped = [cause for cause in verified.dropped if cause.terms and self._is_in_nominal(cause.terms[0])]
         questions = [*rivals, *nearest.values()]
+        first = len(questions)
+        questions += [Question(cause.terms[0]) for cause in dropped]
         noise = self._left(self._searched.extended.data)[self._series.used].std(axis=0)
         with self._asked.phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(
@@ -200,7 +208,8 @@ class _Result:
             if number is not None:
                 hidden = replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
             shown.append(hidden)
-        return planned, tuple(shown)
+        settling = {cause.key: planned.sentence(first + k) for k, cause in enumerate(dropped)}
+        return planned, settling, tuple(shown)
 
     @cached_property
     def _nominal_span(self) -> Span:

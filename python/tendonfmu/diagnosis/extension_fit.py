@@ -57,6 +57,7 @@ class FittedModel:
     values: Mapping[str, float]  # by path of an estimated number, SI units
     cost: float  # ½ Σ e²/S including the prior
     warnings: tuple[str, ...] = ()  # sentences
+    fixed: tuple[str, ...] = ()  # paths of numbers that no fit of this model changes
 
 
 def fit_numbers(
@@ -65,6 +66,7 @@ def fit_numbers(
     settings: FitSettings = FitSettings(),
     *,
     given: Mapping[str, Any] | None = None,
+    fixed: tuple[str, ...] = (),
 ) -> FittedModel:
     """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is."""
     # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
@@ -72,6 +74,8 @@ def fit_numbers(
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={}, cost=float("nan"))
     origin = data if given is None else given
+    if fixed:
+        settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
     structure, learned = learn_numbers(data, recordings, settings, given=origin)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
@@ -81,6 +85,7 @@ def fit_numbers(
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
         cost=float(learned.cost),
         warnings=tuple(learned.warnings),
+        fixed=fixed,
     )
 
 
@@ -110,7 +115,11 @@ def fit_extended(
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
-    return fit_numbers(extended_description(nominal.data, causes), recordings, settings, given=nominal.given)
+    data = extended_description(nominal.data, causes)
+    added = zip(causes, added_paths(nominal.data, causes), strict=True)
+    estimated = {number.path for number in unknowns(data)}
+    fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
+    return fit_numbers(data, recordings, settings, given=nominal.given, fixed=fixed)
 
 
 def cause_parameters(

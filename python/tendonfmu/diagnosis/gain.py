@@ -17,6 +17,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from tendonfmu.estimate import residuals
 from tendonfmu.fmu import build_fmu, run_fmu
 from tendonfmu.model import NUMBERS, description_text, native
 from tendonfmu.recordings import BiasSettings, FitRecording, Model, bias_settings, delayed_torque, rms
-from tendonfmu.statistics import BlockIndex, Interval, Span, blocks_of, gain_interval, make_folds
+from tendonfmu.statistics import BlockIndex, Interval, Span, blocks_of, gain_interval, make_folds, variance_between
 
 AGREEMENT = 1e-9  # of the largest value of an output's series: allowed difference of two implementations
 _NEVER = 1e9  # N·m; a contact threshold that is never passed
@@ -71,12 +72,15 @@ def measure_gain(
     runs["extended"] = runs["nominal"] if same else [run_both(extended, recording) for recording in test.recordings]
     left = {name: [run.residual for run in runs_of] for name, runs_of in runs.items()}
     before, after = test.squares(left["nominal"]), test.squares(left["extended"])
+    trained = {"nominal": test.trained(nominal, left["nominal"])}
+    trained["extended"] = trained["nominal"] if same else test.trained(extended, left["extended"])
+    by_recording = test.pairs(left["nominal"], left["extended"], trained["nominal"], trained["extended"])
     sequence = [before, *(test.squares_of(data) for data in between), *([] if same else [after])]
     return Gain(
-        nominal=ModelErrors(test.trained(nominal, left["nominal"]), test.tested(left["nominal"])),
-        extended=ModelErrors(test.trained(extended, left["extended"]), test.tested(left["extended"])),
+        nominal=ModelErrors(test.pooled(trained["nominal"]), test.tested(left["nominal"])),
+        extended=ModelErrors(test.pooled(trained["extended"]), test.tested(left["extended"])),
         bias_only_rms=test.tested([residuals(extended, recording, None).residual for recording in test.recordings]),
-        value=gain_interval(before, after, seed),
+        value=gain_interval(before, after, seed, variance_between(by_recording) / len(test.recordings)),
         steps=tuple(float(np.sqrt(squares.sum() / max(test.count, 1))) for squares in sequence),
         blocks=len(before),
         held_out=test.held_out,
@@ -233,10 +237,30 @@ class _Test:
     def tested(self, left: Sequence[Numbers]) -> tuple[float, ...]:
         return _pooled(left, self.masks)
 
-    def trained(self, data: Data, left: Sequence[Numbers]) -> tuple[float, ...]:
+    def trained(self, data: Data, left: Sequence[Numbers]) -> Sequence[Numbers]:
+        """Return the residuals of the training recordings."""
+        return left if self.held_out else [residual_of(data, recording) for recording in self.training]
+
+    @cached_property
+    def _trained_on(self) -> list[Flags]:
+        return [_judged(recording, recording.train) for recording in self.training]
+
+    def pooled(self, trained: Sequence[Numbers]) -> tuple[float, ...]:
         """Return the rms on the samples trained on."""
-        residuals = left if self.held_out else [residual_of(data, recording) for recording in self.training]
-        return _pooled(residuals, [_judged(recording, recording.train) for recording in self.training])
+        return _pooled(trained, self._trained_on)
+
+    def pairs(self, before: Sequence[Numbers], after: Sequence[Numbers], *trained: Sequence[Numbers]) -> list[Numbers]:
+        """Return the block sums [B, 2] of the squares of two models, of each recording."""
+        listed = [*zip(self.blocks, before, after, strict=True)]
+        if not self.held_out:
+            blocks = [
+                blocks_of(recording.time, mask) for recording, mask in zip(self.training, self._trained_on, strict=True)
+            ]
+            listed += zip(blocks, *trained, strict=True)
+        return [
+            np.column_stack([block.sums(np.sum(residual**2, axis=1)) for residual in residuals])
+            for block, *residuals in listed
+        ]
 
 
 def _judged(recording: FitRecording, chosen: Flags) -> Flags:

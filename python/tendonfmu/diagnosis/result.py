@@ -161,6 +161,7 @@ class Diagnosis:
     nominal_data: Mapping[str, Any]  # the fitted descriptions
     extended_data: Mapping[str, Any]
     warnings: tuple[str, ...] = ()
+    uncertain: tuple[Cause, ...] = ()  # causes that are significant, but whose gain on unseen data may be 0
     tested: int = 0  # effects at places
     # share of the rms on the training recordings that leaving `events` out removes; None without events
     event_gain: Interval | None = None

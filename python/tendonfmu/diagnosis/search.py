@@ -11,17 +11,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of, without_blocks, without_events
-from tendonfmu.diagnosis.effects import CANDIDATES, SCALING, Candidate, Place, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CANDIDATES, SCALING, Candidate, Place, Term
 from tendonfmu.diagnosis.effects.shapes import is_spring
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, fit_numbers, possible
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.result import Event
-from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, rms_gain
+from tendonfmu.diagnosis.selection import (
+    CERTAIN,
+    SIGNIFICANCE,
+    CauseSearch,
+    Selection,
+    is_alike,
+    rms_gain,
+    step_p_value,
+)
 from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
@@ -32,6 +40,7 @@ from tendonfmu.tasks import Phases, Step
 
 MOST_CAUSES = 8
 MOST_FITTED = 3  # effects that columns cannot distinguish
+NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
 WIDESPREAD = {"presliding"}  # in every finger, and different from place to place
 
 
@@ -71,9 +80,13 @@ class ExtensionSearch(CauseSearch):
         # itself is excluded: it lowers any error by shrinking the torque.
         selection = self.view.beside({refused.key for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
-        if best is None:
+        together = calibration(self.view, selection, tried, self._least_gain)
+        if together is not None and is_better(together, best, self._least_gain):
+            trial = self._tried(together)
+        elif best is not None:
+            trial = beside_calibration(self._best_fitted(selection, best), together)
+        else:
             return None
-        trial = self._best_fitted(selection, best)
         return trial.cause, trial.cause.p_value < SIGNIFICANCE and self._take(trial)
 
     def _best_fitted(self, selection: Selection, best: Cause) -> Trial:
@@ -126,7 +139,7 @@ class ExtensionSearch(CauseSearch):
         model = fit_extended(self.models[0], terms, self.chosen.predicted(begin, self._out), self._settings)
         # fit again with the forces predicted with the cause
         clean = self.chosen.predicted(model.data, self._out)
-        model = fit_numbers(model.data, clean, self._settings, given=self.models[0].given)
+        model = fit_numbers(model.data, clean, self._settings, given=self.models[0].given, fixed=model.fixed)
         if not self._resolved(cause, model):
             return Trial(cause, None, np.array([np.inf]))
         return Trial(cause, model, self._look(model, ()).selection.base)
@@ -138,7 +151,7 @@ class ExtensionSearch(CauseSearch):
         if model is None or gain < self._least_gain or gain <= CERTAIN * error or not self._runs_better(model):
             return False
         # a cause of the start has no column in the view before
-        p_value = cause.p_value if cause.p_value < SIGNIFICANCE else _step_p_value(before, after)
+        p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
         self.models.append(model)
         self.view = self._look(model, candidates)
@@ -171,6 +184,14 @@ class ExtensionSearch(CauseSearch):
         return small
 
 
+def beside_calibration(trial: Trial, together: Cause | None) -> Trial:
+    """Say of a single sensor that is off that it may be several, if their usual errors explain nearly as much."""
+    cause = trial.cause
+    if together is None or cause.effect not in CALIBRATED or together.gain.value < NEARLY * cause.gain.value:
+        return trial
+    return replace(trial, cause=replace(cause, alike=(*cause.alike, together)))
+
+
 def _to_fit(best: Cause) -> list[Cause]:
     """Return the effects that cannot be distinguished from the best one and may replace it."""
     # A correction of the torque itself may replace only another such correction, because it lowers any error.
@@ -183,11 +204,6 @@ def _of_start(terms: tuple[Term, ...]) -> Cause:
     candidate, place = terms[0].candidate, terms[0].place if len(terms) == 1 else Place()
     where = Where(candidate.name, place.joint, place.tendon)
     return Cause(where, candidate.title, candidate.explanation, terms=terms)
-
-
-def _step_p_value(before: Numbers, after: Numbers) -> float:
-    """Return the p-value of a gain by stretch [K]: a one-sided t test."""
-    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0
 
 
 # --- from recordings to causes ---------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.cause import HERE, Cause, Direction, Key, with_error
@@ -101,6 +102,21 @@ class Selection:
         self._results = sorted(judged, key=lambda result: result[0])
         self._known: dict[int, Cause] = {}
 
+    def regularised(self, cause: Cause, ridge: Numbers) -> Cause:
+        """Return a candidate with magnitudes that are expected to be small, their covariance, and its error."""
+        # ridge: [d], weights of the squared magnitudes; their usual sizes are in `ordinary`
+        own, known = cause.direction, sum(len(beside.low) for beside in self._beside)
+        both = _joined(*self._beside, own)
+        arguments = both.mix, both.low, both.high, np.concatenate([np.zeros(known), ridge])
+        magnitudes = self.grams.magnitudes(*arguments)[known:]
+        _, by_fold = self.grams.error(*arguments)
+        energy, scores = self.grams.scores(own.mix, by_fold[:, known:])
+        inverse = np.linalg.inv(energy + np.diag(ridge))
+        # scatter of the estimate, and by how much the prior knowledge pulls it away from a usual size
+        covariance = inverse @ (scores.T @ scores + np.diag((ridge * own.ordinary) ** 2)) @ inverse
+        unseen = self.grams.by_stretch(both.mix, by_fold)
+        return replace(cause, magnitudes=magnitudes, covariance=covariance, unseen=unseen)
+
     def ranked(self) -> list[Cause]:
         """Return the best place and shape of each effect that lowers the error, the best first."""
         best: dict[str, int] = {}
@@ -185,6 +201,11 @@ def _joined(*directions: Direction) -> Direction:
     )
 
 
+def step_p_value(before: Numbers, after: Numbers) -> float:
+    """Return the p-value of a gain by stretch [K]: a one-sided t test."""
+    return float(ttest_1samp(before - after, 0.0, alternative="greater").pvalue) if len(before) > 1 else 1.0
+
+
 def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
     """Return 1 − rms after / rms before from Σ e² by stretch [K], and its standard error."""
     whole, left = float(before.sum()), float(after.sum())
@@ -204,7 +225,7 @@ def invisible_effects(
     selection: Selection, causes: Sequence[Cause], known: Sequence[Cause], least_gain: float
 ) -> list[tuple[Cause, Invisible]]:
     """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
-    places = {(cause.effect, term.place.joint, term.place.tendon) for cause in known for term in cause.terms}
+    places = {(term.candidate.name, term.place.joint, term.place.tendon) for cause in known for term in cause.terms}
     names = [cause.effect for cause in causes]
     best: dict[Key, tuple[float, Cause, Invisible]] = {}
     for cause, share in zip(selection.causes, selection.shares, strict=True):

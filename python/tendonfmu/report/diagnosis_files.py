@@ -24,6 +24,7 @@ from tendonfmu.diagnosis import (
     Diagnosis,
     Experiment,
     ResidualView,
+    Sensor,
     Where,
     at_place,
     reported_causes,
@@ -164,6 +165,9 @@ def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, A
         **_fields(diagnosis, "noise_floor", "gain"),
         "causes": [_cause(cause, diagnosis.kind) for cause in reported_causes(diagnosis)],
         "too_small": [_cause(cause, diagnosis.kind) for cause in diagnosis.too_small],
+        "uncertain": [
+            _cause(cause, diagnosis.kind) | {"experiment": cause.experiment} for cause in diagnosis.uncertain
+        ],
         "unexplained": _fields(diagnosis.unexplained, "share", "description", "by_joint", "gain"),
         "next_experiment": diagnosis.experiment.sentence,
         "waterfall": _waterfall(diagnosis),
@@ -234,8 +238,13 @@ def _cause(cause: Cause, kind: str) -> dict[str, Any]:
         **_numbers_of(cause.parameters),
         **(_changed(cause.changed) if kind == "change" else {}),
         "places": [_fields(place, "joint", "tendon") | _numbers_of(place.parameters) for place in cause.places],
+        **({"sensors": [_sensor(sensor) for sensor in cause.sensors]} if cause.sensors else {}),
         **_fields(cause, "size", "title", "explanation", "evidence"),
     }
+
+
+def _sensor(sensor: Sensor) -> dict[str, Any]:
+    return _where(sensor.where) | _fields(sensor, "correction", "unit")
 
 
 def _changed(changed: ChangedSize | None) -> dict[str, Any]:

@@ -74,6 +74,10 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         fall=waterfall_of(diagnosis, names),
         cards=cards_of(diagnosis, names),
         too_small=_too_small(diagnosis, names),
+        uncertain=[
+            (capital(cause.title), names.places(cause), percent_interval(cause.gain), capital(cause.experiment))
+            for cause in diagnosis.uncertain
+        ],
         errors=_errors(diagnosis, names, factor),
         events=_events(diagnosis, names, factor),
         detection=None if diagnosis.detection is None else _detection(diagnosis.detection, factor, unit),
@@ -173,7 +177,8 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
-        "places": place_rows(cause, names, sizes) if cause.parameters else [],
+        "places": place_rows(cause, names, sizes) if cause.parameters and not cause.sensors else [],
+        "sensors": [sensor.words for sensor in cause.sensors],
         "parameters": [(path, magnitude(*number)) for path, number in cause.parameters.items()],
         "sizes": change_rows(cause, diagnosis.recordings),
     }

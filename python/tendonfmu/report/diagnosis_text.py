@@ -332,6 +332,7 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield error_sentence(diagnosis)
     for k, cause in enumerate(diagnosis.causes, start=1):
         yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
+        yield from (f"     {': '.join(sensor.words)}" for sensor in cause.sensors)
         if confusion := confusion_sentence(cause, names):
             yield f"     {confusion}"
     yield from own_gain_sentences(diagnosis)
@@ -341,6 +342,9 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.too_small:
         small = dict.fromkeys(at_place(each.title, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
+    for cause in diagnosis.uncertain:
+        less = f"less error {percent_interval(cause.gain)}"
+        yield f"uncertain: {at_place(cause.title, cause.where, names)}, {less}; to settle it: {cause.experiment}"
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
         yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"

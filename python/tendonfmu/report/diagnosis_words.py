@@ -21,6 +21,7 @@ class Words:
     no_name: str  # the part of the remaining error that is not noise: in a sentence, and in a legend
     left: str
     small: str  # sentences
+    uncertain: str
     source: str  # headings
     cause: str
     causes: str
@@ -65,8 +66,10 @@ MODEL = Words(
     error="",
     no_name="follows the recorded signals in a way that no known effect explains",
     left="remains: follows the signals, not explained",
-    small="These effects are in the recordings, but on test data each lowers the error by less than {least}, or its "
-    "gain is not certain. They are not in the extended model.",
+    small="These effects are in the recordings, but on test data each lowers the error by less than {least}. They are "
+    "not in the extended model.",
+    uncertain="These effects are in the recordings, but test data do not show whether they matter: their gain may be "
+    "0. They are not in the extended model.",
     source="Where the error comes from",
     cause="The cause",
     causes="The causes, in order of gain",
@@ -114,8 +117,10 @@ CHANGE = Words(
     error=" of the model of the reference",
     no_name="the model gets wrong in the reference as well",
     left="remains: wrong in the reference as well",
-    small="These changes are in the new recordings, but on test data each lowers the error by less than {least}, or "
-    "its gain is not certain. They are not in the model of now.",
+    small="These changes are in the new recordings, but on test data each lowers the error by less than {least}. They "
+    "are not in the model of now.",
+    uncertain="These changes are in the new recordings, but test data do not show whether they matter: their gain may "
+    "be 0. They are not in the model of now.",
     source="What the change is worth",
     cause="What has changed",
     causes="What has changed, in order of gain",

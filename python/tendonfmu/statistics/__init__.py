@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         regular_blocks,
     )
     from .intervals import Interval
-    from .paired_gain import BlockIndex, blocks_of, gain_interval
+    from .paired_gain import BlockIndex, blocks_of, gain_interval, variance_between
     from .random_numbers import LARGEST_SEED, Draws
     from .spectral_line import Line, find_lines
     from .splines import (

@@ -126,11 +126,7 @@ class Grams:
         self.square = float(np.sum(self._target**2))
         by_fold = self._with_target(products.by_fold)
         whole = np.sum(by_fold, axis=0)
-        spread = self.square / max(self._target.size, 1) * MEMORY
-        ridge = np.zeros(self.nominal_count)
-        known = np.isfinite(scale) & (scale > 0)
-        # a column of zeros has a huge scale; squaring the quotient cannot overflow, squaring the scale could
-        ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
+        ridge = self.ridge(scale)
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
         self._by_fold = [self._left_out(whole - held, held) for held in by_fold]
@@ -210,14 +206,25 @@ class Grams:
                 self._raw += part.T @ part
         return self._raw
 
-    def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
-        """Return the magnitudes of a combination of candidates, learned from all folds."""
-        # mix: [c, d]; low, high: [d]; returns [d]
-        return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
+    def ridge(self, scale: Numbers, square: float | None = None) -> Numbers:
+        """Return the weights of the squares of numbers that are about as large as `scale`; 0 where that is unknown."""
+        # scale: [d]; square: Σ e² of what is left ((N·m)²), that of the target if None; returns [d]
+        spread = (self.square if square is None else square) / max(self._target.size, 1) * MEMORY
+        ridge = np.zeros(len(scale))
+        known = np.isfinite(scale) & (scale > 0)
+        # a column of zeros has a huge scale; squaring the quotient cannot overflow, squaring the scale could
+        ridge[known] = (np.sqrt(spread) / np.maximum(scale[known], _SMALLEST)) ** 2
+        return ridge
 
-    def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
+    def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> Numbers:
+        """Return the magnitudes of a combination of candidates, learned from all folds."""
+        # mix: [c, d]; low, high, ridge: [d]; returns [d]
+        energy = mix.T @ self._whole.energy @ mix
+        return bounded(energy + _diagonal(ridge), mix.T @ self._whole.score, low, high)
+
+    def error(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
-        # mix: [c, d]; low, high: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
+        # mix: [c, d]; low, high, ridge: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
         left, magnitudes = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
@@ -225,7 +232,7 @@ class Grams:
             energy, held_energy = (
                 part.T @ matrix[np.ix_(used, used)] @ part for matrix in (fold.energy, fold.own_energy)
             )
-            theta = bounded(energy, part.T @ fold.score[used], low, high)
+            theta = bounded(energy + _diagonal(ridge), part.T @ fold.score[used], low, high)
             gain = 2.0 * float(theta @ (part.T @ fold.own_score[used])) - float(theta @ held_energy @ theta)
             left += (fold.own_square - gain) if counts else 0.0
             magnitudes.append(theta)
@@ -319,6 +326,10 @@ class Grams:
         # returns [R, n] (N·m)
         change = self._whole.refit[:, -1]
         return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
+
+
+def _diagonal(ridge: Numbers | None) -> Numbers | float:
+    return 0.0 if ridge is None else np.diag(ridge)
 
 
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:

@@ -9,6 +9,7 @@ bootstrap-t of Efron and Tibshirani, "An introduction to the bootstrap" (1993), 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ FEWEST = 3  # blocks; fewer give no interval
 _FEW, _SHORTEST = 6, 0.5  # blocks, wanted at least; s, shortest block for this
 _RESAMPLES = 4000
 _MOST = 400  # blocks; more are joined
+_NORMAL = 1.96  # standard deviations
 _LEAST_PLAIN = 12  # blocks; with fewer, the resamples' own errors are too rough, and Student's t is used
 
 
@@ -60,9 +62,9 @@ def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex
     return BlockIndex(index, count)
 
 
-def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
+def gain_interval(before: Numbers, after: Numbers, seed: int = 0, between: float = 0.0) -> Interval:
     """Return the gain 1 − rms_after/rms_before with its 95 % interval."""
-    # before, after: [B]
+    # before, after: [B]; between: variance of log(rms after/rms before) from one recording to the next
     total_before, total_after = float(before.sum()), float(after.sum())
     if total_before <= 0:
         return Interval(0.0)
@@ -70,8 +72,23 @@ def gain_interval(before: Numbers, after: Numbers, seed: int = 0) -> Interval:
     if total_after <= 0 or len(before) < FEWEST:
         return Interval(value)
     pairs = _independent(np.column_stack([before, after]))
-    low, high = _log_ratio_ends(pairs, seed)
+    estimate = math.log(1 - value)
+    low, high = (
+        estimate + math.copysign(math.hypot(end - estimate, _NORMAL * math.sqrt(between)), end - estimate)
+        for end in _log_ratio_ends(pairs, seed)
+    )
     return Interval(value, 1 - math.exp(high), 1 - math.exp(low))
+
+
+def variance_between(recordings: Sequence[Numbers]) -> float:
+    """Return the variance of log(rms after/rms before) between recordings, beyond what their blocks explain."""
+    # recordings: [B, 2] block sums of squares of each, before and after. No recording shows by itself how much another
+    # motion changes the gain (DerSimonian and Laird, "Meta-analysis in clinical trials", Control. Clin. Trials 1986)
+    known = [_independent(pairs) for pairs in recordings if len(pairs) >= FEWEST and (pairs.sum(axis=0) > 0).all()]
+    if len(known) < 2:
+        return 0.0
+    found = np.array([[float(part[0]) for part in _log_ratio(np.ones((1, len(pairs))), pairs)] for pairs in known])
+    return max(0.0, float(np.var(found[:, 0], ddof=1) - np.mean(found[:, 1] ** 2)))
 
 
 def _log_ratio_ends(pairs: Numbers, seed: int) -> tuple[float, float]:

@@ -6,10 +6,21 @@
 """
 
 from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant
-from tendonfmu.diagnosis.effects.table import BY_NAME, CANDIDATES, COMMON, SCALING, SHARED, by_name
+from tendonfmu.diagnosis.effects.table import (
+    BY_NAME,
+    CALIBRATED,
+    CALIBRATION,
+    CANDIDATES,
+    COMMON,
+    SCALING,
+    SHARED,
+    by_name,
+)
 
 __all__ = [
     "BY_NAME",
+    "CALIBRATED",
+    "CALIBRATION",
     "CANDIDATES",
     "COMMON",
     "SCALING",

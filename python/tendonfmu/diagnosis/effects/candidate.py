@@ -186,6 +186,7 @@ class Term:
     place: Place
     shape: Shape = field(default_factory=dict)  # its non-linear numbers
     magnitudes: Sequence[float] = ()  # one per column, as estimated so far; () for an ordinary size
+    fixed: bool = False  # whether a fit leaves its numbers as they are
 
     def added_to(self, data: Data) -> dict[str, Any]:
         """Return the description with this term."""

@@ -258,6 +258,20 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.correction("the true force is"),
     ),
     Candidate(
+        name="calibration",
+        title="several sensors are a little off",
+        explanation=(
+            "Gains and zeros of force sensors, moment arms and the time between forces and positions are each off by "
+            "a little, as on any new bench. Calibrate the force sensors with known weights, measure the arms, and "
+            "compare the clocks; or go on with the corrected description."
+        ),
+        excited_by="strokes of all joints at several pretensions",
+        coordinate="force",
+        possible_places=lambda data, kinematics: [],
+        make=terms.row(),
+        size=words.of("a largest correction of {}", "correction"),
+    ),
+    Candidate(
         name="time_delay",
         title="forces and positions are not of the same time",
         explanation=(
@@ -367,6 +381,8 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=shapes.play,
     ),
 )
+CALIBRATION = "calibration"  # many corrections at once: `calibration.py`
+CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")
 SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
 SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
 COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from tendonfmu.diagnosis.effects.candidate import Sizes
 from tendonfmu.model import LEFT_OUT
+from tendonfmu.statistics import Interval
 
 Words = Callable[[Sizes], str]
 
@@ -110,6 +111,25 @@ def sides(numbers: Sizes) -> str:
     pairs = list(zip(coulomb[::2], coulomb[1::2], strict=True))
     (one, unit), (other, _) = max(pairs, key=lambda pair: abs(pair[0][0] - pair[1][0]))
     return f"{quantity(one, unit)} in the positive direction, {quantity(other, unit)} in the negative one"
+
+
+_OFF = {  # what is off; what a correction above 0 says, and one below 0
+    "force_gain": ("force of tendon {tendon}", "reads {} too little", "reads {} too much"),
+    "force_offset": ("zero of the force of tendon {tendon}", "{} too low", "{} too high"),
+    "moment_arm": ("moment arm of tendon {tendon} at joint {joint}", "{} longer than described", "{} shorter"),
+    "time_delay": ("forces", "{} later than positions", "{} earlier than positions"),
+    "calibration": ("torque of tendon {tendon} at joint {joint}, force and arm together", "{} more", "{} less"),
+}
+
+
+def off_by(effect: str, joint: int | None, tendon: int | None, correction: Interval, unit: str) -> tuple[str, str]:
+    """Return which sensor is off, and by how much, with the 95 % interval where it is known."""
+    what, more, less = _OFF[effect]
+    sign = 1.0 if correction.value >= 0.0 else -1.0
+    ends = sorted((sign * correction.low, sign * correction.high))
+    known = f" ({' to '.join(quantity(end, unit) for end in ends)})" if all(map(math.isfinite, ends)) else ""
+    size = quantity(abs(correction.value), unit)
+    return what.format(tendon=tendon, joint=joint), (more if sign > 0.0 else less).format(size) + known
 
 
 def arm(numbers: Sizes) -> str:
