@@ -6,16 +6,18 @@ judged one by one here, so that a selection can fit many times.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.estimate import (
     Choice,
+    Estimator,
     FrictionFitOptions,
     Interrupted,
     Learned,
@@ -25,6 +27,7 @@ from tendonfmu.estimate import (
     build_structure,
     get_number,
     learn_batch,
+    unknown_names,
     unknowns,
     with_values,
 )
@@ -32,9 +35,13 @@ from tendonfmu.model import finger_from_data, law_path, moment_arms, native
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
+FEWER_SAMPLES = 10_000  # the same for models that are only compared with each other
 PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
 MOST_PASSES = 60  # over the recordings
 TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
+# The same for models that are only compared. Noise is correlated over some 20 samples, and these standard errors do not
+# know it: they are several times too small.
+ROUGH_TOLERANCE = 0.5
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -65,14 +72,18 @@ def fit_numbers(
     settings: FitSettings = FitSettings(),
     *,
     given: Mapping[str, Any] | None = None,
+    begin: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is."""
+    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is.
+
+    `begin` is the same description with better numbers, from which the search starts.
+    """
     # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
     # otherwise fit by shrinking the force.
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={}, cost=float("nan"))
     origin = data if given is None else given
-    structure, learned = learn_numbers(data, recordings, settings, given=origin)
+    structure, learned = _learned(data, recordings, settings, origin, begin, FEWER_SAMPLES, ROUGH_TOLERANCE)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
     return FittedModel(
@@ -88,14 +99,27 @@ def learn_numbers(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
 ) -> tuple[Structure, Learned]:
     """Fit the numbers of a description and return everything known about the fit."""
-    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
+    return _learned(data, recordings, settings, given, None, MOST_SAMPLES, TOLERANCE)
+
+
+def _learned(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings,
+    given: Mapping[str, Any],
+    begin: Mapping[str, Any] | None,
+    samples: int,
+    tolerance: float,
+) -> tuple[Structure, Learned]:
+    every = -(-sum(int(recording.train.sum()) for recording in recordings) // samples)
     recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
     # a diagnosis has its own noise model, so the effective number of samples does not matter
-    fit = FrictionFitOptions(prior=PRIOR, tolerance=TOLERANCE, threads=settings.threads)
+    fit = FrictionFitOptions(prior=PRIOR, tolerance=tolerance, threads=settings.threads)
     options = Settings(fit, passes=MOST_PASSES, effective=False)
     try:
-        return structure, learn_batch(structure, recordings, Watch(None), options, None)
+        start = None if begin is None else _start_at(structure, begin, settings)
+        return structure, learn_batch(structure, recordings, Watch(None), options, start)
     except Interrupted:  # the intermediate result of a partial fit is of no use
         raise KeyboardInterrupt from None
 
@@ -105,12 +129,14 @@ def fit_extended(
     causes: Sequence[Term],
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
+    begin: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit."""
+    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit or at `begin`."""
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
-    return fit_numbers(extended_description(nominal.data, causes), recordings, settings, given=nominal.given)
+    extended = extended_description(nominal.data, causes)
+    return fit_numbers(extended, recordings, settings, given=nominal.given, begin=begin)
 
 
 def cause_parameters(
@@ -159,6 +185,19 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
             continue
         kept.append(cause)
     return kept
+
+
+def _start_at(
+    structure: Structure, begin: Mapping[str, Any], settings: FitSettings
+) -> Callable[[Sequence[str]], Numbers] | None:
+    """Return the unknowns of a description with the same numbers as the start of a fit; None if it has others."""
+    image = finger_from_data(begin, settings.path).image
+    if len(native.Instance(image).parameters()) != len(structure.group):
+        return None
+    estimator = Estimator(image, structure.group, structure.scale)
+    known = dict(zip(unknown_names(estimator), estimator.start, strict=True))
+    same = known.keys() == {*unknown_names(Estimator(structure.start.image, structure.group, structure.scale))}
+    return (lambda names: np.array([known[name] for name in names])) if same else None
 
 
 def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:

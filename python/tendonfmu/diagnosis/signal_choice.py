@@ -88,17 +88,18 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     raw = Signals()
     part = part_of(given, recordings)
     if smoothing is None:
-        signals, start = raw, starting_point(given, part, raw, settings).start
+        best = starting_point(given, part, raw, settings)
     else:
         smooth = starting_point(given, part, smoothing, settings)
         rough = starting_point(given, part, raw, settings, smooth)
         lags = any(recording.kinematics != 3 for recording in recordings)
         is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
-        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
+        best = rough if is_raw else smooth
+    signals, start = best.signals, best.start
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     nominal = fit_numbers(finger.data, own, settings)
-    model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
+    model = fit_extended(nominal, start.terms, own, settings, best.model.data) if start.causes else nominal
     least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
     chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
@@ -149,6 +150,7 @@ class Compared:
 
     signals: Signals
     start: Start
+    model: FittedModel  # fitted with it
     error: float
 
 
@@ -179,7 +181,7 @@ def starting_point(
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-        compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
+        compared.append(Compared(signals, start, model, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 
 

@@ -79,8 +79,9 @@ class View:
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
-        known = [cause for cause in self.selection.causes if cause.key in keys]
-        return Selection(self.grams, self.selection.causes, self.least, known) if known else self.selection
+        whole = self.selection
+        known = [cause for cause in whole.causes if cause.key in keys]
+        return Selection(self.grams, whole.causes, self.least, known, whole.shares) if known else whole
 
     @cached_property
     def residual(self) -> Numbers:

@@ -213,18 +213,19 @@ class Grams:
     def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
         """Return the magnitudes of a combination of candidates, learned from all folds."""
         # mix: [c, d]; low, high: [d]; returns [d]
-        return bounded(mix.T @ self._whole.energy @ mix, mix.T @ self._whole.score, low, high)
+        used = np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        energy = part.T @ self._whole.energy[np.ix_(used, used)] @ part
+        return bounded(energy, part.T @ self._whole.score[used], low, high)
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
         # mix: [c, d]; low, high: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
         left, magnitudes = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
-        part = mix[used]
+        part, inner = mix[used], np.ix_(used, used)
         for fold, counts in zip(self._by_fold, self._judged, strict=True):
-            energy, held_energy = (
-                part.T @ matrix[np.ix_(used, used)] @ part for matrix in (fold.energy, fold.own_energy)
-            )
+            energy, held_energy = (part.T @ matrix[inner] @ part for matrix in (fold.energy, fold.own_energy))
             theta = bounded(energy, part.T @ fold.score[used], low, high)
             gain = 2.0 * float(theta @ (part.T @ fold.own_score[used])) - float(theta @ held_energy @ theta)
             left += (fold.own_square - gain) if counts else 0.0
@@ -324,6 +325,8 @@ class Grams:
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
     """Return a least-squares solution [d] between bounds."""
     count = len(score)
+    if count == 1:
+        return np.clip(score / max(float(energy[0, 0]) * (1.0 + 1e-9), 1e-300), low, high)
     length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
     scaled = energy / (length[:, None] * length)
     right, low, high = score / length, low * length, high * length
