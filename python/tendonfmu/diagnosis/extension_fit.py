@@ -31,11 +31,11 @@ from tendonfmu.estimate import (
     unknowns,
     with_values,
 )
-from tendonfmu.model import finger_from_data, law_path, moment_arms, native
+from tendonfmu.model import finger_from_data, law_path, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-FEWER_SAMPLES = 10_000  # the same for models that are only compared with each other
+FEWER_SAMPLES = 5_000  # the same for models that are only compared with each other
 PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
 MOST_PASSES = 60  # over the recordings
 TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
@@ -83,11 +83,12 @@ def fit_numbers(
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={}, cost=float("nan"))
     origin = data if given is None else given
-    structure, learned = _learned(data, recordings, settings, origin, begin, FEWER_SAMPLES, ROUGH_TOLERANCE)
+    every = _thinning(recordings, FEWER_SAMPLES)
+    structure, learned = _learned(_with_noise(data, every), recordings, settings, origin, begin, every, ROUGH_TOLERANCE)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
     return FittedModel(
-        data=finger.data,
+        data=finger.data if every == 1 else {**finger.data, "bias": {**finger.data["bias"], **_noise(data)}},
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
         cost=float(learned.cost),
@@ -99,7 +100,7 @@ def learn_numbers(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
 ) -> tuple[Structure, Learned]:
     """Fit the numbers of a description and return everything known about the fit."""
-    return _learned(data, recordings, settings, given, None, MOST_SAMPLES, TOLERANCE)
+    return _learned(data, recordings, settings, given, None, _thinning(recordings, MOST_SAMPLES), TOLERANCE)
 
 
 def _learned(
@@ -108,11 +109,10 @@ def _learned(
     settings: FitSettings,
     given: Mapping[str, Any],
     begin: Mapping[str, Any] | None,
-    samples: int,
+    every: int,
     tolerance: float,
 ) -> tuple[Structure, Learned]:
-    every = -(-sum(int(recording.train.sum()) for recording in recordings) // samples)
-    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
+    recordings = [_thinned(_with_own_target(data, recording), every) for recording in recordings]
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
     # a diagnosis has its own noise model, so the effective number of samples does not matter
     fit = FrictionFitOptions(prior=PRIOR, tolerance=tolerance, threads=settings.threads)
@@ -208,6 +208,23 @@ def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRec
     if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
         return recording
     return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
+
+
+def _thinning(recordings: Sequence[FitRecording], most: int) -> int:
+    """Return of how many samples a fit learns from one."""
+    return max(1, -(-sum(int(recording.train.sum()) for recording in recordings) // most))
+
+
+def _with_noise(data: Mapping[str, Any], every: int) -> Mapping[str, Any]:
+    """Return the description with less noise, so that the bias follows one of `every` samples as fast as all."""
+    if every == 1:
+        return data
+    less = {key: value / np.sqrt(every) for key, value in _noise(data).items()}
+    return {**data, "bias": {**(data.get("bias") or {}), **less}}
+
+
+def _noise(data: Mapping[str, Any]) -> dict[str, float]:
+    return {key: number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force")}
 
 
 def _thinned(recording: FitRecording, every: int) -> FitRecording:

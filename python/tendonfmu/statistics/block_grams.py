@@ -221,16 +221,20 @@ class Grams:
     def error(self, mix: Numbers, low: Numbers, high: Numbers) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
         # mix: [c, d]; low, high: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
-        left, magnitudes = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
-        part, inner = mix[used], np.ix_(used, used)
-        for fold, counts in zip(self._by_fold, self._judged, strict=True):
-            energy, held_energy = (part.T @ matrix[inner] @ part for matrix in (fold.energy, fold.own_energy))
-            theta = bounded(energy, part.T @ fold.score[used], low, high)
-            gain = 2.0 * float(theta @ (part.T @ fold.own_score[used])) - float(theta @ held_energy @ theta)
-            left += (fold.own_square - gain) if counts else 0.0
-            magnitudes.append(theta)
-        return left, np.array(magnitudes)
+        part, inner, folds = mix[used], np.ix_(used, used), self._by_fold
+        energy, held_energy = (
+            part.T @ np.stack(matrices) @ part
+            for matrices in ([fold.energy[inner] for fold in folds], [fold.own_energy[inner] for fold in folds])
+        )
+        score, held_score = (
+            np.stack(scores) @ part
+            for scores in ([fold.score[used] for fold in folds], [fold.own_score[used] for fold in folds])
+        )
+        theta = bounded_each(energy, score, low, high)
+        gain = 2.0 * np.sum(theta * held_score, axis=1) - np.einsum("fd,fde,fe->f", theta, held_energy, theta)
+        left = np.array([fold.own_square for fold in folds]) - gain
+        return float(left[self._judged].sum()), theta
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
         """Return the error of each stretch on unseen samples."""
@@ -320,6 +324,17 @@ class Grams:
         # returns [R, n] (N·m)
         change = self._whole.refit[:, -1]
         return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
+
+
+def bounded_each(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
+    """Return the least-squares solutions between bounds of several problems [f, d]."""
+    # energy: [f, d, d]; score: [f, d]
+    length = np.sqrt(np.maximum(np.diagonal(energy, axis1=1, axis2=2), 1e-300))
+    scaled = energy / (length[:, :, None] * length[:, None, :]) + 1e-9 * np.eye(score.shape[1])
+    solutions = np.linalg.solve(scaled, (score / length)[:, :, None])[:, :, 0] / length
+    for k in np.flatnonzero(((solutions < low) | (solutions > high)).any(axis=1)):
+        solutions[k] = bounded(energy[k], score[k], low, high)
+    return np.asarray(solutions)
 
 
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
