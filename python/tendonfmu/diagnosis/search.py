@@ -55,7 +55,8 @@ class ExtensionSearch(CauseSearch):
         self.online = OnlineError(chosen.online(chosen.nominal.data), measured)
         self.models = [chosen.nominal]
         # before the start is fitted, only the residual of the nominal model is needed
-        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+        self.view = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+        self.first = self.view.lean
 
     def run(self, step: Step) -> None:
         begun = self.chosen.start.causes
@@ -142,6 +143,7 @@ class ExtensionSearch(CauseSearch):
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else _step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
         self.models.append(model)
+        self.view = self.view.lean  # frees memory for the next one
         self.view = self._look(model, candidates)
         return True
 

@@ -61,6 +61,12 @@ class View:
     def folds(self) -> Folds:
         return make_folds(self.series)
 
+    @property
+    def lean(self) -> View:
+        """The view without the columns of candidates, which take most of the memory."""
+        nominal, none = self.columns.nominal.copy(), self.columns.values[:, :, :0].copy()
+        return replace(self, columns=replace(self.columns, nominal=nominal, values=none, proposals=()))
+
     @cached_property
     def grams(self) -> Grams:
         """Products of all columns."""

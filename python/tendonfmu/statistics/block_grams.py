@@ -126,6 +126,7 @@ class Grams:
         self.square = float(np.sum(self._target**2))
         by_fold = self._with_target(products.by_fold)
         whole = np.sum(by_fold, axis=0)
+        self._raw = whole[self.nominal_count : -1, self.nominal_count : -1]  # products of the candidates
         spread = self.square / max(self._target.size, 1) * MEMORY
         ridge = np.zeros(self.nominal_count)
         known = np.isfinite(scale) & (scale > 0)
@@ -181,7 +182,7 @@ class Grams:
         # mix: [c, d]
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
-        before = part.T @ self._raw_energy()[inner] @ part
+        before = part.T @ self._raw[inner] @ part
         after = part.T @ self._whole.energy[inner] @ part
         length = np.sqrt(np.diagonal(before))
         if not (length > 0.0).all():
@@ -200,15 +201,6 @@ class Grams:
         energy = np.diagonal(part.T @ self._whole.energy[np.ix_(used, used)] @ part)
         there = max(float(np.mean(energy)), 0.0)
         return 1.0 - float(np.sqrt(self.without / max(self.without + there, 1e-300)))
-
-    def _raw_energy(self) -> Numbers:
-        if not hasattr(self, "_raw"):
-            values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
-            self._raw = np.zeros((self.count, self.count))
-            for begin in range(0, len(values), _PIECE):
-                part = values[begin : begin + _PIECE].astype(np.float64)
-                self._raw += part.T @ part
-        return self._raw
 
     def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers) -> Numbers:
         """Return the magnitudes of a combination of candidates, learned from all folds."""
