@@ -156,6 +156,7 @@ class _Bench:
         self._training, self._tests = training, tests
         self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
+        self._settled: dict[int, FittedModel] = {}  # by the fit in `_fits`
         self._signals = result.estimation.signals
         self.nominal, self._fit_to, self._everything = result.nominal, list(result.fitted_to), list(result.everything)
         if tests:  # the search has fitted to the same samples
@@ -185,8 +186,11 @@ class _Bench:
         model = self._fit(causes, self.fits_sliding)
         if not self.fits_sliding:
             return model
-        data = settled(model.data, self._trained)
-        return replace(model, data=data, values={path: get_number(data, path) for path in model.values})
+        if id(model) not in self._settled:
+            data = settled(model.data, self._trained)
+            values = {path: get_number(data, path) for path in model.values}
+            self._settled[id(model)] = replace(model, data=data, values=values)
+        return self._settled[id(model)]
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""

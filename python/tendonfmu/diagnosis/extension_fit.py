@@ -6,16 +6,18 @@ judged one by one here, so that a selection can fit many times.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.estimate import (
     Choice,
+    Estimator,
     FrictionFitOptions,
     Interrupted,
     Learned,
@@ -25,16 +27,21 @@ from tendonfmu.estimate import (
     build_structure,
     get_number,
     learn_batch,
+    unknown_names,
     unknowns,
     with_values,
 )
-from tendonfmu.model import finger_from_data, law_path, moment_arms, native
+from tendonfmu.model import finger_from_data, law_path, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
+FEWER_SAMPLES = 5_000  # the same for models that are only compared with each other
 PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
 MOST_PASSES = 60  # over the recordings
 TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
+# The same for models that are only compared. Noise is correlated over some 20 samples, and these standard errors do not
+# know it: they are several times too small.
+ROUGH_TOLERANCE = 0.5
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -67,8 +74,12 @@ def fit_numbers(
     *,
     given: Mapping[str, Any] | None = None,
     fixed: tuple[str, ...] = (),
+    begin: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is."""
+    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is.
+
+    `begin` is the same description with better numbers, from which the search starts.
+    """
     # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
     # otherwise fit by shrinking the force.
     if not unknowns(data):
@@ -76,11 +87,12 @@ def fit_numbers(
     origin = data if given is None else given
     if fixed:
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    structure, learned = learn_numbers(data, recordings, settings, given=origin)
+    every = _thinning(recordings, FEWER_SAMPLES)
+    structure, learned = _learned(_with_noise(data, every), recordings, settings, origin, begin, every, ROUGH_TOLERANCE)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)
     return FittedModel(
-        data=finger.data,
+        data=finger.data if every == 1 else {**finger.data, "bias": {**finger.data["bias"], **_noise(data)}},
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
         cost=float(learned.cost),
@@ -93,14 +105,26 @@ def learn_numbers(
     data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
 ) -> tuple[Structure, Learned]:
     """Fit the numbers of a description and return everything known about the fit."""
-    every = -(-sum(int(recording.train.sum()) for recording in recordings) // MOST_SAMPLES)
-    recordings = [_thinned(_with_own_target(data, recording), max(every, 1)) for recording in recordings]
+    return _learned(data, recordings, settings, given, None, _thinning(recordings, MOST_SAMPLES), TOLERANCE)
+
+
+def _learned(
+    data: Mapping[str, Any],
+    recordings: Sequence[FitRecording],
+    settings: FitSettings,
+    given: Mapping[str, Any],
+    begin: Mapping[str, Any] | None,
+    every: int,
+    tolerance: float,
+) -> tuple[Structure, Learned]:
+    recordings = [_thinned(_with_own_target(data, recording), every) for recording in recordings]
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
     # a diagnosis has its own noise model, so the effective number of samples does not matter
-    fit = FrictionFitOptions(prior=PRIOR, tolerance=TOLERANCE, threads=settings.threads)
+    fit = FrictionFitOptions(prior=PRIOR, tolerance=tolerance, threads=settings.threads)
     options = Settings(fit, passes=MOST_PASSES, effective=False)
     try:
-        return structure, learn_batch(structure, recordings, Watch(None), options, None)
+        start = None if begin is None else _start_at(structure, begin, settings)
+        return structure, learn_batch(structure, recordings, Watch(None), options, start)
     except Interrupted:  # the intermediate result of a partial fit is of no use
         raise KeyboardInterrupt from None
 
@@ -110,8 +134,9 @@ def fit_extended(
     causes: Sequence[Term],
     recordings: Sequence[FitRecording],
     settings: FitSettings = FitSettings(),
+    begin: Mapping[str, Any] | None = None,
 ) -> FittedModel:
-    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit."""
+    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit or at `begin`."""
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
@@ -119,7 +144,7 @@ def fit_extended(
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
     estimated = {number.path for number in unknowns(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
-    return fit_numbers(data, recordings, settings, given=nominal.given, fixed=fixed)
+    return fit_numbers(data, recordings, settings, given=nominal.given, fixed=fixed, begin=begin)
 
 
 def cause_parameters(
@@ -170,6 +195,19 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     return kept
 
 
+def _start_at(
+    structure: Structure, begin: Mapping[str, Any], settings: FitSettings
+) -> Callable[[Sequence[str]], Numbers] | None:
+    """Return the unknowns of a description with the same numbers as the start of a fit; None if it has others."""
+    image = finger_from_data(begin, settings.path).image
+    if len(native.Instance(image).parameters()) != len(structure.group):
+        return None
+    estimator = Estimator(image, structure.group, structure.scale)
+    known = dict(zip(unknown_names(estimator), estimator.start, strict=True))
+    same = known.keys() == {*unknown_names(Estimator(structure.start.image, structure.group, structure.scale))}
+    return (lambda names: np.array([known[name] for name in names])) if same else None
+
+
 def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
     """Return the recording with the external torque that makes its target follow from its forces."""
     groups = recording.recording.groups
@@ -178,6 +216,23 @@ def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRec
     if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
         return recording
     return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
+
+
+def _thinning(recordings: Sequence[FitRecording], most: int) -> int:
+    """Return of how many samples a fit learns from one."""
+    return max(1, -(-sum(int(recording.train.sum()) for recording in recordings) // most))
+
+
+def _with_noise(data: Mapping[str, Any], every: int) -> Mapping[str, Any]:
+    """Return the description with less noise, so that the bias follows one of `every` samples as fast as all."""
+    if every == 1:
+        return data
+    less = {key: value / np.sqrt(every) for key, value in _noise(data).items()}
+    return {**data, "bias": {**(data.get("bias") or {}), **less}}
+
+
+def _noise(data: Mapping[str, Any]) -> dict[str, float]:
+    return {key: number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force")}
 
 
 def _thinned(recording: FitRecording, every: int) -> FitRecording:

@@ -64,11 +64,13 @@ class ExtensionSearch(CauseSearch):
         self.online = OnlineError(chosen.online(chosen.nominal.data), measured)
         self.models = [chosen.nominal]
         # before the start is fitted, only the residual of the nominal model is needed
-        self.view = self.first = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+        self.view = self._look(chosen.nominal, () if chosen.start.causes else CANDIDATES)
+        self.first = self.view.lean
 
     def run(self, step: Step) -> None:
-        for terms in self.chosen.start.causes:
-            self._take(self._tried(_of_start(terms)), ())
+        begun = self.chosen.start.causes
+        for terms in begun:
+            self._take(self._tried(_of_start(terms), self.chosen.model.data if len(begun) == 1 else None), ())
         if not self.view.columns.proposals:
             self.view = self._look(self.models[-1])
         super().run(step)
@@ -128,15 +130,15 @@ class ExtensionSearch(CauseSearch):
         gain = with_error(*selection.gain(cause))
         return replace(cause, terms=cause.scaled(), gain=gain, p_value=self.view.p_value(cause))
 
-    def _tried(self, cause: Cause) -> Trial:
-        """Fit the description with a further cause."""
+    def _tried(self, cause: Cause, fitted: Data | None = None) -> Trial:
+        """Fit the description with a further cause; `fitted` is one that was fitted with it."""
         everything = [term for known in [*self.causes, cause] for term in known.terms]
         terms = possible(self.models[0].data, everything)
         if len(terms) < len(everything):
             return Trial(cause, None, np.array([np.inf]))
         # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
-        begin = extended_description(self.models[-1].data, cause.terms)
-        model = fit_extended(self.models[0], terms, self.chosen.predicted(begin, self._out), self._settings)
+        begin = fitted or extended_description(self.models[-1].data, cause.terms)
+        model = fit_extended(self.models[0], terms, self.chosen.predicted(begin, self._out), self._settings, begin)
         # fit again with the forces predicted with the cause
         clean = self.chosen.predicted(model.data, self._out)
         model = fit_numbers(model.data, clean, self._settings, given=self.models[0].given, fixed=model.fixed)
@@ -154,14 +156,17 @@ class ExtensionSearch(CauseSearch):
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
         self.models.append(model)
+        self.view = self.view.lean  # frees memory for the next one
         self.view = self._look(model, candidates)
         return True
 
     def _runs_better(self, model: FittedModel) -> bool:
         """Return whether the model runs better online than the last one."""
         before, after = (self.chosen.online(fitted.data) for fitted in (self.models[-1], model))
-        left, after_error = (self.online.by_stretch(online).sum() for online in (before, after))
-        return bool(after_error < left and self.online.square(after) < self.online.square(before))
+        return (
+            self.online.square(after) < self.online.square(before)
+            and self.online.by_stretch(after).sum() < self.online.by_stretch(before).sum()
+        )
 
     def _resolved(self, cause: Cause, model: FittedModel) -> bool:
         """Return whether the sensors can show a play or delay of the fitted size, and presliding is no spring."""

@@ -77,11 +77,18 @@ def by_gain(causes: Sequence[Cause]) -> list[Cause]:
 class Selection:
     """All candidate causes, judged with the same matrices."""
 
-    def __init__(self, grams: Grams, causes: Sequence[Cause], least: LeastSizes, beside: Sequence[Cause] = ()) -> None:
-        """Judge all candidates."""
+    def __init__(
+        self,
+        grams: Grams,
+        causes: Sequence[Cause],
+        least: LeastSizes,
+        beside: Sequence[Cause] = (),
+        shares: Sequence[float] | None = None,
+    ) -> None:
+        """Judge all candidates; `shares` are those that survive refitting, if they are known."""
         # `beside` holds causes that are taken as present, so that no other effect is credited with what they explain.
         self.grams, self.causes = grams, list(causes)
-        self.shares = [grams.surviving(cause.direction.mix) for cause in causes]
+        self.shares = [grams.surviving(cause.direction.mix) for cause in causes] if shares is None else list(shares)
         self._beside = [cause.direction for cause in beside]
         self.base = grams.by_stretch(None, None)
         if beside:

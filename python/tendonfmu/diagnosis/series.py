@@ -21,7 +21,7 @@ from tendonfmu.recordings import FitRecording, delayed_torque
 from tendonfmu.statistics import BlockSeries, SampleBlocks
 
 SHORTEST_STEP = 0.01  # s; shortest block
-MOST_BLOCKS = 20_000
+MOST_BLOCKS = 12_000
 _NEVER = 1e9  # N·m; a contact threshold that is never passed
 _STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache
 

@@ -35,6 +35,7 @@ from tendonfmu.statistics import Grams, Products, make_folds
 
 NOISIEST = 1000.0  # rad; the largest noise that `position_filter` accepts
 NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
+MOST_SAMPLES = 10_000  # that smoothed signals keep, if they are still fast enough
 ENOUGH = 90.0  # s of motion that suffice to choose signals and a starting point
 BETTER = 0.7  # of the error of smoothed signals, which raw ones must stay below, because they need a filter with a lag
 LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
@@ -84,21 +85,22 @@ class Estimation:
 
 def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:
     """Choose signals and starting point for recordings as they were measured."""
-    smoothing = smoothing_of([recording.recording for recording in recordings], given.data)
+    smoothing = smoothing_of([recording.recording for recording in recordings], given.data, MOST_SAMPLES)
     raw = Signals()
     part = part_of(given, recordings)
     if smoothing is None:
-        signals, start = raw, starting_point(given, part, raw, settings).start
+        best = starting_point(given, part, raw, settings)
     else:
         smooth = starting_point(given, part, smoothing, settings)
         rough = starting_point(given, part, raw, settings, smooth)
         lags = any(recording.kinematics != 3 for recording in recordings)
         is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
-        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
+        best = rough if is_raw else smooth
+    signals, start = best.signals, best.start
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     nominal = fit_numbers(finger.data, own, settings)
-    model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
+    model = fit_extended(nominal, start.terms, own, settings, best.model.data) if start.causes else nominal
     least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
     chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
@@ -149,6 +151,7 @@ class Compared:
 
     signals: Signals
     start: Start
+    model: FittedModel  # fitted with it
     error: float
 
 
@@ -171,15 +174,16 @@ def starting_point(
         tried = [starts[0], *[start for start in starts[1:] if start.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
+    begin = known.model.data if known else None
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
     span = span_of(nominal.data, own)
     compared = []
     for start in tried:
-        model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
+        model = fit_extended(nominal, start.terms, own, settings, begin) if start.causes else nominal
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-        compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
+        compared.append(Compared(signals, start, model, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 
 

@@ -78,9 +78,9 @@ def sliding_alone(
     stuck, sliding = (_squares(model.data, samples, chosen.grid) for samples in (_without(chosen.recordings, own), own))
     if stuck <= WORSE**2 * sliding:
         return None
-    start = starting_point(given, part_of(given, free), chosen.signals, chosen.settings).start
+    best = starting_point(given, part_of(given, free), chosen.signals, chosen.settings)
     nominal = fit_numbers(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
-    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=start))
+    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=best.start, model=best.model))
 
 
 def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]) -> Mapping[str, Any]:
@@ -93,8 +93,16 @@ def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]
     def with_time(time: float) -> dict[str, Any]:
         return {**data, "extensions": [*rows[: at[0]], {**rows[at[0]], "displacement": time}, *rows[at[0] + 1 :]]}
 
-    tried = [data, *(with_time(time) for time in TIMES)]
-    return min(tried, key=error)
+    # downhill from the nearest time: an error of all samples takes long
+    number = int(np.argmin(np.abs(np.log(np.array(TIMES) / max(rows[at[0]]["displacement"], TIMES[0])))))
+    errors = {k: error(with_time(TIMES[k])) for k in (number, number + 1) if k < len(TIMES)}
+    step = -1 if errors[number] <= errors.get(number + 1, np.inf) else 1
+    while 0 <= (following := min(errors) - 1 if step < 0 else max(errors) + 1) < len(TIMES):
+        errors[following] = error(with_time(TIMES[following]))
+        if errors[following] > errors[following - step]:
+            break
+    best = min(errors, key=lambda k: errors[k])
+    return with_time(TIMES[best]) if errors[best] < error(data) else data
 
 
 def _enough(recordings: Sequence[FitRecording]) -> bool:

@@ -61,6 +61,12 @@ class View:
     def folds(self) -> Folds:
         return make_folds(self.series)
 
+    @property
+    def lean(self) -> View:
+        """The view without the columns of candidates, which take most of the memory."""
+        nominal, none = self.columns.nominal.copy(), self.columns.values[:, :, :0].copy()
+        return replace(self, columns=replace(self.columns, nominal=nominal, values=none, proposals=()))
+
     @cached_property
     def grams(self) -> Grams:
         """Products of all columns."""
@@ -79,8 +85,9 @@ class View:
 
     def beside(self, keys: Collection[Key]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
-        known = [cause for cause in self.selection.causes if cause.key in keys]
-        return Selection(self.grams, self.selection.causes, self.least, known) if known else self.selection
+        whole = self.selection
+        known = [cause for cause in whole.causes if cause.key in keys]
+        return Selection(self.grams, whole.causes, self.least, known, whole.shares) if known else whole
 
     @cached_property
     def residual(self) -> Numbers:

@@ -29,6 +29,7 @@ NOISE_BAND = 0.7  # of half the sample rate; above it the spectrum is assumed to
 ABOVE_NOISE = 3.0  # times the noise's spectrum; below it the torque is noise
 SAMPLES_PER_PERIOD = 10.0  # of the cut-off, that a smoothed recording keeps,
 FAST = (5.0, 250.0)  # or, if fewer, the larger of this many per period of the cut-off and per second
+SLOW = 125.0  # samples a second that even a long recording keeps
 FEWEST = 64  # samples of a piece that can be smoothed
 
 
@@ -90,8 +91,10 @@ class Signals:
         return restored
 
 
-def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Signals | None:
-    """Choose the smoothing of recordings."""
+def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any], most: float = np.inf) -> Signals | None:
+    """Choose the smoothing of recordings; of more than `most` samples fewer are kept, SLOW a second at least."""
+    duration = sum(float(recording.time[-1] - recording.time[0]) for recording in recordings)
+    fewest = float(np.clip(most / max(duration, 1e-300), SLOW, FAST[1]))
     arms = moment_arms(data)
     crossings, rates = [], []
     for recording in recordings:
@@ -106,7 +109,7 @@ def smoothing_of(recordings: Sequence[Recording], data: Mapping[str, Any]) -> Si
     if OF_RATE * rate < LOWEST:
         return None
     cutoff = float(np.clip(OF_CROSSING * np.median(crossings), LOWEST, min(HIGHEST, OF_RATE * rate)))
-    return Signals(cutoff, max(1, int(rate / min(SAMPLES_PER_PERIOD * cutoff, max(FAST[0] * cutoff, FAST[1])))))
+    return Signals(cutoff, max(1, int(rate / min(SAMPLES_PER_PERIOD * cutoff, max(FAST[0] * cutoff, fewest)))))
 
 
 def _crossing(torque: Numbers, rate: float) -> float:

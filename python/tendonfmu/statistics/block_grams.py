@@ -127,6 +127,7 @@ class Grams:
         by_fold = self._with_target(products.by_fold)
         whole = np.sum(by_fold, axis=0)
         ridge = self.ridge(scale)
+        self._raw = whole[self.nominal_count : -1, self.nominal_count : -1]  # products of the candidates
         diagonal = np.diagonal(whole)[: self.nominal_count]
         self._ridge = np.maximum(ridge, 1e-9 * diagonal) + 1e-300
         self._by_fold = [self._left_out(whole - held, held) for held in by_fold]
@@ -177,7 +178,7 @@ class Grams:
         # mix: [c, d]
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
-        before = part.T @ self._raw_energy()[inner] @ part
+        before = part.T @ self._raw[inner] @ part
         after = part.T @ self._whole.energy[inner] @ part
         length = np.sqrt(np.diagonal(before))
         if not (length > 0.0).all():
@@ -197,15 +198,6 @@ class Grams:
         there = max(float(np.mean(energy)), 0.0)
         return 1.0 - float(np.sqrt(self.without / max(self.without + there, 1e-300)))
 
-    def _raw_energy(self) -> Numbers:
-        if not hasattr(self, "_raw"):
-            values = self._table[:, :, self.nominal_count :].reshape(self._target.size, self.count)
-            self._raw = np.zeros((self.count, self.count))
-            for begin in range(0, len(values), _PIECE):
-                part = values[begin : begin + _PIECE].astype(np.float64)
-                self._raw += part.T @ part
-        return self._raw
-
     def ridge(self, scale: Numbers, square: float | None = None) -> Numbers:
         """Return the weights of the squares of numbers that are about as large as `scale`; 0 where that is unknown."""
         # scale: [d]; square: Σ e² of what is left ((N·m)²), that of the target if None; returns [d]
@@ -219,24 +211,28 @@ class Grams:
     def magnitudes(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> Numbers:
         """Return the magnitudes of a combination of candidates, learned from all folds."""
         # mix: [c, d]; low, high, ridge: [d]; returns [d]
-        energy = mix.T @ self._whole.energy @ mix
-        return bounded(energy + _diagonal(ridge), mix.T @ self._whole.score, low, high)
+        used = np.flatnonzero(mix.any(axis=1))
+        part = mix[used]
+        energy = part.T @ self._whole.energy[np.ix_(used, used)] @ part
+        return bounded(energy + _diagonal(ridge), part.T @ self._whole.score[used], low, high)
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
         # mix: [c, d]; low, high, ridge: [d]; returns Σ e² on held-out folds ((N·m)²), learned without each fold [f, d]
-        left, magnitudes = 0.0, []
         used = np.flatnonzero(mix.any(axis=1))
-        part = mix[used]
-        for fold, counts in zip(self._by_fold, self._judged, strict=True):
-            energy, held_energy = (
-                part.T @ matrix[np.ix_(used, used)] @ part for matrix in (fold.energy, fold.own_energy)
-            )
-            theta = bounded(energy + _diagonal(ridge), part.T @ fold.score[used], low, high)
-            gain = 2.0 * float(theta @ (part.T @ fold.own_score[used])) - float(theta @ held_energy @ theta)
-            left += (fold.own_square - gain) if counts else 0.0
-            magnitudes.append(theta)
-        return left, np.array(magnitudes)
+        part, inner, folds = mix[used], np.ix_(used, used), self._by_fold
+        energy, held_energy = (
+            part.T @ np.stack(matrices) @ part
+            for matrices in ([fold.energy[inner] for fold in folds], [fold.own_energy[inner] for fold in folds])
+        )
+        score, held_score = (
+            np.stack(scores) @ part
+            for scores in ([fold.score[used] for fold in folds], [fold.own_score[used] for fold in folds])
+        )
+        theta = bounded_each(energy + _diagonal(ridge), score, low, high)
+        gain = 2.0 * np.sum(theta * held_score, axis=1) - np.einsum("fd,fde,fe->f", theta, held_energy, theta)
+        left = np.array([fold.own_square for fold in folds]) - gain
+        return float(left[self._judged].sum()), theta
 
     def by_stretch(self, mix: Numbers | None, magnitudes: Numbers | None) -> Numbers:
         """Return the error of each stretch on unseen samples."""
@@ -332,9 +328,22 @@ def _diagonal(ridge: Numbers | None) -> Numbers | float:
     return 0.0 if ridge is None else np.diag(ridge)
 
 
+def bounded_each(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
+    """Return the least-squares solutions between bounds of several problems [f, d]."""
+    # energy: [f, d, d]; score: [f, d]
+    length = np.sqrt(np.maximum(np.diagonal(energy, axis1=1, axis2=2), 1e-300))
+    scaled = energy / (length[:, :, None] * length[:, None, :]) + 1e-9 * np.eye(score.shape[1])
+    solutions = np.linalg.solve(scaled, (score / length)[:, :, None])[:, :, 0] / length
+    for k in np.flatnonzero(((solutions < low) | (solutions > high)).any(axis=1)):
+        solutions[k] = bounded(energy[k], score[k], low, high)
+    return np.asarray(solutions)
+
+
 def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
     """Return a least-squares solution [d] between bounds."""
     count = len(score)
+    if count == 1:
+        return np.clip(score / max(float(energy[0, 0]) * (1.0 + 1e-9), 1e-300), low, high)
     length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
     scaled = energy / (length[:, None] * length)
     right, low, high = score / length, low * length, high * length
