@@ -16,13 +16,13 @@ from scipy.stats import ttest_1samp
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of, without_blocks, without_events
-from tendonfmu.diagnosis.effects import CANDIDATES, SCALING, Candidate, Place, Term
+from tendonfmu.diagnosis.effects import CANDIDATES, RUBBING, SCALING, Candidate, Place, Term
 from tendonfmu.diagnosis.effects.shapes import is_spring
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, fit_numbers, possible
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, rms_gain
-from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere
+from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere, presliding_of_joints
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import View
@@ -73,6 +73,13 @@ class ExtensionSearch(CauseSearch):
         best = selection.best(self._least_gain, tried)
         if best is None:
             return None
+        # what every finger has comes first: friction that builds up too early in joints looks like other friction
+        alike = {best.effect, *(rival.effect for rival in _to_fit(best))}
+        at_joints = presliding_of_joints(self.models[-1].data)
+        if at_joints and alike & {*RUBBING, *WIDESPREAD}:
+            trial = self._tried(_of_start(at_joints))
+            if self._take(trial):
+                return trial.cause, True
         trial = self._best_fitted(selection, best)
         return trial.cause, trial.cause.p_value < SIGNIFICANCE and self._take(trial)
 

@@ -6,12 +6,13 @@
 """
 
 from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant
-from tendonfmu.diagnosis.effects.table import BY_NAME, CANDIDATES, COMMON, SCALING, SHARED, by_name
+from tendonfmu.diagnosis.effects.table import BY_NAME, CANDIDATES, COMMON, RUBBING, SCALING, SHARED, by_name
 
 __all__ = [
     "BY_NAME",
     "CANDIDATES",
     "COMMON",
+    "RUBBING",
     "SCALING",
     "SHARED",
     "Candidate",

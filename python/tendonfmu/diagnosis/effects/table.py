@@ -369,6 +369,7 @@ CANDIDATES: tuple[Candidate, ...] = (
 )
 SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
 SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
+RUBBING = ("stribeck", *(candidate.name for candidate in CANDIDATES if "friction" in candidate.name))
 COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)
 BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
 
