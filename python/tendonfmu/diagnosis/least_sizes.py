@@ -62,7 +62,7 @@ class LeastSizes:
         return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 
     def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
-        """Return whether the sensors can show the sizes of an effect in a fitted description; no friction is negative."""
+        """Return whether the sensors can show the sizes of a fitted effect; no friction is negative."""
         rows = [extended_row(data, effect, term.place) for term in terms]
         if effect in NEVER_NEGATIVE and sum(row["coulomb"] for row in rows if row) < 0.0:
             return False
