@@ -15,7 +15,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from evidence.diagnosis.hidden_sensors import SENSORS, Random
-from evidence.fingers.matched_physics import Array, Description, Effect, Finger, Motion, held_sign
+from evidence.fingers.matched_physics import Array, Description, Effect, Finger, Motion, build_up, held_sign
 from evidence.fingers.matched_rig import Hand, Hidden, Unreachable, record
 from evidence.fingers.matched_strength import look, residual, surviving
 
@@ -201,15 +201,26 @@ def coupling(finger: Finger, motion: Motion, force: Array, size: float, at: Any,
     return at_joints(motion, slice(j, j + 2), np.column_stack([size * twist, -size * twist]))
 
 
+def built_up(finger: Finger, motion: Motion, tendon: int | None, joint: int) -> Array:
+    """[N] friction over the most it may be: it builds up as the other friction of its tendon or joint does."""
+    kinds, at = (("joint", "load"), joint) if tendon is None else (("edge", "pulley"), tendon)
+    velocity = motion.velocity[:, joint] if tendon is None else motion.tendon[:, tendon, joint]
+    known = (effect.memory for effect in finger.effects if effect.kind in kinds and effect.at[0] == at)
+    memory = next((memory for memory in known if memory is not None), None)
+    if memory is not None:
+        return build_up(velocity, motion.time, memory)
+    return held_sign(velocity, finger.joint_threshold if tendon is None else finger.tendon_threshold)
+
+
 def preload(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
     """A bushing before the joint that clamps the tendon whatever its force."""
     i, j = at["tendon"], at["joint"]
-    drag = size * held_sign(motion.tendon[:, i, j], finger.tendon_threshold)
+    drag = size * built_up(finger, motion, i, j)
     return at_joints(motion, slice(j, None), drag[:, None] * finger.arms[i, j:])
 
 
 def by_load(finger: Finger, motion: Motion, force: Array, size: float, at: Any, draw: Array) -> Array:
-    sign = held_sign(motion.velocity[:, at["joint"]], finger.joint_threshold)
+    sign = built_up(finger, motion, None, at["joint"])
     return at_joints(motion, at["joint"], size * np.abs(force[:, at["tendon"]]) * sign)
 
 

@@ -25,6 +25,7 @@ from tendonfmu.diagnosis.effects.shapes import is_spring, usual_time
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numbers
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.gain import residual_of as online_residual
+from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
 from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
 from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
@@ -183,6 +184,23 @@ def test_the_scan_starts_with_presliding_where_there_is_some() -> None:
     assert distance / 5.0 < starts[0].presliding[0].shape["displacement"] < 5.0 * distance
     without = min(each.error for each in starts if not each.presliding)
     assert starts[0].error < 0.7 * without
+
+
+def test_the_scan_finds_joints_that_are_softer_than_their_tendons() -> None:
+    soft = [{"effect": "presliding", "joint": j, "displacement": 0.05} for j in (1, 2)]
+    truth = finger() | {"extensions": [{"effect": "presliding", "displacement": 0.05}, *soft]}  # 25 µm at tendons
+    starts = scanned(recorded(truth, 25, 3, 20.0))
+    assert [each.place for each in starts[0].presliding] == [Place(), Place(joint=1), Place(joint=2)]
+
+
+def test_negative_friction_is_no_cause() -> None:
+    rows = [
+        {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
+    ]
+    terms = [Term(by_name("load_friction"), Place(1, i)) for i in (1, 2)]
+    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, 0.0)
+    assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
+    assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
 
 
 def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:

@@ -134,6 +134,17 @@ def test_a_diagnosis_names_measures_and_extends() -> None:
     )
 
 
+@pytest.mark.parametrize(("effect", "number"), [("preload_friction", "coulomb"), ("friction_drift", "amplitude")])
+def test_friction_that_builds_up_has_its_own_size(effect: str, number: str) -> None:
+    """What acts on friction is found by how the friction of its place builds up, not by the sign of motion."""
+    case = makers.single(3, replace(SHORT, presliding=True), effect, 3.0)
+    diagnosis = case.diagnosed()
+    first = next(cause for cause in diagnosis.causes if cause.where.effect != "presliding")
+    assert first.where.effect == effect
+    sizes = [value for path, (value, _) in first.parameters.items() if path.endswith(f".{number}")]
+    assert sum(sizes) == pytest.approx(case.facts["magnitude"], rel=0.3)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("effect", ["force_offset", "gravity", "moment_arm"])
 def test_absorbed_is_told_to_be_invisible(effect: str) -> None:

@@ -113,6 +113,25 @@ def held_friction(run: Run) -> None:
 
 
 @case
+def held_friction_builds_up(run: Run) -> None:
+    """preload_friction and load_friction with presliding everywhere: ζ of their velocity in place of its sign."""
+    extensions = [
+        {"effect": "presliding", "displacement": 0.1},  # D: 5e-5 m at a tendon, 1e-3 rad at a joint
+        {"effect": "preload_friction", "joint": 2, "tendon": 2, "coulomb": 5.0},
+        {"effect": "load_friction", "joint": 2, "tendon": 2, "coulomb": 1e-3},
+    ]
+    rec = of_two([0.0, 0.001, 0.002], [[10.0, 8.0]] * 3, [[0.0, 0.0], [0.0, -1.0], [0.0, 2.0]])
+    still = torque(run(two_joints(extensions[:1]), rec))
+    tendon, joint = [0.0], [0.0]  # ẋ_22 = −0.01 q̇_2
+    for side, travel in ((-1.0, 1e-3), (1.0, 2e-3)):
+        joint.append(side - (side - joint[-1]) * math.exp(-travel / 1e-3))
+        tendon.append(-side - (-side - tendon[-1]) * math.exp(-0.01 * travel / 5e-5))
+    added = torque(run(two_joints(extensions), rec)) - still
+    close(added[:, 0], np.zeros(3))
+    close(added[:, 1], -0.01 * 5.0 * np.array(tendon) + 8.0 * 1e-3 * np.array(joint))
+
+
+@case
 def corrected_measurements(run: Run) -> None:
     """Forces and arms other than described: corrections of the torque, not of joint_torque, the angle or the bounds."""
     extensions = [

@@ -113,7 +113,7 @@ class FingerOracle:
         x_dot = tendon_velocity(self.R, v)
         travel = v * dt if self.travel is None else self.travel
         self.travelled = travel, tendon_velocity(self.R, travel)
-        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, out)
+        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, out)
         # 2. each friction effect: F, the increment b, and what stiction may hide
         F, b, hidden = self._effects(q, v, x_dot, time, dt, first, out)
         # 3. forces at and between the joints, and with them what multiplies an F or a b

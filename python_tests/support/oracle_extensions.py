@@ -43,7 +43,8 @@ class Row:
 
 @dataclass
 class Moment:
-    """A sample as torques see it: q, v, acceleration, rest [n], f0 [m]; s of ẋ [m, n + 1] and of q̇ [n]."""
+    """A sample as torques see it: q, v, acceleration, rest [n], f0 [m]; s of ẋ [m, n + 1] and of q̇ [n], or ζ where
+    `presliding` acts; Δ of both."""
 
     q: Array
     v: Array
@@ -52,6 +53,7 @@ class Moment:
     f0: Array
     tendon_side: Array
     joint_side: Array
+    travelled: tuple[Array, Array]
 
 
 @dataclass
@@ -182,6 +184,7 @@ class Extensions:
         self.history: dict[str, list[Array]] = {}
         self.v_before = np.zeros(n)
         self.sides = Sides(np.zeros((m, n + 1)), np.zeros(n), set(self._read_sides(m)))
+        self.shares = np.zeros((m, n + 1)), np.zeros(n)  # ζ of all places of `presliding`
         self.moment: Moment | None = None
 
     def _read_sides(self, m: int) -> list[tuple[Any, ...]]:
@@ -261,9 +264,9 @@ class Extensions:
 
     def advance(
         self, q: Array, v: Array, x_dot: Array, f0: Array, dt: float, first: bool, thresholds: tuple[float, float],
-        out: Step,
+        travelled: tuple[Array, Array], out: Step,
     ) -> None:  # fmt: skip
-        """What torques and friction see of this sample. thresholds: v_min of tendons and joints."""
+        """What torques and friction see of this sample. thresholds: v_min of tendons and joints; travelled: their Δ."""
         for i, row in enumerate(x_dot):
             for j, velocity in enumerate(row):
                 self.sides.take(("tendon", i, j), velocity, thresholds[0], out)
@@ -271,8 +274,15 @@ class Extensions:
             self.sides.take(("joint", j), velocity, thresholds[1], out)
         acceleration = np.zeros(self.n) if first else (v - self.v_before) / dt
         self.v_before = v
+        joint, tendon = (np.zeros_like(travel) if first else travel for travel in travelled)
         sides = self.sides.tendon.copy(), self.sides.joint.copy()
-        self.moment = Moment(q, v, acceleration, self.rest, f0, *sides)
+        for i, j in np.ndindex(tendon.shape):
+            if (distance := self.slides(self.rows_at("edge", (i, j)), thresholds[0])) is not None:
+                sides[0][i, j] = self.shares[0][i, j] = next_share(self.shares[0][i, j], tendon[i, j], distance)
+        for j in range(self.n):
+            if (distance := self.slides(self.rows_at("joint", (j,)), thresholds[1])) is not None:
+                sides[1][j] = self.shares[1][j] = next_share(self.shares[1][j], joint[j], distance)
+        self.moment = Moment(q, v, acceleration, self.rest, f0, *sides, (joint, tendon))
 
     # --- step 2
 

@@ -159,6 +159,7 @@ class Trace:
         self.residual = np.array([np.full(self.n, np.nan), *finger.residuals])
         self.branches = finger.branches
         self.rows = finger.extensions.rows
+        self.finger = finger
         self.units = self._unit_torques(finger)
         self.laws: dict[Place, tuple[Course, float, Array, list[tuple[str, str]]]] = {}
         self.grips: dict[Place, list[int]] = {}  # rows of extensions that change the friction of a place
@@ -196,8 +197,8 @@ class Trace:
         return weights, sides
 
     def _unit_torques(self, finger: Recorder) -> dict[str, Array]:
-        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change) and
-        for what is not linear; of a preload friction what its own joint feels, and what joints beyond feel.
+        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change),
+        for friction (it may build up) and for what is not linear.
         """
 
         def series(row: Row, numbers: Mapping[str, float]) -> Array:
@@ -206,10 +207,7 @@ class Trace:
 
         found = {}
         for k, row in enumerate(self.rows):
-            if row.effect == "preload_friction":
-                found[f"{k}.own"] = series(row, {"coulomb": 1.0, "beyond": 0.0})
-                found[f"{k}.beyond"] = series(row, {"coulomb": 1.0, "beyond": 1.0}) - found[f"{k}.own"]
-            elif row.effect not in (*SPRINGS, "pulley_eccentricity"):
+            if row.effect not in (*SPRINGS, "pulley_eccentricity", "preload_friction", "load_friction"):
                 for name in row.numbers:
                     unit = dict.fromkeys(row.numbers, 0.0) | {name: 1.0}
                     found[f"extensions[{k + 1}].{name}"] = series(row, unit)
@@ -227,11 +225,30 @@ class Trace:
             factor = factor * factor_of(self.rows[k], numbers, course.speed, self.time - self.time[0])
             if self.rows[k].effect == "presliding":
                 distance = distance_of(self.rows[k], numbers["displacement"], threshold)
-                series = [0.0 * distance]
-                for travel in course.travel[1:]:
-                    series.append(next_share(series[-1], travel, distance))
-                share = np.concatenate([np.atleast_2d(each) for each in series], axis=-1)
+                share = self._shares(course.travel, distance)
         return factor, share
+
+    def _side(self, theta: Values, tendon: int | None, joint: int) -> Any:
+        """s of ẋ or q̇ [N], or ζ [U, N] where it slides."""
+        extensions = self.finger.extensions
+        rows = extensions.rows_at("joint", (joint,)) if tendon is None else extensions.rows_at("edge", (tendon, joint))
+        row = next((row for row in rows if row.effect == "presliding"), None)
+        moments = self.finger.moments
+        if row is None:
+            sides = [each.joint_side[joint] if tendon is None else each.tendon_side[tendon, joint] for each in moments]
+            return np.array(sides)
+        displacement = self._numbers(next(k for k, one in enumerate(self.rows) if one is row), theta)["displacement"]
+        distance = distance_of(row, displacement, self.finger.thresholds[int(tendon is None)])
+        travels = [each.travelled[0][joint] if tendon is None else each.travelled[1][tendon, joint] for each in moments]
+        return self._shares(travels, distance)
+
+    @staticmethod
+    def _shares(travels: Any, distance: Any) -> Array:
+        """ζ [U, N]."""
+        series = [0.0 * distance]
+        for travel in travels[1:]:
+            series.append(next_share(series[-1], travel, distance))
+        return np.concatenate([np.atleast_2d(each) for each in series], axis=-1)
 
     def _friction_and_jump(self, place: Place, theta: Values, samples: slice) -> tuple[Any, Any]:
         """F and b of one effect, [U, N]."""
@@ -343,10 +360,14 @@ class Trace:
                 arm = numbers["sine"] * np.sin(turned) + numbers["cosine"] * np.cos(turned)
                 torque[..., row.joint] -= arm * self.force[samples, row.tendon]
             elif row.effect == "preload_friction":
-                beyond = np.asarray(theta[f"extensions[{k + 1}].beyond"])[..., None]
-                torque += np.asarray(theta[f"extensions[{k + 1}].coulomb"])[..., None] * (
-                    self.units[f"{k}.own"][samples] + beyond * self.units[f"{k}.beyond"][samples]
-                )
+                numbers = self._numbers(k, theta)
+                for before in range(self.n) if row.joint is None else [row.joint]:
+                    lost = numbers["coulomb"] * self._side(theta, row.tendon, before)[..., samples]
+                    for j in range(before, self.n):
+                        torque[..., j] += self.R[row.tendon, j] * lost * (1.0 if j == before else numbers["beyond"])
+            elif row.effect == "load_friction":
+                lost = self._numbers(k, theta)["coulomb"] * self._side(theta, None, row.joint)[..., samples]
+                torque[..., row.joint] += lost * np.abs(self.force[samples, row.tendon])
         for path, unit in self.units.items():
             if path in theta:
                 torque += np.asarray(theta[path])[..., None] * unit[samples]

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "extension_signals.h"
+#include "presliding_step.h"
 #include "rows_in_use.h"
 #include "slot_view.h"
 
@@ -254,6 +255,36 @@ static void linearise_joints(linearisation* l) {
   }
 }
 
+/* slope of what makes the travel at a slot */
+static double motion_at(const linearisation* l, size_t slot) {
+  const size_t n = l->finger->joints, lanes = l->finger->tendon_lanes;
+  if (slot >= n * lanes) {
+    return l->motion[slot - n * lanes];
+  }
+  double motion = 0.0;
+  for (size_t j = n; j-- > slot / lanes;) {
+    motion += l->finger->derived.moment_arm[j * lanes + slot % lanes] * l->motion[j];
+  }
+  return motion;
+}
+
+/* adds what friction as a torque owes to how it builds up at its places */
+static void add_followed(const linearisation* l, const extension_row* row, const effect_sample* sample, double* slope) {
+  const tendonfmu_finger* f = l->finger;
+  double slopes[MODEL_MAX_JOINTS] = {0.0};
+  for (size_t k = 0; k < row->memory_count; ++k) {
+    size_t member;
+    const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+    const extension_row* sliding = sliding_row_at(f, slot, &member);
+    if (sliding && l->memory_slope) {
+      slopes[k] = l->memory_slope[sliding->offset + PRESLIDING_NUMBERS * member + PRESLIDING_SHARE];
+    } else if (sliding) {
+      slopes[k] = sliding->memory[PRESLIDING_NUMBERS * member + PRESLIDING_BY_MOTION] * motion_at(l, slot);
+    }
+  }
+  row->effect->torque(row->place, row->parameters, sample, slopes, slope);
+}
+
 /* what the torque rows add */
 static void linearise_extensions(linearisation* l, const double* force) {
   const tendonfmu_finger* f = l->finger;
@@ -273,6 +304,9 @@ static void linearise_extensions(linearisation* l, const double* force) {
       row->effect->torque(row->place, row->parameters, &sample, l->memory_slope + row->offset, slope);
     } else {
       row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    }
+    if (row->effect->slot && f->extensions.sliding) {
+      add_followed(l, row, &sample, slope);
     }
   }
   for (size_t j = 0; j < f->joints; ++j) {

@@ -6,6 +6,7 @@
 
 #include "directional_derivative.h"
 #include "extension_signals.h"
+#include "presliding_step.h"
 
 static void add_plain(parameter_derivative* d, uint32_t parameter, const double* torque, const double* jump) {
   for (size_t j = 0; j < d->joints; ++j) {
@@ -128,6 +129,25 @@ void extension_place_slopes(const tendonfmu_finger* f, const parameter_derivativ
   }
 }
 
+/* friction as a torque whose places slide with a row, by this row's displacement */
+static void add_followers(const tendonfmu_finger* f, const extension_row* row, double* torque) {
+  const effect_sample sample = remembered_sample(f);
+  for (size_t r = 0; r < f->extensions.torques; ++r) {
+    const extension_row* other = torque_row(f, r);
+    double slopes[MODEL_MAX_JOINTS] = {0.0};
+    for (size_t k = 0; other->effect->slot && k < other->memory_count; ++k) {
+      size_t member;
+      const size_t slot = other->effect->slot(other->place, f->joints, f->tendon_lanes, k);
+      if (sliding_row_at(f, slot, &member) == row) {
+        slopes[k] = row->memory[PRESLIDING_NUMBERS * member + PRESLIDING_BY_DISPLACEMENT];
+      }
+    }
+    if (other->effect->slot) {
+      other->effect->torque(other->place, other->parameters, &sample, slopes, torque);
+    }
+  }
+}
+
 static void read_friction_row(const tendonfmu_finger* f, const extension_row* row, parameter_derivative* d) {
   row_slopes sum = {{{0.0}}, {{0.0}}};
   const size_t members = friction_members(f, row->place);
@@ -146,6 +166,9 @@ static void read_friction_row(const tendonfmu_finger* f, const extension_row* ro
         add_place(d, &slopes, place[p], row->effect->parameter_count, &sum);
       }
     }
+  }
+  if (row->in_layer) {
+    add_followers(f, row, sum.torque[0]);
   }
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
     add_plain(d, row->first_parameter + k, sum.torque[k], sum.jump[k]);

@@ -177,6 +177,16 @@ const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
+/* friction as a torque builds up as presliding says where that acts on its places */
+static void follow_places(const tendonfmu_finger* f, const extension_row* row) {
+  for (size_t k = 0; k < row->memory_count; ++k) {
+    const uint32_t at = f->extensions.acting.offset[row->effect->slot(row->place, f->joints, f->tendon_lanes, k)];
+    if (at < f->shape.extension_memory) {
+      row->next[k] = f->scratch.extension[at + PRESLIDING_SHARE];
+    }
+  }
+}
+
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
   const int travels = filters_position(f);
@@ -202,6 +212,9 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
     const extension_row* row = f->extensions.row + r;
     if (row->effect->advance && !row->in_layer) {
       row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
+    }
+    if (row->effect->slot && f->extensions.sliding) {
+      follow_places(f, row);
     }
   }
 }
@@ -259,6 +272,16 @@ int friction_acts_on(const tendonfmu_finger* f, const extension_row* row, size_t
   const int at_tendon = slot < joint_row, used = at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
   *member = at_tendon ? slot / lanes * f->tendons + slot % lanes : f->joints * f->tendons + slot - joint_row;
   return used && !row_yields(f, row, slot);
+}
+
+const extension_row* sliding_row_at(const tendonfmu_finger* f, size_t slot, size_t* member) {
+  for (size_t r = 0; r < f->extensions.friction; ++r) {
+    const extension_row* row = friction_row(f, r);
+    if (row->in_layer && friction_acts_on(f, row, slot, member)) {
+      return row;
+    }
+  }
+  return NULL;
 }
 
 static void add_grip(slot_grip* to, const effect_grip* grip) {

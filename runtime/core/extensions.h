@@ -35,6 +35,9 @@ static inline int row_yields(const tendonfmu_finger* finger, const extension_row
 /* Whether such a row acts on a slot, and which member it is there. */
 int friction_acts_on(const tendonfmu_finger* finger, const extension_row* row, size_t slot, size_t* member);
 
+/* The row that makes a slot slide, and which member of it the slot is; NULL: none. */
+const extension_row* sliding_row_at(const tendonfmu_finger* finger, size_t slot, size_t* member);
+
 /* What all friction rows together make of a slot, from the memory: F = value·|F(v)| where it slides, else value·F; b is
  * multiplied by bias. */
 typedef struct slot_grip {
@@ -61,8 +64,8 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
 
-/* What every other effect will remember, but for the rows in the layers of what slides; angles, velocities and forces
- * are known. */
+/* What every other effect will remember, but for the rows in the layers of what slides, which have been advanced;
+ * angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
 
 /* What the friction rows make of F at every slot, into scratch; after what slides has been advanced. */

@@ -156,7 +156,7 @@ class _Bench:
         self._training, self._tests = training, tests
         self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
-        self._settled: dict[int, FittedModel] = {}  # by the fit in `_fits`
+        self._settled_fits: dict[int, FittedModel] = {}
         self._signals = result.estimation.signals
         self.nominal, self._fit_to, self._everything = result.nominal, list(result.fitted_to), list(result.everything)
         if tests:  # the search has fitted to the same samples
@@ -179,18 +179,24 @@ class _Bench:
 
     def fit(self, causes: Sequence[Cause]) -> FittedModel:
         """Return the fit that causes are judged by."""
-        return self._fit(causes, self._result.only_sliding)
+        return self._settled(causes, self._result.only_sliding)
 
     def result(self, causes: Sequence[Cause]) -> FittedModel:
         """Return the fit that becomes the extended model."""
-        model = self._fit(causes, self.fits_sliding)
-        if not self.fits_sliding:
+        return self._settled(causes, self.fits_sliding)
+
+    def _settled(self, causes: Sequence[Cause], sliding: bool) -> FittedModel:
+        """Return a fit that runs over stuck samples, too: of those that slide it learns no distance of presliding."""
+        model = self._fit(causes, sliding)
+        if not sliding:
             return model
-        if id(model) not in self._settled:
+        key = id(model)
+        if key not in self._settled_fits:
             data = settled(model.data, self._trained)
-            values = {path: get_number(data, path) for path in model.values}
-            self._settled[id(model)] = replace(model, data=data, values=values)
-        return self._settled[id(model)]
+            self._settled_fits[key] = replace(
+                model, data=data, values={path: get_number(data, path) for path in model.values}
+            )
+        return self._settled_fits[key]
 
     def _trained(self, data: Data) -> float:
         """Return Σ r² over all samples that are fitted to, (N·m)²."""

@@ -20,6 +20,7 @@ from tendonfmu.model import extended_row
 
 OF_NOISE = 4.0  # standard deviations of the position noise
 OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
+NEVER_NEGATIVE = ("preload_friction", "load_friction")  # all their places together
 BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
 
 
@@ -61,7 +62,10 @@ class LeastSizes:
         return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 
     def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
-        """Return whether the sensors can show the sizes that an effect has in a fitted description."""
+        """Return whether the sensors can show the sizes of a fitted effect; no friction is negative."""
+        rows = [extended_row(data, effect, term.place) for term in terms]
+        if effect in NEVER_NEGATIVE and sum(row["coulomb"] for row in rows if row) < 0.0:
+            return False
         return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
 
 

@@ -16,7 +16,7 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of, without_blocks, without_events
-from tendonfmu.diagnosis.effects import CALIBRATED, CANDIDATES, SCALING, Candidate, Place, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CANDIDATES, RUBBING, SCALING, Candidate, Place, Term
 from tendonfmu.diagnosis.effects.shapes import is_spring
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, fit_numbers, possible
 from tendonfmu.diagnosis.gain import OnlineError
@@ -30,7 +30,7 @@ from tendonfmu.diagnosis.selection import (
     rms_gain,
     step_p_value,
 )
-from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere
+from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere, presliding_of_joints
 from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import View
@@ -82,6 +82,12 @@ class ExtensionSearch(CauseSearch):
         # itself is excluded: it lowers any error by shrinking the torque.
         selection = self.view.beside({refused.key for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
+        at_joints = presliding_of_joints(self.models[-1].data)
+        # what every finger has comes first: friction that builds up too early in joints looks like other friction
+        if best is not None and at_joints and _effects(best) & {*RUBBING, *WIDESPREAD}:
+            trial = self._tried(_of_start(at_joints))
+            if self._take(trial):
+                return trial.cause, True
         together = calibration(self.view, selection, tried, self._least_gain)
         if together is not None and is_better(together, best, self._least_gain):
             trial = self._tried(together)
@@ -202,6 +208,11 @@ def _to_fit(best: Cause) -> list[Cause]:
     # A correction of the torque itself may replace only another such correction, because it lowers any error.
     scaling = best.effect in SCALING
     return [rival for rival in best.alike if scaling or rival.effect not in SCALING][: MOST_FITTED - 1]
+
+
+def _effects(best: Cause) -> set[str]:
+    """Return the effect of a cause and those that may replace it."""
+    return {best.effect, *(rival.effect for rival in _to_fit(best))}
 
 
 def _of_start(terms: tuple[Term, ...]) -> Cause:

@@ -20,7 +20,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import candidate_columns, without_uncertainty
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
-from tendonfmu.diagnosis.effects.shapes import is_spring
+from tendonfmu.diagnosis.effects.shapes import is_spring, of_joints
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes, noise_of
@@ -285,7 +285,22 @@ def scan(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid
             start = Start(presliding, known, 0.0)
             begin = extended_description(data, start.terms)
             starts.append(replace(start, error=float(_errors(begin, recordings, grid, moved[:, :, :1] * 0.0)[0])))
+    first = min(starts, key=lambda start: start.error)
+    at_joints = presliding_of_joints(extended_description(data, first.presliding))
+    if at_joints:
+        begin = extended_description(data, [*first.presliding, *at_joints])
+        late = _torque(recordings, grid, first.delay) - _torque(recordings, grid, 0.0)
+        error = float(_errors(begin, recordings, grid, late[:, :, None])[0])
+        if error < (1.0 - CLEAR_GAIN) ** 2 * first.error:
+            starts.append(Start((*first.presliding, *at_joints), first.delay, error))
     return sorted(starts, key=lambda start: start.error)
+
+
+def presliding_of_joints(data: Data) -> tuple[Term, ...]:
+    """Return presliding in joints over distances of their own, where a description has one distance everywhere."""
+    return tuple(
+        Term(PRESLIDING, place, {"displacement": distance}, (1.0,)) for place, distance in of_joints(data).items()
+    )
 
 
 def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Term, ...]]:

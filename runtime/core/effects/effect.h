@@ -137,6 +137,9 @@ typedef struct effect_type {
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);
+  /* Of friction: the slot with whose velocity number k of its memory has its sign. Where presliding acts there, the
+   * number is presliding's share in place of the sign. torque() must be linear in the memory; NULL: not so. */
+  size_t (*slot)(effect_place place, size_t joints, size_t lanes, size_t k);
 
   /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
    * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's; of a finger's

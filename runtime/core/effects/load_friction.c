@@ -15,6 +15,11 @@ static void advance(effect_place place, const double* parameters, const effect_s
   after[0] = held_side(sample, sample->velocity[place.joint], sample->joint_threshold, before);
 }
 
+static size_t slot(effect_place place, size_t joints, size_t lanes, size_t k) {
+  (void)k;
+  return joints * lanes + place.joint;
+}
+
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   torque[place.joint] += parameters[0] * memory[0] * fabs(sample->force[place.tendon]);
@@ -27,5 +32,6 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_load_friction = {
-    LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .memory_count = 1, .advance = advance, .torque = torque, .slope = slope,
+    LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .memory_count = 1, .advance = advance,
+    .torque = torque,    .slope = slope,        .slot = slot,
 };

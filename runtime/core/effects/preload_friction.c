@@ -31,6 +31,11 @@ static void advance(effect_place place, const double* parameters, const effect_s
   }
 }
 
+static size_t slot(effect_place place, size_t joints, size_t lanes, size_t k) {
+  (void)joints;
+  return (from_joint(place) + k) * lanes + place.tendon;
+}
+
 /* adds own times what is lost before each joint itself, and before times what is lost before the joints before it */
 static void add_lost(effect_place place, const effect_sample* sample, const double* memory, double own, double before,
                      double* torque) {
@@ -59,7 +64,7 @@ static void by_parameter(effect_place place, const double* parameters, uint32_t 
 
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
-  (void)place; /* constant but for its sign */
+  (void)place; /* constant but for its memory */
   (void)parameters;
   (void)sample;
   (void)memory;
@@ -70,5 +75,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 const effect_type effect_preload_friction = {
     PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
     .advance = advance,     .torque = torque,      .by_parameter = by_parameter,
-    .slope = slope,
+    .slope = slope,         .slot = slot,
 };

@@ -302,8 +302,8 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   const double velocity_gain = find_kinematics(f, time, step);
   if (f->shape.extension_count) {
     follow_signals(f, step, velocity_gain);
-    advance_extensions(f, time, step);
     advance_sliding_places(f, step, first);
+    advance_extensions(f, time, step);
     follow_memories(f);
   }
   if (f->extensions.friction) {

@@ -19,7 +19,7 @@ from tendonfmu.diagnosis.effects.places import (
 )
 from tendonfmu.diagnosis.effects.terms import ANGLES
 from tendonfmu.diagnosis.span import Span
-from tendonfmu.model import EFFECT_NUMBERS, Effect, velocity_threshold
+from tendonfmu.model import EFFECT_NUMBERS, Effect, moment_arms, velocity_threshold
 
 Grid = list[dict[str, float]]
 
@@ -149,6 +149,21 @@ def usual_time(data: Data, span: Span) -> float:
     """Return the travel between reversals over the threshold of motion, s: the median over the places with friction."""
     times = [_travel(place, span) / max(_threshold(data, place), _SLOWEST) for place in rubbing_parts(data)]
     return float(np.median([time for time in times if time > 0] or [0.0]))
+
+
+def of_joints(data: Data) -> dict[Place, float]:
+    """Return distances of presliding for the joints' own friction beside presliding everywhere, rad; none if known."""
+    # presliding everywhere links them to those of tendons by the thresholds of motion; turning a joint so far moves its
+    # tendons by their distance
+    rows = [row for row in data.get("extensions") or [] if row["effect"] == "presliding"]
+    everywhere = next((row for row in rows if is_everywhere(row)), None)
+    places = rubbing_parts(data)
+    if everywhere is None or any(row.get("joint") for row in rows) or all(place.tendon is None for place in places):
+        return {}
+    along = float(everywhere["displacement"]) * thresholds(data)[0]
+    arms = np.abs(moment_arms(data))
+    turns = [place for place in places if place.joint is not None and arms[:, place.joint - 1].any()]
+    return {place: along / float(arms[:, (place.joint or 1) - 1].max()) for place in turns}
 
 
 def is_spring(data: Data, span: Span) -> bool:

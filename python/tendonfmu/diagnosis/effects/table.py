@@ -385,6 +385,7 @@ CALIBRATION = "calibration"  # many corrections at once: `calibration.py`
 CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")
 SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
 SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
+RUBBING = ("stribeck", *(candidate.name for candidate in CANDIDATES if "friction" in candidate.name))
 COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)
 BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
 
