@@ -169,7 +169,7 @@ def run_case(plan: Plan) -> dict[str, Any]:
     diagnosis = case.diagnosed()
     row = row_of(plan, case) | judged(plan.group, case, diagnosis)
     if case.gain_recordings:
-        row["true_gain"] = true_gain(diagnosis, case)
+        row["true_gain"] = true_gain((diagnosis.nominal_data, diagnosis.extended_data), case)
     if case.experiment is not None:
         row["named_after_experiment"] = named_after_experiment(case, diagnosis)
     return row
@@ -186,7 +186,7 @@ def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     causes = causes_of(diagnosis)
     hidden = [effect for truth in case.truths for effect in truth.effects]
     counted = [cause for cause in causes if cause["effect"] not in case.also or cause["effect"] in hidden]
-    unknown = leaves_unnamed(diagnosis)
+    unknown = leaves_unnamed(diagnosis.verdict, causes)
     row = {
         "verdict": diagnosis.verdict,
         "causes": causes,
@@ -227,13 +227,13 @@ def named_after_experiment(case: Case, diagnosis: Diagnosis) -> bool:
     return any(holds(cause, truth) for cause in causes_of(case.diagnosed(case.experiment(motion))))
 
 
-def true_gain(diagnosis: Diagnosis, case: Case) -> float:
+def true_gain(models: Sequence[Mapping[str, Any]], case: Case) -> float:
     """1 − rms of the extended / rms of the nominal model, over all joints of the gain recordings."""
     finger = read_finger(case.finger)
     sums = np.zeros(2)
     for frame in case.gain_recordings:
         recording = prepare(finger, read_recording(frame), case.kinematics, Held())
-        for k, data in enumerate((diagnosis.nominal_data, diagnosis.extended_data)):
+        for k, data in enumerate(models):
             sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
     return 1.0 - math.sqrt(sums[1] / sums[0])
 
