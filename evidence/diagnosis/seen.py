@@ -82,16 +82,19 @@ def make(family: str, effect: str, seed: int, gain_recordings: int = 0) -> Case:
         pilot = replace(hidden, size=START[effect], seconds=PILOT)
         seen = simulator.simulate(finger, pilot, PILOT, np.random.default_rng((machine, 9)), machine)["seen"]
         hidden = replace(hidden, size=START[effect] * min(wanted / float(seen), MOST))
-    lengths = [TRAIN, TEST, *[TEST] * gain_recordings]
-    made = [simulator.simulate(finger, hidden, s, rng, machine) for s in lengths]
-    size = {"size": hidden.size, "hidden_rms": rms(made[0]["hidden"]), "visible_rms": float(made[0]["seen"])}
     sensors, noise = np.zeros((4, len(finger.stiffness))), float(rng.uniform(0.02, 0.05))
+    arms = finger.arms
     if effect == SENSORS:
         sensors = rng.uniform(0.5, 1.5, sensors.shape) * rng.choice([-1.0, 1.0], sensors.shape)
         mistake(nominal, sensors)
         arms = np.array([tendon["moment_arms"] for tendon in nominal["tendons"]])
-        size["hidden_rms"] = rms(measured(made[0], sensors) @ arms - made[0]["force"] @ finger.arms)
-    frames = [recorded(trace, sensors, noise, rng) for trace in made]
+    size, frames = {"size": hidden.size}, []
+    for seconds in (TRAIN, TEST, *[TEST] * gain_recordings):
+        trace = simulator.simulate(finger, hidden, seconds, rng, machine)
+        frames.append(recorded(trace, sensors, noise, rng))
+        if seconds == TRAIN:
+            off = measured(trace, sensors) @ arms - trace["force"] @ finger.arms
+            size |= {"hidden_rms": rms(trace["hidden"] + off), "visible_rms": float(trace["seen"])}
     placed = effect not in (NULL, *WITHOUT_PLACE)
     joint = hidden.joint + 1 if placed else None
     tendon = hidden.tendon + 1 if effect == "pulley_eccentricity" else None

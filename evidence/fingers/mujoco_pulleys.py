@@ -23,9 +23,9 @@ from evidence.fingers.common_finger import (
 from evidence.fingers.foreign import Array
 from evidence.fingers.mujoco_run import random_motion
 
-JOINTS, RATE = 3, 1000.0  # Hz
+JOINTS, RATE = 3, 500.0  # Hz
 LEFT = 0.003  # N·m rms that a diagnosis leaves with nothing hidden
-STEP, SETTLE = 0.0005, 1.0  # s
+STEP, TICK, SETTLE = 0.0005, 0.001, 1.0  # s; friction is set at every tick
 LINK, RADIUS, PULLEY = 0.04, 0.008, 5e-7  # m, m, kg·m²
 FREE = -1e3  # m, springs only pull
 
@@ -101,7 +101,7 @@ class Mechanism:
         return np.asarray(self.stiffness * np.maximum(stretch, 0.0))
 
     def advance(self, t: float, motors: Array) -> tuple[Array, ...]:
-        """One step: angle, velocity, speed, load of the pulleys, force, position, extra torque; then what rubs."""
+        """One tick: angle, velocity, speed, load of the pulleys, force, position, extra torque; then what rubs."""
         d, finger, hidden = self.data, self.finger, self.hidden
         shape = (1, *finger.arms.shape)
         time, angle, velocity = np.array([t]), d.qpos[self.hinges][None], d.qvel[self.hinges][None]
@@ -118,7 +118,7 @@ class Mechanism:
         joints = joint_friction(finger, hidden, time, velocity, force)[0]
         self.model.dof_frictionloss[self.pulleys] = RADIUS * edges + 1e-9
         self.model.dof_frictionloss[self.hinges] = joints
-        self.rest += STEP * (angle - self.rest) / CREEP
+        self.rest += TICK * (angle - self.rest) / CREEP
         extra = hidden_torque(hidden, finger, time, angle, self.rest, force)
         if hidden.effect == "pulley_eccentricity":  # the force behind the pulley
             behind = tension[self.runs[hidden.tendon][hidden.joint + 1]]
@@ -126,7 +126,7 @@ class Mechanism:
         d.qfrc_applied[self.hinges] = -extra[0]
         d.ctrl[:] = motors
         position = d.qpos[self.motors][None].copy()
-        mujoco.mj_step(self.model, d)
+        mujoco.mj_step(self.model, d, round(TICK / STEP))
         z_edge = np.zeros(shape)
         z_edge[0, self.rows, self.columns] = -d.qfrc_constraint[self.pulleys] / (RADIUS * edges + 1e-9)
         z_joint = -d.qfrc_constraint[self.hinges][None] / (joints + 1e-9)
@@ -139,13 +139,13 @@ def simulate(
     """Forces, positions and angles without noise."""
     mechanism = Mechanism(finger, hidden)
     aims = random_motion(len(finger.cover), rng)
-    times = np.asarray(STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP)), dtype=float)
+    times = np.asarray(TICK * np.arange(-round(SETTLE / TICK), round(seconds / TICK)), dtype=float)
     share, frequency = aims.breathing
     pull = aims.pretension * (1 + share * np.sin(2 * np.pi * frequency * times))
     motors = aims.angles(times) @ finger.arms.T + pull[:, None] / finger.stiffness
-    every, rows = round(1.0 / (RATE * STEP)), []
-    for k, t in enumerate(times.tolist(), start=-round(SETTLE / STEP)):
-        row = mechanism.advance(t, motors[k + round(SETTLE / STEP)])
+    every, rows = round(1.0 / (RATE * TICK)), []
+    for k, t in enumerate(times.tolist(), start=-round(SETTLE / TICK)):
+        row = mechanism.advance(t, motors[k + round(SETTLE / TICK)])
         if k >= 0 and k % every == 0:
             rows.append(row)
     time, angle, velocity, speed, z_edge, z_joint, force, position, extra = (
