@@ -183,16 +183,20 @@ def row_of(plan: Plan, case: Case) -> dict[str, Any]:
 
 def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     """Columns of a row; None for questions that do not arise."""
-    causes = causes_of(diagnosis)
+    causes, small = causes_of(diagnosis), causes_of(diagnosis, too_small=True)
     hidden = [effect for truth in case.truths for effect in truth.effects]
-    counted = [cause for cause in causes if cause["effect"] not in case.also or cause["effect"] in hidden]
+    counted, with_small = (
+        [cause for cause in some if cause["effect"] not in case.also or cause["effect"] in hidden]
+        for some in (causes, [*causes, *small])
+    )
     unknown = leaves_unnamed(diagnosis.verdict, causes)
     row = {
         "verdict": diagnosis.verdict,
         "causes": causes,
+        "too_small": small,
         "cause_count": len(counted),
         "named_count": len(causes),
-        "detected": bool(counted) or diagnosis.verdict in ALARMS,
+        "detected": bool(with_small) or diagnosis.verdict in ALARMS,
         "unknown": unknown,
         "wrong_name": bool(counted) and not unknown,
         "gain": diagnosis.gain.value,
@@ -202,10 +206,16 @@ def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     }
     if group == "single":
         (truth,) = case.truths
-        judgement = judge(counted, truth)
-        holding = [cause for cause in counted if holds(cause, truth)]
+        judgement = judge(with_small, truth)
+        holding = [cause for cause in with_small if holds(cause, truth)]
         place = is_exactly_at_place(holding[0], truth) if holding and truth.has_place else None
-        row |= {"in_set": judgement.in_set, "first": judgement.first, "set_size": judgement.set_size, "place": place}
+        row |= {
+            "in_causes": judge(counted, truth).in_set,
+            "in_set": judgement.in_set,
+            "first": judgement.first,
+            "set_size": judgement.set_size,
+            "place": place,
+        }
     if group == "double":
         hits = [any(holds(cause, truth) for cause in counted) for truth in case.truths]
         row |= {"both": all(hits), "exactly": all(hits) and len(counted) == len(hits)}

@@ -58,8 +58,8 @@ class Case:
 # --- what a diagnosis says --------------------------------------------------------------------------------------------
 
 
-def causes_of(diagnosis: Diagnosis) -> list[Cause]:
-    """The causes with a term in the extended model, as in diagnosis.json."""
+def causes_of(diagnosis: Diagnosis, too_small: bool = False) -> list[Cause]:
+    """The causes with a term in the extended model, as in diagnosis.json; or those that are too small to matter."""
     return [
         {
             "effect": cause.effect,
@@ -68,7 +68,7 @@ def causes_of(diagnosis: Diagnosis) -> list[Cause]:
             "places": [{"joint": place.joint, "tendon": place.tendon} for place in cause.places],
             "confusable_with": [vars(where) for where in cause.confusable_with],
         }
-        for cause in diagnosis.causes
+        for cause in (diagnosis.too_small if too_small else diagnosis.causes)
     ]
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -57,7 +57,7 @@ SYNONYMOUS = {  # names of the same physics
 }
 # 5 % of one joint's torque in the next one is what arms that are a little askew do.
 ALLOWED = {"unknown_cross": ("moment_arm", SENSORS)}
-WITHOUT_PLACE = (SENSORS, "friction_drift", "stribeck")
+WITHOUT_PLACE = (NULL, SENSORS, "friction_drift", "stribeck")
 LATE, GAIN, ZERO, ARM, ENCODER = 0.002, 0.03, 0.3, 0.03, 2e-3  # s, 1, N, 1, rad: a new bench's sensors
 TRAIN, TEST, PILOT, GAIN_RECORDINGS = 60.0, 30.0, 20.0, 2  # s, s, s
 
@@ -95,22 +95,25 @@ def make(family: str, effect: str, seed: int, gain_recordings: int = 0) -> Case:
         if seconds == TRAIN:
             off = measured(trace, sensors) @ arms - trace["force"] @ finger.arms
             size |= {"hidden_rms": rms(trace["hidden"] + off), "visible_rms": float(trace["seen"])}
-    placed = effect not in (NULL, *WITHOUT_PLACE)
-    joint = hidden.joint + 1 if placed else None
+    joint = None if effect in WITHOUT_PLACE else hidden.joint + 1
     tendon = hidden.tendon + 1 if effect == "pulley_eccentricity" else None
-    truth = Truth(
+    facts = {"family": family, "hidden": {"effect": effect, "joint": joint, "tendon": tendon}, **size}
+    return Case(
+        family, nominal, frames[:1], kinematics, seed, test=frames[1:2], gain_recordings=frames[2:], facts=facts
+    )
+
+
+def truth_of(family: str, hidden: Mapping[str, Any]) -> Truth:
+    """What counts as an answer; presliding is right in every case."""
+    effect = hidden["effect"]
+    return Truth(
         effects=() if effect == NULL or effect.startswith("unknown") else SYNONYMOUS.get(effect, (effect,)),
-        joint=joint,
-        tendon=tendon,
+        joint=hidden["joint"],
+        tendon=hidden["tendon"],
         allowed=ALLOWED.get(effect, ()) + ALSO.get(family, ()),
         neutral=("presliding", UNKNOWN),
         synonyms=SYNONYMS,
     )
-    facts = {"family": family, "hidden": {"effect": effect, "joint": joint, "tendon": tendon}, **size}
-    return Case(
-        family, nominal, frames[:1], kinematics, seed, (truth,), truth.allowed, frames[1:2],
-        gain_recordings=frames[2:], facts=facts,
-    )  # fmt: skip
 
 
 def place_of(effect: str, joints: int, arms: Array, rng: np.random.Generator) -> Hidden:
@@ -148,12 +151,12 @@ def recorded(trace: Signals, sensors: Array, noise: float, rng: np.random.Genera
 
 def run_case(family: str, effect: str, seed: int) -> dict[str, Any]:
     case = make(family, effect, seed, GAIN_RECORDINGS)
-    run = run_command(case)
+    run, truth = run_command(case), truth_of(family, case.facts["hidden"])
     row = {"seed": seed, "answered": run.report is not None, **case.facts}
     row |= {key: getattr(run, key) for key in ("exit", "message", "seconds", "peak_megabytes")}
     if run.report is None:
         return row
-    return row | judged(run.report, case.truths[0], effect) | {"true_gain": true_gain(run.models, case)}
+    return row | judged(run.report, truth, effect) | {"true_gain": true_gain(run.models, case)}
 
 
 def judged(report: dict[str, Any], truth: Truth, effect: str) -> dict[str, Any]:
