@@ -169,7 +169,7 @@ def run_case(plan: Plan) -> dict[str, Any]:
     diagnosis = case.diagnosed()
     row = row_of(plan, case) | judged(plan.group, case, diagnosis)
     if case.gain_recordings:
-        row["true_gain"] = true_gain(diagnosis, case)
+        row["true_gain"] = true_gain((diagnosis.nominal_data, diagnosis.extended_data), case)
     if case.experiment is not None:
         row["named_after_experiment"] = named_after_experiment(case, diagnosis)
     return row
@@ -183,16 +183,20 @@ def row_of(plan: Plan, case: Case) -> dict[str, Any]:
 
 def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     """Columns of a row; None for questions that do not arise."""
-    causes = causes_of(diagnosis)
+    causes, small = causes_of(diagnosis), causes_of(diagnosis, too_small=True)
     hidden = [effect for truth in case.truths for effect in truth.effects]
-    counted = [cause for cause in causes if cause["effect"] not in case.also or cause["effect"] in hidden]
-    unknown = leaves_unnamed(diagnosis)
+    counted, with_small = (
+        [cause for cause in some if cause["effect"] not in case.also or cause["effect"] in hidden]
+        for some in (causes, [*causes, *small])
+    )
+    unknown = leaves_unnamed(diagnosis.verdict, causes)
     row = {
         "verdict": diagnosis.verdict,
         "causes": causes,
+        "too_small": small,
         "cause_count": len(counted),
         "named_count": len(causes),
-        "detected": bool(counted) or diagnosis.verdict in ALARMS,
+        "detected": bool(with_small) or diagnosis.verdict in ALARMS,
         "unknown": unknown,
         "wrong_name": bool(counted) and not unknown,
         "gain": diagnosis.gain.value,
@@ -202,10 +206,16 @@ def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     }
     if group == "single":
         (truth,) = case.truths
-        judgement = judge(counted, truth)
-        holding = [cause for cause in counted if holds(cause, truth)]
+        judgement = judge(with_small, truth)
+        holding = [cause for cause in with_small if holds(cause, truth)]
         place = is_exactly_at_place(holding[0], truth) if holding and truth.has_place else None
-        row |= {"in_set": judgement.in_set, "first": judgement.first, "set_size": judgement.set_size, "place": place}
+        row |= {
+            "in_causes": judge(counted, truth).in_set,
+            "in_set": judgement.in_set,
+            "first": judgement.first,
+            "set_size": judgement.set_size,
+            "place": place,
+        }
     if group == "double":
         hits = [any(holds(cause, truth) for cause in counted) for truth in case.truths]
         row |= {"both": all(hits), "exactly": all(hits) and len(counted) == len(hits)}
@@ -227,13 +237,13 @@ def named_after_experiment(case: Case, diagnosis: Diagnosis) -> bool:
     return any(holds(cause, truth) for cause in causes_of(case.diagnosed(case.experiment(motion))))
 
 
-def true_gain(diagnosis: Diagnosis, case: Case) -> float:
+def true_gain(models: Sequence[Mapping[str, Any]], case: Case) -> float:
     """1 − rms of the extended / rms of the nominal model, over all joints of the gain recordings."""
     finger = read_finger(case.finger)
     sums = np.zeros(2)
     for frame in case.gain_recordings:
         recording = prepare(finger, read_recording(frame), case.kinematics, Held())
-        for k, data in enumerate((diagnosis.nominal_data, diagnosis.extended_data)):
+        for k, data in enumerate(models):
             sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
     return 1.0 - math.sqrt(sums[1] / sums[0])
 

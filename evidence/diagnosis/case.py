@@ -58,8 +58,8 @@ class Case:
 # --- what a diagnosis says --------------------------------------------------------------------------------------------
 
 
-def causes_of(diagnosis: Diagnosis) -> list[Cause]:
-    """The causes with a term in the extended model, as in diagnosis.json."""
+def causes_of(diagnosis: Diagnosis, too_small: bool = False) -> list[Cause]:
+    """The causes with a term in the extended model, as in diagnosis.json; or those that are too small to matter."""
     return [
         {
             "effect": cause.effect,
@@ -68,13 +68,13 @@ def causes_of(diagnosis: Diagnosis) -> list[Cause]:
             "places": [{"joint": place.joint, "tendon": place.tendon} for place in cause.places],
             "confusable_with": [vars(where) for where in cause.confusable_with],
         }
-        for cause in diagnosis.causes
+        for cause in (diagnosis.too_small if too_small else diagnosis.causes)
     ]
 
 
-def leaves_unnamed(diagnosis: Diagnosis) -> bool:
+def leaves_unnamed(verdict: str, causes: Sequence[Cause]) -> bool:
     """Whether the diagnosis says that something is there that it cannot name."""
-    return diagnosis.verdict in ALARMS or any(UNKNOWN in effects_of(cause) for cause in causes_of(diagnosis)[:1])
+    return verdict in ALARMS or any(UNKNOWN in effects_of(cause) for cause in causes[:1])
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
@@ -89,6 +89,7 @@ class Run:
     seconds: float  # CPU
     peak_megabytes: float
     report: dict[str, Any] | None  # diagnosis.json, if it was written
+    models: tuple[dict[str, Any], ...] = ()  # nominal.json and extended.json, with it
 
 
 def run_command(case: Case, with_reference: bool = True, limit: float = LIMIT) -> Run:
@@ -112,7 +113,8 @@ def run_command(case: Case, with_reference: bool = True, limit: float = LIMIT) -
         lines = [line.strip() for line in messages if line.strip()]
         written = folder / "report" / "diagnosis.json"
         is_written = process.returncode == 0 and written.is_file()
-        report = json.loads(written.read_text(encoding="utf-8")) if is_written else None
+        files = [written, written.with_name("nominal.json"), written.with_name("extended.json")] if is_written else []
+        report, *models = [json.loads(file.read_text(encoding="utf-8")) for file in files] or [None]
     kilobytes = usage.ru_maxrss / (1024 if sys.platform == "darwin" else 1)
     return Run(
         exit=None if late.is_set() else process.returncode,
@@ -120,4 +122,5 @@ def run_command(case: Case, with_reference: bool = True, limit: float = LIMIT) -
         seconds=usage.ru_utime + usage.ru_stime,
         peak_megabytes=kilobytes / 1024,
         report=report,
+        models=tuple(models),
     )

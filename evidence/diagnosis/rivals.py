@@ -106,7 +106,8 @@ class Answer:
 def run_case(plan: Plan) -> dict[str, Any]:
     case = plan.make()
     diagnosis = case.diagnosed()
-    diagnosed = Answer(causes_of(diagnosis), unnamed=leaves_unnamed(diagnosis), gain=diagnosis.gain.value)
+    causes = causes_of(diagnosis)
+    diagnosed = Answer(causes, unnamed=leaves_unnamed(diagnosis.verdict, causes), gain=diagnosis.gain.value)
     answers = {OWN: diagnosed, **rival_answers(case)}
     return row_of(plan, case) | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
 

@@ -24,7 +24,7 @@ def cause(effect: str, joint: int | None = 1, *others: Where, places: tuple[Caus
 def row(group: str, *truths: Truth, causes: tuple[Any, ...] = (), also: tuple[str, ...] = (), **more: Any) -> Any:
     """A row of a diagnosis that names these causes."""
     gain = SimpleNamespace(value=0.1, low=0.05, high=0.15)
-    given = {"verdict": "explained", "events": (), "invisible": (), "gain": gain, "causes": causes}
+    given = {"verdict": "explained", "events": (), "invisible": (), "gain": gain, "causes": causes, "too_small": ()}
     diagnosis: Any = SimpleNamespace(**(given | {key: more.pop(key) for key in tuple(more) if key in given}))
     case = Case("matched", {}, [], truths=truths, also=also)
     known = {"name": "a", "group": group, "rig": "matched", "joints": 1, "error": ""}
@@ -81,6 +81,8 @@ def test_one_effect_named_first_in_a_set_or_not_at_all() -> None:
     assert answer(cause("joint_coupling", 1, *others)) == (True, True, False, 3, True, False)
     assert answer(cause("inertia")) == (True, False, False, 1, None, False)
     assert answer(verdict="unexplained") == (True, False, False, None, None, True)
+    assert answer(too_small=(cause("gravity"),)) == (True, True, True, 1, True, False)
+    assert answer(cause("inertia"), too_small=(cause("gravity"),)) == (True, True, False, 1, True, False)
     places = (CausePlace(2, None, {}), CausePlace(1, None, {}))
     assert answer(cause("gravity", None, places=places)) == (True, True, True, 1, True, False)
 

@@ -150,13 +150,18 @@ def test_recorded_cases_are_read() -> None:
 
 
 def test_foreign_fingers_share_nothing_with_the_product() -> None:
-    paths = [path for path in FOLDER.glob("*.py") if path.name.startswith(("numpy_", "mujoco_", "foreign", "sticking"))]
+    paths = [
+        path
+        for path in FOLDER.glob("*.py")
+        if path.name.startswith(("numpy_", "mujoco_", "foreign", "sticking", "common"))
+    ]
     assert len(paths) >= 11
     for path in paths:
         imported = re.findall(r"^\s*(?:from|import) (\S+)", path.read_text(encoding="utf-8"), re.MULTILINE)
         assert not [name for name in imported if name.startswith("tendonfmu") or "matched" in name], path.name
         if path.name.startswith("numpy_") and path.stem != "numpy_cases":
-            assert [name for name in imported if name.startswith("evidence")] == ["evidence.fingers.foreign"]
+            shared = {name.removeprefix("evidence.fingers.") for name in imported if name.startswith("evidence")}
+            assert "foreign" in shared and shared <= {"foreign", "common_finger"}
 
 
 # --- a run of the command, with a program in its place that writes what a test wants ----------------------------------
@@ -175,6 +180,8 @@ assert sys.argv[1:] == {ARGUMENTS!r}.split()
 spent = sum(k * k for k in range(2_000_000))
 os.mkdir("report")
 open("report/diagnosis.json", "w").write({json.dumps(REPORT)!r})
+for name in ("nominal", "extended"):
+    open(f"report/{{name}}.json", "w").write("{{}}")
 """
 FAILS = "import sys\nprint('some words', file=sys.stderr)\nsys.exit('internal error: x | y')"
 SLEEPS = "import time\ntime.sleep(60)"
