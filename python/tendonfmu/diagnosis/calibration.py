@@ -165,7 +165,7 @@ def calibrated(cause: Cause) -> Cause:
 
 def _size(sensors: Sequence[Sensor]) -> str:
     """Name the sensors that are most certainly off."""
-    certain = sorted((s for s in sensors if not s.correction.low <= 0.0 <= s.correction.high), key=_distance)
+    certain = sorted((s for s in sensors if s.is_off), key=_distance)
     shown = [" ".join(s.words) for s in (certain or sensors)[:_SHOWN]]
     more = len(certain) - len(shown)
     return "; ".join(shown) + (f"; {more} more" if more > 0 else "")

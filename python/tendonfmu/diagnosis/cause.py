@@ -82,6 +82,11 @@ class Sensor:
     unit: str
 
     @property
+    def is_off(self) -> bool:
+        """Whether the interval leaves 0 out."""
+        return not self.correction.low <= 0.0 <= self.correction.high
+
+    @property
     def words(self) -> tuple[str, str]:
         """Which sensor it is, and by how much it is off."""
         return off_by(self.where.effect, self.where.joint, self.where.tendon, self.correction, self.unit)

@@ -9,7 +9,7 @@ from typing import Any
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Term
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
 from tendonfmu.diagnosis.search import Search
@@ -73,7 +73,7 @@ def verify(
     causes, dropped = confirmed(merged(result.causes), judge)
     fit, nominal = bench.result(causes), bench.online(bench.nominal)
     extended = bench.online(fit) if causes else nominal
-    ranked = by_gain(_with_places(bench.nominal, fit, causes))
+    ranked = by_gain(bench.with_places(fit, causes))
     between = [bench.online(bench.result(ranked[: k + 1])) for k in range(len(ranked) - 1)]
     return Verified(
         causes=tuple(ranked),
@@ -128,18 +128,6 @@ def _rivals(cause: Cause, named: Collection[str]) -> tuple[Cause, ...]:
     return tuple(rivals.values())
 
 
-def _with_places(nominal: FittedModel, model: FittedModel, causes: Sequence[Cause]) -> list[Cause]:
-    """Return the causes with the numbers of each of their places in a model that was fitted with all of them."""
-    numbers = iter(cause_parameters(nominal.data, [term for cause in causes for term in cause.terms], model))
-    return [
-        replace(
-            cause,
-            places=tuple(CausePlace(term.place.joint, term.place.tendon, next(numbers)) for term in cause.terms),
-        )
-        for cause in causes
-    ]
-
-
 class _Bench:
     """Fits of any set of causes, and their residuals on unseen data."""
 
@@ -155,6 +143,7 @@ class _Bench:
         self._given, self._result, self._settings, self._seed = given, result, settings, seed
         self._training, self._tests = training, tests
         self._fits: dict[tuple[frozenset[int], bool], FittedModel] = {}
+        self._order: dict[frozenset[int], list[Term]] = {}  # of the terms in a fitted description
         self._errors: dict[int, tuple[FittedModel, Numbers]] = {}
         self._settled_fits: dict[int, FittedModel] = {}
         self._signals = result.estimation.signals
@@ -163,6 +152,7 @@ class _Bench:
             for count, model in enumerate(result.models):
                 known = [term for cause in result.causes[:count] for term in cause.terms]
                 self._fits[frozenset(map(id, known)), result.only_sliding] = model
+                self._order[frozenset(map(id, known))] = known
         else:
             self._hold_out()
         self.fits_sliding = result.only_sliding
@@ -222,8 +212,24 @@ class _Bench:
                     replace(clean, train=recording.train)
                     for clean, recording in zip(self._predicted, fit_to, strict=True)
                 ]
-            self._fits[key] = fit_extended(self.nominal, terms, fit_to, self._settings)
+            order = self._order.setdefault(key[0], terms)
+            self._fits[key] = fit_extended(self.nominal, order, fit_to, self._settings)
         return self._fits[key]
+
+    def with_places(self, model: FittedModel, causes: Sequence[Cause]) -> list[Cause]:
+        """Return the causes with the numbers of each of their places in a model that was fitted with all of them."""
+        order = self._order.get(frozenset(id(term) for cause in causes for term in cause.terms), [])
+        found = cause_parameters(self.nominal.data, order, model)
+        numbers = {id(term): own for term, own in zip(order, found, strict=True)}
+        return [
+            replace(
+                cause,
+                places=tuple(
+                    CausePlace(term.place.joint, term.place.tendon, numbers[id(term)]) for term in cause.terms
+                ),
+            )
+            for cause in causes
+        ]
 
     @cached_property
     def _predicted(self) -> list[FitRecording]:

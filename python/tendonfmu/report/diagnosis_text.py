@@ -332,7 +332,7 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield error_sentence(diagnosis)
     for k, cause in enumerate(diagnosis.causes, start=1):
         yield f"  {k}. {at_place(cause.title, cause.where, names)}: {cause.size}"
-        yield from (f"     {': '.join(sensor.words)}" for sensor in cause.sensors)
+        yield from (f"     {': '.join(sensor.words)}" for sensor in cause.sensors if sensor.is_off)
         if confusion := confusion_sentence(cause, names):
             yield f"     {confusion}"
     yield from own_gain_sentences(diagnosis)
