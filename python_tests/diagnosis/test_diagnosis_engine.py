@@ -309,7 +309,7 @@ def test_a_fit_is_taken_where_the_error_falls_beyond_chance(error: Numbers, take
     """The rms falls by 5 %, in each stretch, or much in some while it grows in others."""
     rounds, model = Fitted({}), FittedModel({}, {}, {}, 0.0)
     rounds.models, rounds._least_gain = [], 0.03
-    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)))  # type: ignore[assignment]
+    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)), lean=None)  # type: ignore[assignment]
     rounds._runs_better = lambda model: True  # type: ignore[method-assign]
     rounds._look = lambda model, candidates: rounds.view  # type: ignore[method-assign]
     assert rounds._take(Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
