@@ -169,7 +169,7 @@ class _Result:
         torques = np.sum((measured[used] - measured[used].mean(axis=0)) ** 2)
         result = unexplained_of(remainder, looked_at, everything, self._asked.least_gain, float(torques))
         finger = self._given.finger
-        parts = (view.series, left, remainder.prediction, finger.joint_names, finger.tendon_names)
+        parts = (view.series, left, remainder, finger.joint_names, finger.tendon_names)
         shown = remainder_map(*parts) if result.unknown else None
         return replace(result, map=shown)
 

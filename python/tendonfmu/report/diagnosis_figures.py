@@ -10,7 +10,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
-from tendonfmu.drawing import Band, Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.drawing import DIVERGING, Band, Bars, Curve, Dots, Heat, Panel, Sheet
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
@@ -48,8 +48,31 @@ def diagnosis_sheets(diagnosis: Diagnosis) -> list[Sheet]:
             for k, cause in enumerate(diagnosis.causes, start=1)
             if cause.evidence
         ),
+        *_map_sheets(diagnosis, names),
         *(_joint_sheet(diagnosis, names, j, views) for j, views in _by_joint(diagnosis.views)),
     ]
+
+
+def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
+    """Show where a part without a name is, over the two signals that it follows best."""
+    shown, (factor, unit) = diagnosis.unexplained.map, unit_of(diagnosis)
+    if shown is None:
+        return
+    torque = factor * shown.torque
+    most = float(np.nanquantile(np.abs(torque), 0.98))
+    joint, (one, two) = names.joint(shown.joint), shown.labels
+    x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in shown.edges)
+    title = f"What remains at {joint}, over {one.split(' (')[0]} and {two.split(' (')[0]}"
+    panel = Panel(
+        title="Mean residual of the extended model" if diagnosis.causes else "Mean residual",
+        alt=f"{title}, from {-most:.2g} to {most:.2g} {unit}",
+        x_label=one,
+        y_label=two,
+        note=f"blue −{most:.2g}, red +{most:.2g} {unit}",
+        heat=Heat(torque, x, y, DIVERGING, -most, most, unit),
+    )
+    caption = "One colour in a whole region is a torque that comes back there each time. Cells without data are empty."
+    yield Sheet(section="views", name="views_map", title=title, caption=caption, keys=(), panels=(panel,))
 
 
 # --- evidence for a cause ---------------------------------------------------------------------------------------------
