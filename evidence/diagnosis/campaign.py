@@ -1,4 +1,4 @@
-"""How often `diagnose` is right: matched rigs and foreign fingers of 1, 2 and 4 joints whose cause is known.
+"""How often `diagnose` is right: matched rigs of 1, 2 and 4 joints whose cause is known.
 
     python -m evidence.diagnosis.campaign --seed 140001 -o FOLDER [--minutes 480]
 
@@ -51,12 +51,6 @@ PAIRS = (
     "stribeck",
     "pulley_friction",
 )
-# Numbers of the plans of both families that fit a campaign: at most 500 Hz, and an effect that refitting does not take.
-NUMPY_NULL, NUMPY_SINGLE, NUMPY_UNKNOWN = (1, 2, 3, 4, 5), (6, 8, 9, 10, 11, 12, 13, 14, 16, 18), (17, 19, 22)
-MUJOCO_NULL, MUJOCO_UNKNOWN, MUJOCO_CONTACT = (1, 2, 20), (17, 18, 22), (15,)
-MUJOCO_SINGLE = (3, 5, 6, 8, 10, 11, 12, 13, 14, 16, 21, 24)
-SECOND_JOINT = (6, 10, 12, 16, 17, 18, 24)  # plans whose effect is at joint 2, or at a tendon of it
-FOREIGN_SECONDS, FOREIGN_RATE = 45.0, 500.0  # s, Hz
 
 NEAR = 1.4  # a case counts as one of the strengths within this factor
 SHOWN = 0.3  # strength from which a motion shows an absorbed effect, and at which two effects must both be named
@@ -78,10 +72,6 @@ def planned(seed: int) -> list[Plan]:
         [_absorbed(ABSORBABLE[k % len(ABSORBABLE)], k, seed) for k in range(80)],
         list(_unknown(48, seed)),
         [_matched(f"contact_{k}", "contact", makers.contact, seed + 500_000 + k) for k in range(16)],
-        _foreign("null", NUMPY_NULL, MUJOCO_NULL, 5, 5, seed),
-        _foreign("single", NUMPY_SINGLE, MUJOCO_SINGLE, 1, 2, seed),
-        _foreign("unknown", NUMPY_UNKNOWN, MUJOCO_UNKNOWN, 2, 2, seed),
-        _foreign("contact", (), MUJOCO_CONTACT, 0, 2, seed),
     ]
     random = np.random.default_rng([seed, 68])
     return makers.in_turn([[plans[k] for k in random.permutation(len(plans))] for plans in kinds])
@@ -142,24 +132,6 @@ def _unknown(count: int, seed: int) -> Iterator[Plan]:
         yield _matched(f"{effect}_{strength:g}_{k}", "unknown", makers.single, seed + 400_000 + k, **given)
 
 
-def _foreign(
-    group: str, in_numpy: Sequence[int], in_mujoco: Sequence[int], times_numpy: int, times_mujoco: int, seed: int
-) -> list[Plan]:
-    """Every finger so many times, numpy and MuJoCo in turn."""
-    plans: dict[str, list[Plan]] = {"numpy": [], "mujoco": []}
-    for k, number in itertools.product(range(times_numpy), in_numpy):
-        given: dict[str, Any] = {"number": number, "seconds": FOREIGN_SECONDS, "gain_recordings": GAIN_RECORDINGS}
-        name = f"numpy_{group}_{number:02d}_{k}"
-        plans["numpy"].append(Plan(name, group, seed + 600_000 + k, makers.numpy_finger, given))
-    for k, number in itertools.product(range(times_mujoco), in_mujoco):
-        own_seed = seed + 600_000 + 100 * number + k
-        joints = max(_joints(own_seed)[0], 2 if number in SECOND_JOINT else 1)
-        given = {"number": number, "joints": joints, "seconds": FOREIGN_SECONDS, "rate": FOREIGN_RATE}
-        name = f"mujoco_{group}_{number:02d}_{k}"
-        plans["mujoco"].append(Plan(name, group, own_seed, makers.mujoco_finger, given))
-    return [plan for pair in itertools.zip_longest(*plans.values()) for plan in pair if plan is not None]
-
-
 # --- one case ---------------------------------------------------------------------------------------------------------
 
 
@@ -177,7 +149,7 @@ def run_case(plan: Plan) -> dict[str, Any]:
 
 def row_of(plan: Plan, case: Case) -> dict[str, Any]:
     """What a row says of its case."""
-    effects = [truth.effects[0] for truth in case.truths]
+    effects = [effect for truth in case.truths for effect in truth.effects[:1]]
     return {"group": plan.group, "rig": case.machine, "seed": case.seed, "true_effects": effects, **case.facts}
 
 
@@ -185,20 +157,16 @@ def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     """Columns of a row; None for questions that do not arise."""
     causes, small = causes_of(diagnosis), causes_of(diagnosis, too_small=True)
     hidden = [effect for truth in case.truths for effect in truth.effects]
-    counted, with_small = (
-        [cause for cause in some if cause["effect"] not in case.also or cause["effect"] in hidden]
-        for some in (causes, [*causes, *small])
-    )
+    with_small = [*causes, *small]
     unknown = leaves_unnamed(diagnosis.verdict, causes)
     row = {
         "verdict": diagnosis.verdict,
         "causes": causes,
         "too_small": small,
-        "cause_count": len(counted),
-        "named_count": len(causes),
+        "cause_count": len(causes),
         "detected": bool(with_small) or diagnosis.verdict in ALARMS,
         "unknown": unknown,
-        "wrong_name": bool(counted) and not unknown,
+        "wrong_name": bool(causes) and not unknown,
         "gain": diagnosis.gain.value,
         "gain_low": diagnosis.gain.low,
         "gain_high": diagnosis.gain.high,
@@ -210,15 +178,15 @@ def judged(group: str, case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
         holding = [cause for cause in with_small if holds(cause, truth)]
         place = is_exactly_at_place(holding[0], truth) if holding and truth.has_place else None
         row |= {
-            "in_causes": judge(counted, truth).in_set,
+            "in_causes": judge(causes, truth).in_set,
             "in_set": judgement.in_set,
             "first": judgement.first,
             "set_size": judgement.set_size,
             "place": place,
         }
     if group == "double":
-        hits = [any(holds(cause, truth) for cause in counted) for truth in case.truths]
-        row |= {"both": all(hits), "exactly": all(hits) and len(counted) == len(hits)}
+        hits = [any(holds(cause, truth) for cause in causes) for truth in case.truths]
+        row |= {"both": all(hits), "exactly": all(hits) and len(causes) == len(hits)}
     if group == "absorbed":
         listed = [entry for entry in diagnosis.invisible if entry.where.effect in hidden]
         named = any(cause["effect"] in hidden for cause in causes)
@@ -284,7 +252,7 @@ def _named_afterwards(row: Row) -> bool | None:
 
 def _covered(row: Row) -> bool | None:
     low, high, true = row.get("gain_low"), row.get("gain_high"), row.get("true_gain")
-    if low is None or high is None or true is None or not row["named_count"]:
+    if low is None or high is None or true is None or not row["cause_count"]:
         return None
     return bool(low <= true <= high)
 
@@ -328,9 +296,6 @@ def rates(rows: Sequence[Row]) -> list[Line]:
         some = [row for row in single if strength / NEAR < (row.get("strength") or 0.0) < strength * NEAR]
         if some or strength == GOALS_AT:
             lines += _one_effect(f"one effect at {strength:g}", some, GOALS if strength == GOALS_AT else NO_GOALS)
-    of_own_size = [row for row in single if not row.get("strength")]
-    if of_own_size:
-        lines += _one_effect("one effect of a size of its own", of_own_size, NO_GOALS)
     return [*lines, *(rate(what, goal, rows, holds) for what, goal, holds in RATES)]
 
 
@@ -344,10 +309,9 @@ def _one_effect(what: str, rows: Sequence[Row], goals: Sequence[str]) -> list[Li
 
 
 def rates_by_part(rows: Sequence[Row]) -> list[Line]:
-    """The rates that differ most, by what made the recordings and by number of joints."""
-    rigs = {rig: where(rows, rig=rig) for rig in sorted({row["rig"] for row in rows})}
-    joints = {f"{n} joint{'s' * (n > 1)}": where(rows, joints=n) for n in sorted({row["joints"] for row in rows})}
-    parts = [part for groups in (rigs, joints) if len(groups) > 1 for part in groups.items()]
+    """The rates that differ most, by number of joints."""
+    numbers = sorted({row["joints"] for row in rows})
+    parts = [(f"{n} joint{'s' * (n > 1)}", where(rows, joints=n)) for n in numbers if len(numbers) > 1]
     lines = [rate(f"{what}; {part}", "", some, holds) for what, holds in PARTS.items() for part, some in parts]
     return [line for line in lines if line[3] != "0"]
 

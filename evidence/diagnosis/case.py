@@ -31,7 +31,6 @@ class Case:
     kinematics: int = 1
     seed: int = 0
     truths: tuple[Truth, ...] = ()  # one for each hidden effect that the list has
-    also: tuple[str, ...] = ()  # effects of the machine that the description lacks: neither right nor false
     test: Sequence[pd.DataFrame] = ()
     reference: Sequence[pd.DataFrame] = ()
     gain_recordings: Sequence[pd.DataFrame] = ()  # of other motions, for the true gain of the extended model

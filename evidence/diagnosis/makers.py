@@ -1,9 +1,7 @@
-"""What makes the cases of a campaign by their seed: matched rigs that hide something, and the foreign fingers."""
+"""What makes the cases of a campaign by their seed: matched rigs that hide something."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,8 +11,6 @@ import pandas as pd
 
 from evidence.diagnosis.case import Case
 from evidence.diagnosis.hidden_effects import UNKNOWN, placed, scaled
-from evidence.fingers import foreign, numpy_cases
-from evidence.fingers.foreign import Nominal, rough
 from evidence.fingers.matched_rig import Hand, Unreachable, perform, random_hand, record
 from evidence.fingers.matched_strength import shown_strength
 from evidence.judge import Truth
@@ -194,61 +190,3 @@ def _truth_of(label: Mapping[str, Any]) -> Truth:
 
 def _facts_of(label: Mapping[str, Any]) -> dict[str, Any]:
     return {key: label[key] for key in ("magnitude", "strength", "surviving_share", "note")}
-
-
-# --- foreign fingers: in MuJoCo all is the seed's; the five numpy fingers are what they are, and the rest is the seed's
-
-
-def numpy_finger(seed: int, number: int, seconds: float, gain_recordings: int) -> Case:
-    """A case of numpy_cases.py. The test and the recordings for the true gain are as long as the first one."""
-    made = numpy_cases.make(number, seconds, seconds, seed)
-    simulator = numpy_cases.PLANS[number - 1].simulator
-    random = np.random.default_rng((seed, number, 3))
-    case = foreign_finger(dataclasses.replace(made, nominal=_rougher(made.nominal, random)))
-    gains = [simulator.simulate(made.truth.hidden, seconds, random) for _ in range(gain_recordings)]
-    return replace(case, gain_recordings=[numpy_cases.recording(gain) for gain in gains])
-
-
-def mujoco_finger(seed: int, number: int, joints: int, seconds: float, rate: float) -> Case:
-    """A case of mujoco_cases.py with as many joints. rate: Hz, at most. Nobody looks at its test."""
-    from evidence.fingers import mujoco_cases  # mujoco need not be there for the other family
-
-    plan = mujoco_cases.PLANS[number - 1]
-    plan = dataclasses.replace(plan, joints=joints, rate=min(plan.rate, rate))
-    return replace(foreign_finger(mujoco_cases.of_plan(plan, number, seed, seconds, 1.0)), test=())
-
-
-def foreign_finger(made: foreign.Case) -> Case:
-    """The case of a foreign finger, by its joint angles where it has any."""
-    truth = made.truth
-    listed = truth.hidden not in ("none", "contact") and not truth.hidden.startswith("unknown")
-    return Case(
-        machine=made.family,
-        finger=made.nominal,
-        recordings=[made.train],
-        kinematics=2 if "joint_position[1]" in made.train else 1,
-        truths=(Truth((truth.hidden,), truth.joint, truth.tendon),) if listed else (),
-        also=("presliding", *truth.also),
-        test=[made.test],
-        facts={"joints": truth.joints, "hidden": truth.hidden, "hidden_rms": truth.rms or 0.0},
-    )
-
-
-def _rougher(nominal: Nominal, random: np.random.Generator) -> Nominal:
-    """The description with starting numbers of its own: each size of friction and each cover times 0.6 to 1.6."""
-    rougher: Nominal = json.loads(json.dumps(nominal))  # joints may share a law
-
-    def move(law: dict[str, Any] | None) -> None:
-        for part in [] if law is None else law.get("laws", [law]):
-            factor = rough(1.0, random)
-            part |= {key: part[key] * factor for key in ("static", "coulomb", "viscous") if key in part}
-
-    for joint in rougher["joints"]:
-        for key in ("friction", "load_friction"):
-            move(joint.get(key))
-        if joint.get("cover"):
-            joint["cover"]["stiffness"] = rough(joint["cover"]["stiffness"], random)
-    for tendon in rougher["tendons"]:
-        for law in [*(tendon.get("edge_friction") or ()), *(tendon.get("pulley_friction") or ())]:
-            move(law)
-    return rougher

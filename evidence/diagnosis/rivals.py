@@ -16,7 +16,7 @@ from typing import Any
 from evidence.diagnosis import makers, rival_methods
 from evidence.diagnosis.campaign import row_of
 from evidence.diagnosis.case import Case, causes_of, leaves_unnamed
-from evidence.diagnosis.foreign_cases import is_absorbed, is_outside
+from evidence.diagnosis.foreign_cases import is_absorbed, is_outside, make
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
 from evidence.diagnosis.makers import Options, Plan
 from evidence.fingers import foreign
@@ -85,8 +85,8 @@ def _foreign() -> Iterator[Plan]:
 
 
 def foreign_case(seed: int, family: str, number: int) -> Case:
-    """The case of that number, whose seed is its own; joint angles are left unused."""
-    return replace(makers.foreign_finger(module_of(family).make(number, TRAIN, TEST)), kinematics=1)
+    """The case of that number, whose seed is its own."""
+    return make(family, number, TRAIN, TEST)
 
 
 # --- one case ---------------------------------------------------------------------------------------------------------
@@ -145,12 +145,7 @@ def _causes(places: Iterator[Where] | Sequence[Where]) -> list[Cause]:
 
 def judged(case: Case, answer: Answer) -> dict[str, Any]:
     """The same questions for everybody; on foreign fingers presliding is never false. None: it does not arise."""
-    truth = replace(
-        case.truths[0] if case.truths else Truth(),
-        allowed=case.also,
-        neutral=("unknown",) if case.machine == "matched" else ("presliding", "unknown"),
-        synonyms=SYNONYMS,
-    )
+    truth = replace(case.truths[0] if case.truths else Truth(), synonyms=SYNONYMS)
     causes = [cause for cause in answer.causes if cause["effect"] not in truth.neutral]
     if answer.one_of and causes:
         causes = [{**causes[0], "confusable_with": causes[1:]}]
@@ -158,7 +153,7 @@ def judged(case: Case, answer: Answer) -> dict[str, Any]:
     alone = not answer.one_of or judgement.set_size == 1
     return {
         "names": answer.names,
-        "false": len(judgement.false if case.truths else judgement.named),
+        "false": len(judgement.false if truth.effects else judgement.named),
         "in_set": judgement.in_set,
         "first": judgement.first and alone,
         "at_place": judgement.at_place if judgement.in_set else None,

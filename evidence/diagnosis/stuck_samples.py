@@ -15,13 +15,13 @@ from unittest import mock
 
 import numpy as np
 
-from evidence.diagnosis.makers import mujoco_finger
 from evidence.fingers import sticking_finger
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import Row, by, count, table
 from tendonfmu.diagnosis import diagnose, search
 
 SECONDS, WEIGHT, PULL = 30.0, 0.05, 20.0  # s, N·m, N
+MUJOCO_SECONDS, MOST_RATE = 45.0, 500.0  # s, Hz
 PHYSICS = {"presliding", "inertia"}  # of the simulated finger
 WAYS = ("always count", "may be left out")
 
@@ -57,8 +57,13 @@ def of_sticking_finger(hidden: str, way: str, seed: int) -> dict[str, Any]:
 
 
 def of_mujoco(way: str, number: int, seed: int, joints: int) -> dict[str, Any]:
+    from evidence.fingers import mujoco_cases  # mujoco need not be there for the other fingers
+
+    plan = mujoco_cases.PLANS[number - 1]
+    plan = replace(plan, joints=joints, rate=min(plan.rate, MOST_RATE))
+    made = mujoco_cases.of_plan(plan, number, seed, MUJOCO_SECONDS, 1.0)
     with searching(way):
-        diagnosis = replace(mujoco_finger(seed, number, joints, 45.0, 500.0), seed=seed).diagnosed()
+        diagnosis = diagnose(made.nominal, made.train, kinematics=2, seed=seed)
     return {"way": way, "false": bool({cause.effect for cause in diagnosis.causes} - PHYSICS)}
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 import sys
+from functools import partial
 from importlib import import_module
 from types import ModuleType
 
@@ -14,9 +15,7 @@ import pandas as pd
 import pytest
 
 from evidence.diagnosis import case as diagnosis_case
-from evidence.diagnosis.case import run_command
-from evidence.diagnosis.foreign_cases import markdown, row_of
-from evidence.diagnosis.makers import foreign_finger
+from evidence.diagnosis import foreign_cases, seen
 from evidence.fingers import numpy_cases, recorded
 from evidence.fingers.families import cases_of
 from evidence.fingers.foreign import Array, Truth
@@ -170,6 +169,8 @@ REPORT = {
     "verdict": "explained",
     "nominal": {"test_rms": [0.02, 0.01]},
     "extended": {"test_rms": [0.01, 0.005]},
+    "too_small": [],
+    "unexplained": {"share": 0.0},
     "gain": {"value": 0.5, "interval": [0.4, 0.6]},
     "causes": [{"effect": "gravity", "joint": 1, "tendon": None, "gain": {"value": 0.5, "interval": [0.4, 0.6]}}],
 }
@@ -188,22 +189,21 @@ SLEEPS = "import time\ntime.sleep(60)"
 
 
 def test_the_table_has_a_row_for_each_end_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = numpy_cases.make(6, 1.0, 0.5)
+    made = foreign_cases.make("numpy", 6, 1.0, 0.5)
+    monkeypatch.setattr(foreign_cases, "make", lambda *given: made)
     rows = []
     for k, (program, limit) in enumerate(((WRITES, 60.0), (FAILS, 60.0), (SLEEPS, 0.5))):
         monkeypatch.setattr(diagnosis_case, "PROGRAM", (sys.executable, "-c", program))
-        row = row_of("numpy", made.truth, run_command(foreign_finger(made), limit=limit))
+        monkeypatch.setattr(seen, "run_command", partial(diagnosis_case.run_command, limit=limit))
+        row = seen.run_case("numpy", None, 6)
         rows.append(json.loads(json.dumps(row | {"name": f"made_0{k}"})))
     assert [row["exit"] for row in rows] == [0, 1, None] and rows[2]["message"] == "ended after 0.5 s"
     assert rows[0]["seconds"] > 0.02 and rows[0]["peak_megabytes"] > 3.0
-    assert rows[0]["first"] and rows[0]["false"] == [] and rows[0]["error_ratio"] == pytest.approx(0.5)
-    text = markdown(rows)
-    assert "gravity j1 50 %" in text and "internal error: x / y" in text
-    # a run without a report counts as wrong
-    assert "| runs that end with a report | 1/3 |" in text and "| true cause in the set | 1/3 |" in text
-    assert "| gain ≥ 0 | 1/3 |" in text and "| false causes per case | 0.00 |" in text
-    nothing = rows[0] | {"hidden": rows[0]["hidden"] | {"effect": "none"}, "asked": False}
-    assert "| made_00 | 2 | 20.00, 10.00 | 10.00, 5.00 |" in markdown([nothing])
+    assert rows[0]["first"] and rows[0]["false"] == [] and rows[0]["left"] == [0.01, 0.005]
+    text = seen.markdown(rows)
+    assert "gravity j1 50 %" in text and "internal error: x / y" in text and "| 10.00, 5.00 |" in text
+    assert "| runs that end with a report | 100 % | 33.3 % | 1/3 |" in text
+    assert "| false causes a case | ≤ 0.15 | 0.00 | 0/1 |" in text
 
 
 def test_halves_are_by_number() -> None:

@@ -105,21 +105,22 @@ def test_each_rival_answers_on_a_recording(case: Case) -> None:
 # --- the table --------------------------------------------------------------------------------------------------------
 
 
-def made_case(*truths: Truth, machine: str = "numpy", also: tuple[str, ...] = ("presliding",)) -> Case:
-    return Case(machine, {}, [], truths=truths, also=also)
+def made_case(*truths: Truth) -> Case:
+    return Case("numpy", {}, [], truths=truths)
 
 
 def causes(*listed: tuple[str, int | None, int | None]) -> list[dict[str, Any]]:
     return [{"effect": effect, "joint": joint, "tendon": tendon} for effect, joint, tendon in listed]
 
 
-GRAVITY = Truth(("gravity",), 1)
+NEUTRAL = ("presliding", "unknown")  # on foreign fingers
+GRAVITY, NOTHING = Truth(("gravity",), 1, neutral=NEUTRAL), Truth(neutral=NEUTRAL)
 
 
 def test_presliding_is_false_on_matched_rigs_alone() -> None:
     answer = Answer(causes(("presliding", None, None)))
-    assert judged(made_case(), answer)["false"] == 0
-    assert judged(made_case(machine="matched", also=()), answer)["false"] == 1
+    assert judged(made_case(NOTHING), answer)["false"] == 0
+    assert judged(made_case(), answer)["false"] == 1
 
 
 def test_a_set_without_an_order_is_first_only_alone() -> None:

@@ -122,7 +122,14 @@ def test_what_is_on_no_list_is_said_to_remain_or_has_a_wrong_name() -> None:
 
 
 def test_the_table_has_the_goals() -> None:
-    known = {"family": "dahl", "name": "dahl_gravity_1", "answered": True, "seconds": 9.0, "peak_megabytes": 300.0}
+    known = {
+        "family": "dahl",
+        "name": "dahl_gravity_1",
+        "answered": True,
+        "absorbed": False,
+        "seconds": 9.0,
+        "peak_megabytes": 300.0,
+    }
     known |= {"hidden": cause("gravity"), "hidden_rms": 0.004, "visible_rms": 0.002, "true_gain": 0.2}
     text = seen.markdown([known | row("gravity", Truth(("gravity",), 1), [cause("gravity")], [])])
     assert "| in the set, causes and too small | ≥ 85 % | 100.0 % | 1/1 |" in text
