@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.diagnosis.remainder_features import Features
@@ -105,8 +106,10 @@ class Learner:
             train = np.flatnonzero(~inside)
             train = train[:: max(1, len(train) // MOST_ROWS)]
             trees = HistGradientBoostingRegressor(**TREES, early_stopping=False, random_state=seed)
-            trees.fit(table[train], self.target[train, joint])
-            prediction[inside] = trees.predict(table[inside])
+            # its threads come with its library, so no limit that was set before it was loaded holds for them
+            with threadpool_limits(limits=1, user_api="openmp"):
+                trees.fit(table[train], self.target[train, joint])
+                prediction[inside] = trees.predict(table[inside])
         return self._span.without(prediction[:, None])[:, 0]
 
     def gains(self, prediction: Numbers) -> Numbers:
