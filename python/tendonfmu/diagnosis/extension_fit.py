@@ -35,7 +35,7 @@ from tendonfmu.model import finger_from_data, law_path, moment_arms, native, num
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-FEWER_SAMPLES = 5_000  # the same for models that are only compared with each other
+FEWER_SAMPLES = 20_000  # the same for models that are only compared with each other
 PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
 MOST_PASSES = 60  # over the recordings
 TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together

@@ -100,7 +100,7 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     nominal = fit_numbers(finger.data, own, settings)
-    model = fit_extended(nominal, start.terms, own, settings, best.model.data) if start.causes else nominal
+    model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
     least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
     chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
@@ -174,12 +174,11 @@ def starting_point(
         tried = [starts[0], *[start for start in starts[1:] if start.presliding != starts[0].presliding][:1]]
     else:
         tried = [known.start]
-    begin = known.model.data if known else None
     cutoff = signals.cutoff or (known.signals.cutoff if known else None)
     span = span_of(nominal.data, own)
     compared = []
     for start in tried:
-        model = fit_extended(nominal, start.terms, own, settings, begin) if start.causes else nominal
+        model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
