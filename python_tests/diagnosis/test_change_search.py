@@ -190,7 +190,7 @@ def test_a_test_recording_judges(test: Worn, named: list[str]) -> None:
     assert found.tests == ("test.parquet",) and not found.held_out
     assert found.gain.value >= 0.0 and (found.gain.value > 0.3) == bool(named)
     if not named:
-        assert "joint_friction" in {effect for each in found.too_small for effect in names(each)}
+        assert "joint_friction" in {effect for each in found.uncertain for effect in names(each)}
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
