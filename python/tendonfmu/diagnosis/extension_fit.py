@@ -35,7 +35,6 @@ from tendonfmu.model import finger_from_data, law_path, moment_arms, native, num
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-FEWER_SAMPLES = 20_000  # the same for models that are only compared with each other
 PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
 MOST_PASSES = 60  # over the recordings
 TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
@@ -87,7 +86,7 @@ def fit_numbers(
     origin = data if given is None else given
     if fixed:
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    every = _thinning(recordings, FEWER_SAMPLES)
+    every = _thinning(recordings, MOST_SAMPLES)
     structure, learned = _learned(_with_noise(data, every), recordings, settings, origin, begin, every, ROUGH_TOLERANCE)
     numbers = np.asarray(learned.estimator.values(learned.z))
     finger = with_values(structure, numbers)

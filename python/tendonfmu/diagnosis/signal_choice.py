@@ -89,14 +89,13 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     raw = Signals()
     part = part_of(given, recordings)
     if smoothing is None:
-        best = starting_point(given, part, raw, settings)
+        signals, start = raw, starting_point(given, part, raw, settings).start
     else:
         smooth = starting_point(given, part, smoothing, settings)
         rough = starting_point(given, part, raw, settings, smooth)
         lags = any(recording.kinematics != 3 for recording in recordings)
         is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
-        best = rough if is_raw else smooth
-    signals, start = best.signals, best.start
+        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
     finger = replace(given, data=signals.description(given.data))
     own = estimation_recordings(finger, recordings, signals)
     nominal = fit_numbers(finger.data, own, settings)
@@ -151,7 +150,6 @@ class Compared:
 
     signals: Signals
     start: Start
-    model: FittedModel  # fitted with it
     error: float
 
 
@@ -182,7 +180,7 @@ def starting_point(
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-        compared.append(Compared(signals, start, model, _error(model.data, own, grid, cutoff)))
+        compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 
 
