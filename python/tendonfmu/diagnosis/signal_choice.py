@@ -150,6 +150,7 @@ class Compared:
 
     signals: Signals
     start: Start
+    model: FittedModel  # fitted with it
     error: float
 
 
@@ -180,7 +181,7 @@ def starting_point(
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-        compared.append(Compared(signals, start, _error(model.data, own, grid, cutoff)))
+        compared.append(Compared(signals, start, model, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 
 
