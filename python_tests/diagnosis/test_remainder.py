@@ -14,6 +14,7 @@ from repetitions import repeated
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis.pictures import residual_views, whiteness
 from tendonfmu.diagnosis.remainder import measure_remainder
+from tendonfmu.diagnosis.remainder_map import remainder_map
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.splines import bias_splines
 
@@ -83,6 +84,21 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
         assert line is not None
         assert line.frequency == pytest.approx(3.7, abs=0.02)
         assert "3.7 Hz" in found.description
+
+
+def test_the_map_is_over_what_is_followed() -> None:
+    series = make_series(7)
+    nuisance = nuisance_of(series)
+    hidden = with_effect(series, nuisance, product(series), joint=1, strength=3.0)
+    residual = residual_of(hidden, nuisance)
+    found = remainder_map(hidden, residual, measure_remainder(hidden, residual, bias_splines(hidden)), "ab", "cdef")
+    assert found is not None
+    assert (found.joint, found.labels) == (2, ("angle of a (rad)", "angle of b (rad)"))
+    middles = np.meshgrid(*(0.5 * (edges[1:] + edges[:-1]) for edges in found.edges))
+    one, other = (middle / spread for middle, spread in zip(middles, series.angle.std(axis=0), strict=True))
+    known = np.isfinite(found.torque)
+    wave = np.sin(1.3 * one) * np.cos(1.1 * other)
+    assert np.corrcoef(found.torque[known], wave[known])[0, 1] > 0.6
 
 
 def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:

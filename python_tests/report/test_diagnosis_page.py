@@ -22,7 +22,7 @@ from repetitions import repeated
 from tendonfmu.diagnosis.cause import CausePlace
 from tendonfmu.diagnosis.names import title_of
 from tendonfmu.diagnosis.reported import reported_causes
-from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
+from tendonfmu.diagnosis.result import Diagnosis, ModelErrors, RemainderMap
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.report.diagnosis_files import build_report, report_text
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
@@ -168,6 +168,15 @@ def test_what_is_not_known_is_null() -> None:
     assert report["noise_floor"] == [None, 1e-3] and report["gain"] == {"value": None, "interval": [None, None]}
     text = plain(diagnosis_page(found))
     assert "nan" not in text.lower().split() and "inf" not in text.lower().split()
+
+
+def test_a_part_without_a_name_has_a_map(full: Diagnosis) -> None:
+    edges = (np.linspace(-1.0, 1.0, 4), np.linspace(10.0, 20.0, 3))
+    torque = np.array([[1e-3, np.nan, -1e-3], [2e-3, 0.0, -2e-3]])
+    shown = RemainderMap(2, ("angle of mcp (rad)", "force of flexor (N)"), edges, torque)
+    page = diagnosis_page(replace(full, unexplained=replace(full.unexplained, map=shown)))
+    assert 'id="views_map"' in page and "over angle of mcp and force of flexor" in page
+    assert 'id="views_map"' not in diagnosis_page(full)
 
 
 def test_a_wrong_report_is_refused(full: Diagnosis) -> None:
