@@ -32,7 +32,7 @@ from evidence.runner import ROOT, parser, say, write
 
 PACKAGES = {
     "requirements-foreign.lock": ("mujoco",),
-    "requirements-diagnosis-peers.lock": ("pysindy", "knockpy"),
+    "requirements-diagnosis-peers.lock": ("pysindy",),
     "requirements-fit-peers.lock": ("filterpy",),
     "requirements-peers.lock": ("pythonfmu",),
 }

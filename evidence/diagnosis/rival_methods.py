@@ -6,24 +6,17 @@ slow bias can mend by plain least squares, as with independent samples.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import t as student
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from tendonfmu.diagnosis.cause import Where
-from tendonfmu.diagnosis.series import make_grid
-from tendonfmu.diagnosis.view import View, residual_alone, series_of
-from tendonfmu.estimate.evaluation import model_over, residuals
-from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.recordings.residuals import Model
+from tendonfmu.diagnosis.view import View
 from tendonfmu.statistics.splines import Span, basis, without
 
 Numbers = NDArray[np.float64]
@@ -31,7 +24,6 @@ Flags = NDArray[np.bool_]
 
 MOST_CAUSES = 4  # that any rival may name
 SIGNIFICANCE = 0.01
-SEED = 0
 
 
 @dataclass(frozen=True)
@@ -182,57 +174,6 @@ def shows(trial: Trial, power: Numbers) -> bool:
     return bool(power[trial.columns].max() > least_power(power))
 
 
-# --- model-X knockoffs: Candès, Fan, Janson, Lv: "Panning for gold", JRSS B 80 (2018) ---------------------------------
-# By knockpy (Spector, Janson). Each candidate at a place is one variable: the first principal direction of its columns.
-# Gaussian knockoffs of second order by minimum reconstructability (MVR), the statistic is the difference of lasso
-# coefficients. A cause is named where it passes the threshold for a share of false ones of 10 %, the largest statistic
-# first. The threshold is that of the modified share (offset 0). The exact one (offset 1, "knockoff+") names nothing or
-# at least ten causes at 10 %, and here there is one. The method takes rows for independent draws; those of a recording
-# are not.
-
-FALSE_SHARE = 0.1
-
-
-def by_knockoffs(data: Plain) -> list[Trial]:
-    """Raises ModuleNotFoundError where knockpy is not installed."""
-    from knockpy import KnockoffFilter
-    from knockpy.knockoff_stats import data_dependent_threshhold
-
-    owners, variables = one_variable_each(data)
-    np.random.seed(SEED)  # noqa: NPY002  knockpy draws from the global generator
-    knockoffs = KnockoffFilter(ksampler="gaussian", fstat="lasso", knockoff_kwargs={"method": "mvr"})
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the lasso, at its smallest penalties
-        knockoffs.forward(variables, data.target / data.target.std(), fdr=FALSE_SHARE)
-    statistic = np.asarray(knockoffs.W)
-    least = data_dependent_threshhold(statistic, fdr=FALSE_SHARE, offset=0)
-    order = np.argsort(-statistic)
-    return [owners[k] for k in order if statistic[k] > 0.0 and statistic[k] >= least][:MOST_CAUSES]
-
-
-def one_variable_each(data: Plain) -> tuple[list[Trial], Numbers]:
-    """A trial for each place of a candidate, and [R, v] the first principal direction of its columns, of rms 1."""
-    owners: list[Trial] = []
-    variables: list[Numbers] = []
-    for trial, columns in columns_by_place(data):
-        variable = columns @ np.linalg.eigh(columns.T @ columns)[1][:, -1]
-        owners.append(trial)
-        variables.append(variable / np.sqrt(np.mean(variable**2)))
-    return owners, np.column_stack(variables)
-
-
-def columns_by_place(data: Plain) -> Iterator[tuple[Trial, Numbers]]:
-    """For each place of a candidate its first trial, and [R, c] its columns of length 1, without those that are
-    rounding."""
-    power = np.einsum("rc,rc->c", data.columns, data.columns)
-    shown = power > least_power(power)
-    for where in dict.fromkeys(trial.where for trial in data.trials):
-        trials = [trial for trial in data.trials if trial.where == where]
-        numbers = [number for trial in trials for number in trial.numbers if shown[number]]
-        if numbers:
-            yield trials[0], data.columns[:, numbers] / np.sqrt(power[numbers])
-
-
 # --- a structural-residual test as fault diagnosis has it (Gertler 1998; Blanke et al. 2016): detect, then isolate ----
 # Residuals are parity relations of the torque balance. One for each joint is the balance of that joint. One for each
 # tendon is the part of the balance that no force of this tendon can enter: its component across the tendon's arms.
@@ -300,67 +241,15 @@ def largest_ratio(values: Numbers, length: int) -> float:
 
 def signature_matrix(data: Plain, relations: list[Numbers]) -> dict[Where, Flags]:
     """[k] for each effect at a place: which residuals it enters."""
-    joints = len(relations[0])
+    joints, power = len(relations[0]), np.einsum("rc,rc->c", data.columns, data.columns)
+    numbers: dict[Where, list[int]] = {}
+    for trial in data.trials:
+        shown = [number for number in trial.numbers if power[number] > least_power(power)]
+        numbers.setdefault(trial.where, []).extend(shown)
     signatures: dict[Where, Flags] = {}
-    for trial, columns in columns_by_place(data):
-        by_joint = columns.reshape(-1, joints, columns.shape[1])
-        entering = [np.einsum("bjc,jd->bdc", by_joint, directions) for directions in relations]
-        shares = [float(np.mean(np.sum(part**2, axis=(0, 1)))) for part in entering]
-        signatures[trial.where] = np.array([share >= ENTERS for share in shares])
+    for where, chosen in numbers.items():
+        if chosen:
+            by_joint = (data.columns[:, chosen] / np.sqrt(power[chosen])).reshape(-1, joints, len(chosen))
+            entering = [np.einsum("bjc,jd->bdc", by_joint, directions) for directions in relations]
+            signatures[where] = np.array([np.mean(np.sum(part**2, axis=(0, 1))) >= ENTERS for part in entering])
     return signatures
-
-
-# --- a discrepancy as Kennedy and O'Hagan have it (JRSS B 63 (2001)): it predicts what is left, unnamed ---------------
-# y = T + δ(q, q̇, f) + bias + noise: T is the nominal model with its fitted numbers, δ a Gaussian process for each joint
-# over all joint angles, all joint velocities and the tendons' mean force (squared exponential kernel with a length for
-# each input, white noise; hyperparameters by the marginal likelihood; scikit-learn), learned from 400 random blocks of
-# 10 ms. The numbers of T are not fitted again with δ: it gets what they leave. One mean force in place of all forces
-# was chosen on five cases: on unseen recordings it predicts better and takes less time. Its gain is that of
-# `diagnose`: 1 − rms ratio with and without δ of the residual on raw samples of recordings that nothing was fitted to,
-# before the bias update.
-
-Data = Mapping[str, Any]
-Processes = list[GaussianProcessRegressor]
-
-BLOCKS = 400
-
-
-def gain_of_discrepancy(data: Data, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> float:
-    """1 − rms ratio on the tests. data: the fitted nominal description, with the settings for raw samples."""
-    scale, processes = learned(data, training)
-    sums = np.zeros(2)
-    for test in tests:
-        model = model_over(data, test)
-        inputs = inputs_of(model.joint_angle, model.joint_speed, test.recording.groups["tendon_force"])
-        seen = test.tracked & np.isfinite(inputs).all(axis=1)
-        correction = np.zeros_like(test.target)
-        correction[seen] = np.column_stack([process.predict(inputs[seen] / scale) for process in processes])
-        for k, tried in enumerate((model, corrected(model, correction))):
-            sums[k] += float(np.nansum(residuals(data, test, tried).residual[seen] ** 2))
-    return 1.0 - float(np.sqrt(sums[1] / sums[0]))
-
-
-def inputs_of(angle: Numbers, velocity: Numbers, force: Numbers) -> Numbers:
-    """[N, 2n + 1] of δ. angle, velocity: [N, n] of the joints. force: [N, m] of the tendons."""
-    return np.column_stack([angle, velocity, np.abs(force).mean(axis=1)])
-
-
-def corrected(model: Model, correction: Numbers) -> Model:
-    return replace(model, torque=model.torque + correction)
-
-
-def learned(data: Data, training: Sequence[FitRecording]) -> tuple[Numbers, Processes]:
-    """[2n + 1] scale of the inputs, and a process for each joint."""
-    series = series_of(data, training, make_grid(training))
-    left = residual_alone(data, series)[series.used]
-    inputs = inputs_of(series.angle, series.velocity, series.force)[series.used]
-    scale = np.maximum(inputs.std(axis=0), 1e-12)
-    rows = np.random.default_rng(SEED).permutation(len(inputs))[:BLOCKS]
-    kernel = ConstantKernel() * RBF(np.ones(inputs.shape[1])) + WhiteKernel()
-    processes = []
-    for joint in range(left.shape[1]):
-        process = GaussianProcessRegressor(kernel, normalize_y=True, random_state=SEED)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of inputs that tell nothing: their lengths end at a bound
-            processes.append(process.fit(inputs[rows] / scale, left[rows, joint]))
-    return scale, processes

@@ -1,7 +1,7 @@
 """`diagnose` and its rivals (rival_methods.py) on the same cases: python -m evidence.diagnosis.rivals -o FOLDER
 
 Foreign: the even cases in numpy and MuJoCo, without what refitting absorbs. The rivals work on the very residual and
-columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without them sindy and knockoffs are left out) and
+columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without them sindy is left out) and
 requirements-foreign.lock. Writes FOLDER/rivals.md.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import statistics
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -99,15 +99,13 @@ class Answer:
     causes: Sequence[Cause] = ()  # the first one first
     one_of: bool = False  # whether it says only that one of them is present; none of several is then first
     unnamed: bool | None = None  # whether something is missing that it cannot name; None if it never says so
-    gain: float | None = None  # 1 − rms ratio of its model and the nominal one on the tests; None if it has no model
-    names: bool = True  # whether it names anything at all
 
 
 def run_case(plan: Plan) -> dict[str, Any]:
     case = plan.make()
     diagnosis = case.diagnosed()
     causes = causes_of(diagnosis)
-    diagnosed = Answer(causes, unnamed=leaves_unnamed(diagnosis.verdict, causes), gain=diagnosis.gain.value)
+    diagnosed = Answer(causes, unnamed=leaves_unnamed(diagnosis.verdict, causes))
     answers = {OWN: diagnosed, **rival_answers(case)}
     return row_of(plan, case) | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
 
@@ -115,24 +113,17 @@ def run_case(plan: Plan) -> dict[str, Any]:
 def rival_answers(case: Case) -> dict[str, Answer]:
     """The rivals on a case, from the signals that `diagnose` chooses."""
     finger = read_finger(case.finger)
-    recordings, tests = (
-        [prepare(finger, read_recording(frame), case.kinematics, Held()) for frame in frames]
-        for frames in (case.recordings, case.test)
-    )
+    recordings = [prepare(finger, read_recording(frame), case.kinematics, Held()) for frame in case.recordings]
     chosen = choose(finger, recordings, FitSettings(threads=1))
-    answers = answers_of(look(chosen.nominal.data, chosen.recordings, chosen.grid, chosen.least))
-    nominal = chosen.online(chosen.nominal.data)
-    gain = rival_methods.gain_of_discrepancy(nominal, recordings, tests)
-    return answers | {"discrepancy": Answer(gain=gain, names=False)}
+    return answers_of(look(chosen.nominal.data, chosen.recordings, chosen.grid, chosen.least))
 
 
 def answers_of(view: View) -> dict[str, Answer]:
-    """What each rival says of the residual. sindy and knockoffs only where they are installed."""
+    """What each rival says of the residual; sindy only where it is installed."""
     data = rival_methods.plain(view)
     trials = {name: rival_methods.stepwise(data, choose) for name, choose in rival_methods.STEPWISE.items()}
-    for name, rival in (("sindy", rival_methods.by_sindy), ("knockoffs", rival_methods.by_knockoffs)):
-        with contextlib.suppress(ModuleNotFoundError):
-            trials[name] = rival(data)
+    with contextlib.suppress(ModuleNotFoundError):
+        trials["sindy"] = rival_methods.by_sindy(data)
     answers = {name: Answer(_causes(trial.where for trial in named)) for name, named in trials.items()}
     parity = rival_methods.by_parity(data, moment_arms(view.data), view.series.step)
     unnamed = bool(parity.fired.any()) and not parity.causes
@@ -152,60 +143,34 @@ def judged(case: Case, answer: Answer) -> dict[str, Any]:
     judgement = judge(causes, truth)
     alone = not answer.one_of or judgement.set_size == 1
     return {
-        "names": answer.names,
         "false": len(judgement.false if truth.effects else judgement.named),
         "in_set": judgement.in_set,
         "first": judgement.first and alone,
         "at_place": judgement.at_place if judgement.in_set else None,
         "set_size": judgement.set_size,
         "unnamed": answer.unnamed,
-        "gain": answer.gain,
     }
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
 
-Verdict = Mapping[str, Any]
-Cell = Callable[[Sequence[Verdict], str], str]
+Cell = Callable[[Sequence[Any]], str]
 
 
-def _known(verdicts: Sequence[Verdict], key: str) -> list[Any]:
-    return [verdict[key] for verdict in verdicts if verdict[key] is not None]
-
-
-def _share(verdicts: Sequence[Verdict], key: str) -> str:
-    return count(_known(verdicts, key))
-
-
-def _naming(verdicts: Sequence[Verdict], key: str) -> str:
-    return _share(verdicts, key) if all(verdict["names"] for verdict in verdicts) else "names nothing"
-
-
-def _mean(verdicts: Sequence[Verdict], key: str) -> str:
-    known = _known([verdict for verdict in verdicts if verdict["names"]], key)
-    return f"{statistics.fmean(known):.2f}" if known else NOTHING
-
-
-def _gain(verdicts: Sequence[Verdict], key: str) -> str:
-    values = _known(verdicts, key)
-    if not values:
-        return NOTHING
-    return f"{100 * statistics.median(values):.1f} % ({100 * min(values):.1f} to {100 * max(values):.1f})"
+def _mean(values: Sequence[Any]) -> str:
+    return f"{statistics.fmean(values):.2f}" if values else NOTHING
 
 
 # by what is asked: the group of cases, how its cell is made, and of which answer
 LINES: dict[str, tuple[str, Cell, str]] = {
-    "nothing hidden: names something": ("null", _naming, "false"),
-    "one effect: in the set": ("single", _naming, "in_set"),
-    "one effect: first": ("single", _naming, "first"),
-    "one effect: at its place, where in the set": ("single", _naming, "at_place"),
+    "nothing hidden: names something": ("null", count, "false"),
+    "one effect: in the set": ("single", count, "in_set"),
+    "one effect: first": ("single", count, "first"),
+    "one effect: at its place, where in the set": ("single", count, "at_place"),
     "one effect: false causes per case": ("single", _mean, "false"),
     "one effect: effects in the set": ("single", _mean, "set_size"),
-    "not on the list: names something": ("unknown", _naming, "false"),
-    "not on the list: says there is something, unnamed": ("unknown", _share, "unnamed"),
-    "nothing hidden: gain, median and range": ("null", _gain, "gain"),
-    "one effect: gain": ("single", _gain, "gain"),
-    "not on the list: gain": ("unknown", _gain, "gain"),
+    "not on the list: names something": ("unknown", count, "false"),
+    "not on the list: says there is something, unnamed": ("unknown", count, "unnamed"),
 }
 
 
@@ -218,7 +183,8 @@ def markdown(rows: Sequence[Row]) -> str:
         of_family = [row for row in good if (row["rig"] == "matched") == is_matched]
         for what, (group, cell, key) in LINES.items():
             asked = [row["answers"] for row in of_family if row["group"] == group]
-            cells = [cell([answers[who] for answers in asked if who in answers], key) for who in names]
+            said = [[answers[who][key] for answers in asked if who in answers] for who in names]
+            cells = [cell([value for value in values if value is not None]) for values in said]
             lines.append([f"{family}, {what}", *cells])
     failed = len(rows) - len(good)
     note = f"\n{failed} of {len(rows)} cases ended in an error and are left out.\n" if failed else ""

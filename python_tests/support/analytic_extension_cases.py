@@ -160,7 +160,7 @@ def corrected_measurements(run: Run) -> None:
 
 @case
 def presliding(run: Run) -> None:
-    """ζ: 0, 1/2, 3/4, back over twice the way, held at rest on the side of before; no jump of the bias."""
+    """ζ: 0, 1/2, 3/4, back over twice the distance, then at rest on the earlier side; no jump of the bias."""
     law = {"positive": JOINT_DRY, "negative": JOINT_DRY | {"static": 0.3, "coulomb": 0.2}}
     rows = [{"effect": "presliding", "joint": 1, "displacement": 0.1 * HALF}]
     description = finger([{"moment_arms": [ARM]}], [{"name": "j", "friction": law}], extensions=rows)
@@ -327,7 +327,7 @@ def late_positions(run: Run, source: int) -> None:
 
 @case
 def late_forces(run: Run) -> None:
-    """delay < 0: the forces of before everywhere: τ, the mean force of the noise, the stretch."""
+    """delay < 0: earlier forces in all of it: τ, the mean force of the noise, the stretch."""
     rows = [{"effect": "time_delay", "delay": -0.05}]
     bias = {"drift_variance": 0.0, "noise_std": 0.0, "noise_std_per_force": 0.01, "initial_variance": 0.0225}
     description = finger([{"moment_arms": [ARM]}], extensions=rows, bias=bias)

@@ -75,7 +75,6 @@ PARTS = {
     "fmi4j": _file("our FMUs in FMI4j", FMI4J, "./test --all fetches it with Maven"),
     "maestro": _file("our FMUs in Maestro and VDMCheck", MAESTRO, "./test --all fetches it with Maven"),
     "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
-    "knockpy": _package("rivals of the diagnosis", "knockpy", "requirements-diagnosis-peers.lock"),
     "davinci data": _file("the da Vinci tools", DATA / "davinci_tool", RECORDINGS),
     "emps data": _file("the carriage EMPS", DATA / "emps", RECORDINGS),
     "foreign data": _file("recordings of foreign fingers", DATA.parent / "foreign", RECORDINGS),

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import welch
 from scipy.stats import ttest_1samp
 
-from tendonfmu.arrays import Indices, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.remainder_features import GROUPS, LAW, Features, Finding, features, tree_states
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Unexplained
@@ -82,8 +82,8 @@ def measure_remainder(
             law_alone[:, joint] = law[:, joint]
     large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
     if any(large):
-        named = _named(learner, choices(seen)[1:])
-        findings += [Finding(j + 1, named[j].group, named[j].subject) for j in range(joints) if large[j]]
+        named = _named(learner, seen)
+        findings += [Finding(j + 1, *named[j]) for j in range(joints) if large[j]]
     lines = _lines(series, residual, prediction, findings)
     p_value = min([1.0, *(joints * p_value for p_value in p_values), *lines])
     gain = learner.gains(prediction[folds.rows])
@@ -128,10 +128,14 @@ def _p_value(gain: Numbers) -> float:
     return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
 
 
-def _named(learner: Learner, tried: Sequence[Choice]) -> list[Choice]:
-    """Return for each joint the named set of columns that predicts best."""
-    known = [choice for choice in tried if choice.group != "interaction"]
-    left = [np.sum((learner.target - learner.predicted(choice.columns)) ** 2, axis=0) for choice in known]
+def _named(learner: Learner, seen: Features) -> list[tuple[str, str]]:
+    """Return for each joint the group whose columns predict best, and the subject of these, "" for all of the group."""
+    pairs = [pair for pair in zip(seen.group.tolist(), seen.subject.tolist(), strict=True) if pair[0] != "interaction"]
+    known = list(dict.fromkeys([*((group, "") for group, _ in pairs), *pairs]))
+    left = []
+    for group, subject in known:
+        columns = np.flatnonzero((seen.group == group) & ((seen.subject == subject) | (not subject)))
+        left.append(np.sum((learner.target - learner.predicted(columns)) ** 2, axis=0))
     return [known[k] for k in np.argmin(left, axis=0)]
 
 
@@ -146,32 +150,6 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
         findings += [Finding(joint + 1, "line", "", line) for line in lines]
         p_values += [min(1.0, joints * line.p_value) for line in lines]
     return p_values
-
-
-# --- sets of columns -------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A set of columns."""
-
-    group: str  # key of GROUPS; "" for all groups
-    subject: str  # subject within the group; "" for the whole group
-    columns: Indices  # indices of the columns
-
-
-def choices(seen: Features) -> list[Choice]:
-    """Return all columns, those of each group, and those of each subject of each group."""
-    pairs = list(dict.fromkeys(zip(seen.group.tolist(), seen.subject.tolist(), strict=True)))
-    names = list(dict.fromkeys(group for group, _ in pairs))
-    listed = [Choice("", "", np.arange(len(seen.group)))]
-    listed += [Choice(name, "", np.flatnonzero(seen.group == name)) for name in names]
-    listed += [
-        Choice(group, subject, np.flatnonzero((seen.group == group) & (seen.subject == subject)))
-        for group, subject in pairs
-        if subject
-    ]
-    return listed
 
 
 # --- in words --------------------------------------------------------------------------------------------------------

@@ -370,7 +370,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         title="play before motion passes on",
         explanation=(
             "After a reversal the measured position moves on for a short way before the joint follows: a loose "
-            "gear, coupling or tendon fixing. Rock the drive to and fro by a little and see whether the joint "
+            "gear, coupling or tendon fixing. Rock the drive back and forth by a little and see whether the joint "
             "follows."
         ),
         excited_by="many small reversals, with travels around the play's width",

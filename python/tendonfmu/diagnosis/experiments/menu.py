@@ -198,7 +198,7 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
         middle = recorded.ranges[:, 0] + share * width
         ranges = np.column_stack([middle - stroke / 2, middle + stroke / 2])
         sections.append(replace(usual, ranges=_as_ranges(ranges), max_speed=speed, seconds=SECONDS / len(_POSTURES)))
-    return Entry(f"small strokes of {float(stroke.max()):.2g} rad to and fro, at three postures", tuple(sections))
+    return Entry(f"small strokes of {float(stroke.max()):.2g} rad back and forth, at three postures", tuple(sections))
 
 
 # --- pretensions and loads --------------------------------------------------------------------------------------------
