@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from repetitions import repeated
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
@@ -84,6 +84,19 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
         assert line is not None
         assert line.frequency == pytest.approx(3.7, abs=0.02)
         assert "3.7 Hz" in found.description
+
+
+def test_a_strong_line_in_smooth_signals_is_found() -> None:
+    """A filter that whitens smooth signals predicts a sine, too, and leaves nothing of it."""
+    series = make_series(5)
+    rng = np.random.default_rng(5)
+    noise = sosfiltfilt(
+        butter(4, 6.0, fs=1.0 / series.step, output="sos"), rng.standard_normal((len(series.time), 2)), 0
+    )
+    residual = 1e-3 * noise / noise.std(axis=0)
+    residual[:, 0] += 3e-3 * np.sin(2.0 * np.pi * 1.5 * series.time)
+    found = measure_remainder(series, residual, bias_splines(series)).findings
+    assert [(finding.joint, finding.group) for finding in found] == [(1, "line")]
 
 
 def test_the_map_is_over_what_is_followed() -> None:

@@ -34,6 +34,7 @@ from tendonfmu.statistics import (
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
+STRONG = 0.1  # of the variance, of a line in signals that are not whitened
 CERTAIN = 2.0  # standard errors over the stretches
 LAW_ERROR = 0.1  # of the torque to be explained: laws of friction differ from each other by no more
 CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
@@ -145,7 +146,10 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
     joints = residual.shape[1]
     for joint in range(joints):
         own = Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
-        lines, wave = find_lines(series, residual[:, joint] - prediction[:, joint], own, level=LEVEL / joints)
+        left = residual[:, joint] - prediction[:, joint]
+        lines, wave = find_lines(series, left, own, level=LEVEL / joints)
+        if not lines:  # a filter that was fitted to smooth signals removes a strong line itself
+            lines, wave = find_lines(series, left, None, level=LEVEL / joints, least=STRONG)
         prediction[:, joint] += wave
         findings += [Finding(joint + 1, "line", "", line) for line in lines]
         p_values += [min(1.0, joints * line.p_value) for line in lines]

@@ -68,9 +68,9 @@ GROUPS = {
     "torque": "the torque of another joint",
     "interaction": "several of angle, velocity, force and history together",
 }
-# What a friction law depends on: the motion and load of its own place. Every real law differs a little from every
-# description in these, also where nothing is missing.
-LAW = ("velocity", "friction over force", "acceleration", "travel", "memory of direction", "rest", "tendon")
+# What a friction law depends on, and not on time: motion, load, and travel since a reversal. In these every real law
+# differs a little from every description, also where nothing is missing.
+LAW = ("velocity", "friction over force", "acceleration", "travel", "rest", "tendon")
 HISTORY = (0.1, 1.0, 10.0)  # s, for the trees
 
 
@@ -116,10 +116,10 @@ def tree_states(series: Series, force: Numbers, torque: Numbers | None = None) -
     states, starts = _states(series), run_starts(series.segment)
     ratio = series.velocity / states.speed
     law = [ratio, states.side, states.moving, states.rest, series.travel]
-    law += [_filtered(states.side, memory, series.step, starts) for memory in HISTORY]
     law += [states.side[:, joint, None] * force for joint in range(ratio.shape[1])]
     others = [series.angle, force, series.time[:, None], *([] if torque is None else [torque])]
     for memory in HISTORY:
+        others.append(_filtered(states.side, memory, series.step, starts))
         others.append(_filtered(np.abs(ratio), memory, series.step, starts))
         others.append(series.angle - _filtered(series.angle - series.angle[0], memory, series.step, starts))
     own = np.concatenate(law, axis=1)

@@ -38,22 +38,25 @@ class Line:
 
 
 def find_lines(
-    series: BlockSeries, residual: Numbers, filters: Whitener, *, level: float
+    series: BlockSeries, residual: Numbers, filters: Whitener | None, *, level: float, least: float = 0.0
 ) -> tuple[tuple[Line, ...], Numbers]:
-    """Find lines in the residual of a joint."""
+    """Find lines with at least a share of the variance in the residual of a joint, whitened by filters if given."""
     # residual: [B] (N·m); returns their sum [B] (N·m), 0 in unused blocks
     used = series.used & np.isfinite(residual)
     left = np.where(used, residual, 0.0)
     total, lines = np.zeros(len(residual)), []
     variance = float(np.sum(left**2))
     for _ in range(MOST_LINES):
-        flat = np.where(filters.valid, filters.apply(left[:, None])[:, 0], 0.0)
-        peak = _strongest(series, flat, filters.valid)
+        valid = used if filters is None else filters.valid
+        flat = np.where(valid, left if filters is None else filters.apply(left[:, None])[:, 0], 0.0)
+        peak = _strongest(series, flat, valid)
         if peak is None or peak[1] > level:
             break
         wave, amplitude = _fitted(series, left, used, peak[0])
-        share = 1.0 - float(np.sum((left - wave) ** 2)) / max(float(np.sum(left**2)), 1e-300)
-        lines.append(Line(peak[0], amplitude, peak[1], share * float(np.sum(left**2)) / max(variance, 1e-300)))
+        share = float(np.sum(left**2) - np.sum((left - wave) ** 2)) / max(variance, 1e-300)
+        if share < least:
+            break
+        lines.append(Line(peak[0], amplitude, peak[1], share))
         left = left - wave
         total += wave
     return tuple(lines), total
