@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
 # Tries what the pages promise on a fresh machine: makes a minimal Debian on the spot (mmdebstrap, chroot), with this
 # machine's package settings and nothing else, and runs there, each in a fresh clone of the last commit,
-#   - the two commands of README.md,
-#   - the recipe of docs/reference/packages.md.
-# both at once, each line with the name of its trial in front.
-# tools/try_minimal_debian.sh [FOLDER]     default: a temporary folder, removed at the end
+#   readme   the two commands of README.md; TESTS: what the second is given, for example python_tests/cli
+#   wheel    the recipe of docs/reference/packages.md
+# at once, each line with the name of its trial in front.
+# tools/try_minimal_debian.sh [readme|wheel]     default: both
 # Needs root. Exit status: 0 all succeeded.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tools/setup.sh
 
 suite=bookworm
-folder=${1:-$(mktemp -d)}
+folder=$(mktemp -d)
+trap 'rm -rf --one-file-system "$folder"' EXIT
 
 # Settings of apt and pip: mirrors, certificates, proxies. No package of this machine comes with them.
 package_settings() {
@@ -51,7 +52,7 @@ in_debian() {
 }
 
 # The first block of commands of a page.
-commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed 's/^    //'; }
+commands_of() { sed -n '/^    [^ ]/,/^$/p' "$1" | sed '/^$/q' | sed "s/^    //; s|^\./test|& ${TESTS:-}|"; }
 
 # Each page in a Debian of its own: what one installs, the other must not find.
 trial() {
@@ -66,14 +67,16 @@ trial() {
 
 if [ "$(id -u)" -ne 0 ]; then die "needs root: chroot and mounts"; fi
 if ! command -v mmdebstrap >/dev/null; then quietly "installing mmdebstrap" apt_install mmdebstrap; fi
-if [ -z "${1:-}" ]; then trap 'rm -rf --one-file-system "$folder"' EXIT; fi
 quietly "making a minimal Debian" make_debian "$folder/minimal"
-trial readme README.md 2>&1 | sed -u 's/^/readme: /' &
-readme=$!
-trial wheel docs/reference/packages.md 2>&1 | sed -u 's/^/wheel: /' &
-wheel=$!
+declare -A pages=([readme]=README.md [wheel]=docs/reference/packages.md) trials=()
+if [ $# -eq 0 ]; then set -- readme wheel; fi
+for name in "$@"; do
+  trial "$name" "${pages[$name]}" 2>&1 | sed -u "s/^/$name: /" &
+  trials[$name]=$!
+done
 # Not `trial ... || failed=1`: set -e is off in what stands before ||, and a failed step would be passed over.
 failed=0
-wait "$readme" || failed=1
-wait "$wheel" || failed=1
+for name in "${!trials[@]}"; do
+  wait "${trials[$name]}" || failed=1
+done
 exit "$failed"
