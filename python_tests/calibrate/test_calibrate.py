@@ -32,8 +32,6 @@ from tendonfmu.recordings.smoothing import Signals
 from tendonfmu.report.numbers import together
 from tendonfmu.tasks.steps import Steps
 
-pytestmark = pytest.mark.xdist_group("calibrate")  # one worker makes what they share
-
 Numbers = NDArray[np.float64]
 
 PUSH = 0.06  # N·m

@@ -26,8 +26,6 @@ from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 from tendonfmu.report.score_figures import contact_sheet, delay_sheet, event_sheet, roc_sheet
 
-pytestmark = pytest.mark.xdist_group("score")  # one worker makes what they share
-
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
 PUSHES, FREE_X4 = DEMO / "index_finger_pushes.parquet", DEMO / "index_finger_free_x4.parquet"

@@ -31,8 +31,6 @@ from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.residuals import BiasSettings, track
 
-pytestmark = pytest.mark.xdist_group("tune")  # one worker makes what they share
-
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
 FREE, FREE_X4 = DEMO / "index_finger_free.parquet", DEMO / "index_finger_free_x4.parquet"

@@ -25,12 +25,10 @@ from numpy.typing import NDArray
 from optional_parts import require
 from repository_paths import ROOT, TESTS
 
-pytestmark = pytest.mark.xdist_group("portable")  # one worker builds for all of them
-
 sys.path.insert(0, str(ROOT / "tools"))
 
-import binary_contents  # noqa: E402
-import portable_binaries as portable  # noqa: E402
+import binary_contents
+import portable_binaries as portable
 
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 RECORDING = TESTS / "reference" / "index_finger_in.csv"

@@ -18,8 +18,6 @@ from fit_finger import made_recording, moved_start, write_recording
 from optional_parts import needs, require
 from repository_paths import ROOT, TESTS
 
-pytestmark = pytest.mark.xdist_group("installed library")  # one worker builds for all of them
-
 FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 CONSUMER = TESTS / "model" / "consumer"  # programs of another project

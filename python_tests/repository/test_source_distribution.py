@@ -16,7 +16,7 @@ from optional_parts import require
 from repository_paths import ROOT
 
 # One worker packs for all of them.
-pytestmark = [pytest.mark.xdist_group("source_distribution"), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # What CMake reads, as shell patterns of git; `:!` leaves out. tools/setup.sh reads the same for its digest.
 NEEDED = (
