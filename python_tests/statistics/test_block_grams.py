@@ -161,7 +161,7 @@ def test_bounded_is_bounded_least_squares(seed: int) -> None:
     size = 1.0 / np.sqrt(np.sum(a**2, axis=0))
     low = np.where(rng.uniform(size=6) < 0.5, -np.inf, -rng.uniform(0, 1, 6) * size)
     high = np.where(rng.uniform(size=6) < 0.5, np.inf, rng.uniform(0, 1, 6) * size)
-    found = bounded(a.T @ a, a.T @ b, low, high)
+    found = bounded((a.T @ a)[None], (a.T @ b)[None], low, high)[0]
     assert np.all(found >= low - 1e-12 * size) and np.all(found <= high + 1e-12 * size)
     best = lsq_linear(a, b, (low, high), tol=1e-14)
     # numbers are set to their bounds one after another: near the best, not always it
@@ -171,9 +171,9 @@ def test_bounded_is_bounded_least_squares(seed: int) -> None:
 def test_bounded_without_bounds_solves() -> None:
     a = np.random.default_rng(3).standard_normal((40, 4))
     b = a @ [1.0, -2.0, 3.0, 0.0]
-    found = bounded(a.T @ a, a.T @ b, np.full(4, -np.inf), np.full(4, np.inf))
+    found = bounded((a.T @ a)[None], (a.T @ b)[None], np.full(4, -np.inf), np.full(4, np.inf))[0]
     assert found == pytest.approx([1, -2, 3, 0], abs=1e-6)
-    assert len(bounded(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros(0))) == 0
+    assert bounded(np.zeros((1, 0, 0)), np.zeros((1, 0)), np.zeros(0), np.zeros(0)).shape == (1, 0)
 
 
 def test_standard_error_of_a_sum() -> None:

@@ -78,7 +78,7 @@ def measure_remainder(
     for joint in range(joints):
         gain = learner.gains(everything)[:, joint]
         p_values.append(_p_value(gain))
-        if gain.sum() > CERTAIN * standard_error(gain):
+        if _is_certain(gain):
             prediction[folds.rows, joint] = everything[:, joint]
             law_alone[:, joint] = law[:, joint]
     large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
@@ -97,7 +97,7 @@ def measure_remainder(
 
 
 def _predicted(learner: Learner, seen: Features, states: tuple[Numbers, Numbers], seed: int) -> tuple[Numbers, Numbers]:
-    """Return what all that was recorded predicts on unseen stretches, and what a friction law's states do [R, n]."""
+    """Return what all that was recorded predicts on unseen stretches, and where it does, a law's states [R, n]."""
     groups = list(dict.fromkeys(seen.group.tolist()))
     sets = [np.flatnonzero(seen.group == group) for group in groups]
     of_law = [k for k, group in enumerate(groups) if group in LAW]
@@ -106,9 +106,16 @@ def _predicted(learner: Learner, seen: Features, states: tuple[Numbers, Numbers]
     best = [np.zeros_like(learner.target) for _ in mixtures]
     for joint in range(learner.target.shape[1]):
         for k in range(len(best)):
+            if k and not _is_certain(learner.gains(best[0])[:, joint]):
+                continue
             trees = learner.by_trees(states[k], joint, seed)
             best[k][:, joint] = _best(learner.target[:, joint], mixtures[k][:, joint], together[k][:, joint], trees)
     return best[0], best[1]
+
+
+def _is_certain(gain: Numbers) -> bool:
+    """Return whether gains by stretch [K] are more than chance."""
+    return float(gain.sum()) > CERTAIN * standard_error(gain)
 
 
 def _best(target: Numbers, *predictions: Numbers) -> Numbers:

@@ -25,7 +25,7 @@ PENALTIES = (1e-3, 1e-2, 1e-1)  # of the number of rows: a standardised column w
 FEWEST_FOLDS = 3  # weights are learned without two of them
 FLAT = 0.02  # of the mean power of the predictions: keeps weights of predictions that are alike from running apart
 MOST_ROWS = 1000  # that a tree sees: blocks of 10 ms are much alike
-TREES = {"learning_rate": 0.1, "max_iter": 60, "max_leaf_nodes": 8, "min_samples_leaf": 10, "l2_regularization": 1.0}
+TREES = {"learning_rate": 0.2, "max_iter": 30, "max_leaf_nodes": 8, "min_samples_leaf": 10, "l2_regularization": 1.0}
 
 
 class Learner:

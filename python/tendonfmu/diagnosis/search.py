@@ -2,7 +2,7 @@
 
 After each cause, everything is computed anew around the fitted description. The derivatives of a wrong model would
 otherwise ask for small pieces that only correct the linearisation. The search ends when no candidate is material and
-certain. Where stuck samples mislead it, it is made once more without them.
+certain. Where stuck samples mislead it, it is made without them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere, presliding_of_joints
-from tendonfmu.diagnosis.sliding import RUNS, settled, sliding_alone
+from tendonfmu.diagnosis.sliding import RUNS, Sliding, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import View
 from tendonfmu.model import Finger
@@ -180,6 +180,26 @@ class ExtensionSearch(CauseSearch):
             return False
         return self.chosen.least.shows_all(cause.effect, cause.terms, model.data)
 
+    def run_alone(self, alone: Sliding, step: Step) -> ExtensionSearch:
+        """Search only where everything slides."""
+        sliding = ExtensionSearch(alone.estimation, alone.measured, self._out, self._least_gain)
+        sliding.run(step)
+        return sliding
+
+    def fitted_with(self, causes: Sequence[Cause], recordings: Sequence[FitRecording] | None = None) -> FittedModel:
+        """Fit the nominal model with some causes to these recordings, or to those of this search."""
+        terms = [term for cause in causes for term in cause.terms]
+        return fit_extended(self.models[0], terms, recordings or self.fitted_to, self._settings)
+
+    def is_misled(self, alone: Sliding, sliding: ExtensionSearch, model: FittedModel) -> bool:
+        """Return whether a search without stuck samples leaves less there than a model of all, and no more elsewhere."""
+
+        def error(data: Data) -> float:
+            return self.online.square(self.chosen.online(data))
+
+        own = sliding.models[-1]
+        return alone.is_better(own, model) and error(settled(own.data, error)) < RUNS**2 * error(model.data)
+
     def _look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         return self.chosen.look(model.data, self._out, candidates)
 
@@ -259,9 +279,7 @@ def search(
     measured = [without_events(recording, events) for recording in recordings]
     with phases.start("causes", MOST_CAUSES) as step:
         whole = ExtensionSearch(chosen, measured, out, least_gain)
-        whole.run(step)
-        sliding = _without_stuck(given, measured, whole, out, least_gain, step)
-    best = sliding or whole
+        best = _searched(whole, sliding_alone(given, measured, chosen), step)
     models = [whole.models[0], *best.models[1:]]
     if events:
         # drop events that the causes explain
@@ -280,31 +298,25 @@ def search(
         out=out,
         fitted_to=best.fitted_to,
         everything=whole.fitted_to,
-        only_sliding=sliding is not None,
+        only_sliding=best is not whole,
     )
 
 
-def _without_stuck(
-    given: Finger,
-    measured: Sequence[FitRecording],
-    whole: ExtensionSearch,
-    out: Flags,
-    least_gain: float,
-    step: Step,
-) -> ExtensionSearch | None:
-    """Search without the samples in which something is stuck; return nothing if these do not mislead."""
-    alone = sliding_alone(given, measured, whole.chosen, whole.models[-1])
-    if alone is None:
-        return None
-    sliding = ExtensionSearch(alone.estimation, alone.measured, out, least_gain)
-    sliding.run(step)
-    model = sliding.models[-1].data
-
-    def error(data: Data) -> float:
-        return whole.online.square(whole.chosen.online(data))
-
-    is_better = alone.is_better(sliding.models[-1], whole.models[-1])
-    return sliding if is_better and error(settled(model, error)) < RUNS**2 * error(whole.models[-1].data) else None
+def _searched(whole: ExtensionSearch, alone: Sliding | None, step: Step) -> ExtensionSearch:
+    """Search in all samples, or only where everything slides if stuck samples mislead."""
+    start = whole.chosen.model
+    tried = alone is not None and alone.leaves_less(start) and alone.is_better(alone.estimation.model, start)
+    if alone is not None and tried:  # stuck samples mislead already before any cause
+        sliding = whole.run_alone(alone, step)
+        if whole.is_misled(alone, sliding, whole.fitted_with(sliding.causes)):
+            return sliding
+    whole.run(step)
+    model = whole.models[-1]
+    if alone is not None and not tried and alone.leaves_less(model):
+        if alone.is_better(whole.fitted_with(whole.causes, alone.recordings), model):
+            sliding = whole.run_alone(alone, step)
+            return sliding if whole.is_misled(alone, sliding, model) else whole
+    return whole
 
 
 def _without_blocks(given: Estimation, out: Flags) -> tuple[Estimation, list[FitRecording]]:

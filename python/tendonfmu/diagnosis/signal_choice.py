@@ -89,27 +89,28 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
     raw = Signals()
     part = part_of(given, recordings)
     if smoothing is None:
-        signals, start = raw, starting_point(given, part, raw, settings).start
+        best = starting_point(given, part, raw, settings)
     else:
         smooth = starting_point(given, part, smoothing, settings)
         rough = starting_point(given, part, raw, settings, smooth)
         lags = any(recording.kinematics != 3 for recording in recordings)
-        is_raw = rough.error < (BETTER if lags else 1.0) * smooth.error
-        signals, start = (raw, rough.start) if is_raw else (smoothing, smooth.start)
-    finger = replace(given, data=signals.description(given.data))
-    own = estimation_recordings(finger, recordings, signals)
-    nominal = fit_numbers(finger.data, own, settings)
-    model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
+        best = rough if rough.error < (BETTER if lags else 1.0) * smooth.error else smooth
+    own, nominal, model, start = best.recordings, best.nominal, best.model, best.start
+    if part is not recordings:
+        finger = replace(given, data=best.signals.description(given.data))
+        own = estimation_recordings(finger, recordings, best.signals)
+        nominal = fit_numbers(finger.data, own, settings)
+        model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
     least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
-    chosen = Estimation(signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
+    chosen = Estimation(best.signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
 
 
-def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecording]:
-    """Return the first seconds of each recording, ENOUGH in total."""
+def part_of(given: Finger, recordings: Sequence[FitRecording]) -> Sequence[FitRecording]:
+    """Return the first seconds of each recording, ENOUGH in total; the same list if they have no more."""
     share = ENOUGH / max(sum(recording.duration for recording in recordings), 1e-300)
     if share >= 1.0:
-        return list(recordings)
+        return recordings
     parts = []
     for recording in recordings:
         end = int(np.searchsorted(recording.time, recording.time[0] + share * (recording.time[-1] - recording.time[0])))
@@ -124,7 +125,7 @@ def part_of(given: Finger, recordings: Sequence[FitRecording]) -> list[FitRecord
         )
         own = prepare(given, part, recording.kinematics, Held())
         parts.append(replace(own, train=own.train & recording.train[:end]))
-    return parts or list(recordings)
+    return parts or recordings
 
 
 def _with_filter(chosen: Estimation, recordings: Sequence[FitRecording]) -> Estimation:
@@ -149,8 +150,10 @@ class Compared:
     """A starting point with certain signals; `error` is the rms on unseen stretches, N·m."""
 
     signals: Signals
+    recordings: list[FitRecording]  # with these
     start: Start
-    model: FittedModel  # fitted with it
+    nominal: FittedModel
+    model: FittedModel  # fitted with the start
     error: float
 
 
@@ -181,7 +184,7 @@ def starting_point(
         if is_spring(model.data, span):  # a spring is missing, and would not be found beside long presliding
             start = replace(start, presliding=())
             model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-        compared.append(Compared(signals, start, model, _error(model.data, own, grid, cutoff)))
+        compared.append(Compared(signals, own, start, nominal, model, _error(model.data, own, grid, cutoff)))
     return min(compared, key=lambda result: result.error)
 
 

@@ -10,7 +10,8 @@ which none of them has. Fitted to the samples that slide, friction was right wit
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,34 +54,39 @@ def without_stuck(given: Finger, recordings: Sequence[FitRecording], signals: Si
     return sliding
 
 
-@dataclass(frozen=True)
 class Sliding:
     """Recordings without stuck samples, as they were measured, and what is estimated from them."""
 
-    measured: list[FitRecording]
-    estimation: Estimation
+    def __init__(self, given: Finger, measured: list[FitRecording], chosen: Estimation) -> None:
+        """Prepare recordings of the samples in which everything slides."""
+        self.measured, self._given, self._all = measured, given, chosen
+        finger = replace(given, data=chosen.signals.description(given.data))
+        self.recordings = estimation_recordings(finger, measured, chosen.signals)
+
+    @cached_property
+    def estimation(self) -> Estimation:
+        chosen = self._all
+        best = starting_point(self._given, part_of(self._given, self.measured), chosen.signals, chosen.settings)
+        nominal = fit_numbers(chosen.nominal.data, self.recordings, chosen.settings, given=chosen.nominal.given)
+        return replace(chosen, recordings=self.recordings, nominal=nominal, start=best.start, model=best.model)
+
+    def leaves_less(self, model: FittedModel) -> bool:
+        """Return whether a model that was fitted to all samples leaves much less here than in the stuck ones."""
+        stuck = _squares(model.data, _without(self._all.recordings, self.recordings), self._all.grid)
+        return stuck > WORSE**2 * self._square(model)
 
     def is_better(self, alone: FittedModel, model: FittedModel) -> bool:
         """Return whether stuck samples mislead: a model fitted alone leaves much less here than one fitted to all."""
-        own, grid = self.estimation.recordings, self.estimation.grid
-        return _squares(alone.data, own, grid) < BETTER**2 * _squares(model.data, own, grid)
+        return self._square(alone) < BETTER**2 * self._square(model)
+
+    def _square(self, model: FittedModel) -> float:
+        return _squares(model.data, self.recordings, self._all.grid)
 
 
-def sliding_alone(
-    given: Finger, recordings: Sequence[FitRecording], chosen: Estimation, model: FittedModel
-) -> Sliding | None:
-    """Return recordings and estimation without stuck samples; None if these leave no larger error than the others."""
+def sliding_alone(given: Finger, recordings: Sequence[FitRecording], chosen: Estimation) -> Sliding | None:
+    """Return recordings without stuck samples; None if these are too few."""
     free = without_stuck(given, recordings, chosen.signals)
-    if not _enough(free):
-        return None
-    finger = replace(given, data=chosen.signals.description(given.data))
-    own = estimation_recordings(finger, free, chosen.signals)
-    stuck, sliding = (_squares(model.data, samples, chosen.grid) for samples in (_without(chosen.recordings, own), own))
-    if stuck <= WORSE**2 * sliding:
-        return None
-    best = starting_point(given, part_of(given, free), chosen.signals, chosen.settings)
-    nominal = fit_numbers(chosen.nominal.data, own, chosen.settings, given=chosen.nominal.given)
-    return Sliding(free, replace(chosen, recordings=own, nominal=nominal, start=best.start, model=best.model))
+    return Sliding(given, free, chosen) if _enough(free) else None
 
 
 def settled(data: Mapping[str, Any], error: Callable[[Mapping[str, Any]], float]) -> Mapping[str, Any]:

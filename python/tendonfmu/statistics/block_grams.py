@@ -214,7 +214,7 @@ class Grams:
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
         energy = part.T @ self._whole.energy[np.ix_(used, used)] @ part
-        return bounded(energy + _diagonal(ridge), part.T @ self._whole.score[used], low, high)
+        return bounded((energy + _diagonal(ridge))[None], (part.T @ self._whole.score[used])[None], low, high)[0]
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
@@ -229,7 +229,7 @@ class Grams:
             np.stack(scores) @ part
             for scores in ([fold.score[used] for fold in folds], [fold.own_score[used] for fold in folds])
         )
-        theta = bounded_each(energy + _diagonal(ridge), score, low, high)
+        theta = bounded(energy + _diagonal(ridge), score, low, high)
         gain = 2.0 * np.sum(theta * held_score, axis=1) - np.einsum("fd,fde,fe->f", theta, held_energy, theta)
         left = np.array([fold.own_square for fold in folds]) - gain
         return float(left[self._judged].sum()), theta
@@ -328,38 +328,32 @@ def _diagonal(ridge: Numbers | None) -> Numbers | float:
     return 0.0 if ridge is None else np.diag(ridge)
 
 
-def bounded_each(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
+def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
     """Return the least-squares solutions between bounds of several problems [f, d]."""
     # energy: [f, d, d]; score: [f, d]
-    length = np.sqrt(np.maximum(np.diagonal(energy, axis1=1, axis2=2), 1e-300))
-    scaled = energy / (length[:, :, None] * length[:, None, :]) + 1e-9 * np.eye(score.shape[1])
-    solutions = np.linalg.solve(scaled, (score / length)[:, :, None])[:, :, 0] / length
-    for k in np.flatnonzero(((solutions < low) | (solutions > high)).any(axis=1)):
-        solutions[k] = bounded(energy[k], score[k], low, high)
-    return np.asarray(solutions)
-
-
-def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Numbers:
-    """Return a least-squares solution [d] between bounds."""
-    count = len(score)
+    count = score.shape[1]
     if count == 1:
-        return np.clip(score / max(float(energy[0, 0]) * (1.0 + 1e-9), 1e-300), low, high)
-    length = np.sqrt(np.maximum(np.diagonal(energy), 1e-300))
-    scaled = energy / (length[:, None] * length)
-    right, low, high = score / length, low * length, high * length
-    fixed = np.full(count, np.nan)
-    for _ in range(count + 1):
+        return np.clip(score / np.maximum(energy[:, 0] * (1.0 + 1e-9), 1e-300), low, high)
+    length = np.sqrt(np.maximum(np.diagonal(energy, axis1=1, axis2=2), 1e-300))
+    scaled = energy / (length[:, :, None] * length[:, None, :])
+    right, least, most = score / length, low * length, high * length
+    solutions, fixed = np.zeros_like(score), np.full(score.shape, np.nan)
+    for _ in range(count + 1 if count else 0):
         free = np.isnan(fixed)
-        solution = np.where(free, 0.0, fixed)
-        if free.any():
-            inner = scaled[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
-            solution[free] = np.linalg.solve(inner, right[free] - scaled[np.ix_(free, ~free)] @ solution[~free])
-        beyond = np.where(free, np.maximum(low - solution, solution - high), -np.inf)
-        worst = int(np.argmax(beyond)) if count else 0
-        if not count or beyond[worst] <= 0.0:
+        at = np.where(free, 0.0, fixed)
+        # the rows and columns of fixed numbers become those of the identity
+        inner = np.where(free[:, :, None] & free[:, None, :], scaled, 0.0)
+        inner += np.where(free, 1e-9, 1.0)[:, :, None] * np.eye(count)
+        given = np.where(free, right - (scaled @ at[:, :, None])[:, :, 0], at)
+        solutions = np.linalg.solve(inner, given[:, :, None])[:, :, 0]
+        beyond = np.where(free, np.maximum(least - solutions, solutions - most), -np.inf)
+        worst = np.argmax(beyond, axis=1)
+        rows = np.flatnonzero(beyond[np.arange(len(worst)), worst] > 0.0)
+        if not len(rows):
             break
-        fixed[worst] = low[worst] if solution[worst] < low[worst] else high[worst]
-    return np.asarray(solution / length) if count else np.zeros(0)
+        own = worst[rows]
+        fixed[rows, own] = np.where(solutions[rows, own] < least[rows, own], least[rows, own], most[rows, own])
+    return np.asarray(solutions / length)
 
 
 def _solved(matrix: Numbers, right: Numbers) -> Numbers:
