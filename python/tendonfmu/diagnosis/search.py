@@ -186,13 +186,18 @@ class ExtensionSearch(CauseSearch):
         sliding.run(step)
         return sliding
 
-    def fitted_with(self, causes: Sequence[Cause], recordings: Sequence[FitRecording] | None = None) -> FittedModel:
+    def fitted_with(self, causes: Sequence[Cause], recordings: Sequence[FitRecording] = ()) -> FittedModel:
         """Fit the nominal model with some causes to these recordings, or to those of this search."""
         terms = [term for cause in causes for term in cause.terms]
         return fit_extended(self.models[0], terms, recordings or self.fitted_to, self._settings)
 
+    def is_better_alone(self, alone: Sliding) -> bool:
+        """Return whether the causes leave much less where everything slides if they are fitted to that alone."""
+        model = self.models[-1]
+        return alone.leaves_less(model) and alone.is_better(self.fitted_with(self.causes, alone.recordings), model)
+
     def is_misled(self, alone: Sliding, sliding: ExtensionSearch, model: FittedModel) -> bool:
-        """Return whether a search without stuck samples leaves less there than a model of all, and no more elsewhere."""
+        """Return whether a search in sliding samples leaves much less there than a model of all, but no more of all."""
 
         def error(data: Data) -> float:
             return self.online.square(self.chosen.online(data))
@@ -304,18 +309,18 @@ def search(
 
 def _searched(whole: ExtensionSearch, alone: Sliding | None, step: Step) -> ExtensionSearch:
     """Search in all samples, or only where everything slides if stuck samples mislead."""
-    start = whole.chosen.model
-    tried = alone is not None and alone.leaves_less(start) and alone.is_better(alone.estimation.model, start)
-    if alone is not None and tried:  # stuck samples mislead already before any cause
-        sliding = whole.run_alone(alone, step)
-        if whole.is_misled(alone, sliding, whole.fitted_with(sliding.causes)):
-            return sliding
-    whole.run(step)
-    model = whole.models[-1]
-    if alone is not None and not tried and alone.leaves_less(model):
-        if alone.is_better(whole.fitted_with(whole.causes, alone.recordings), model):
-            sliding = whole.run_alone(alone, step)
-            return sliding if whole.is_misled(alone, sliding, model) else whole
+    model = whole.chosen.model
+    early = alone is not None and alone.leaves_less(model) and alone.is_better(alone.estimation.model, model)
+    if not early:
+        whole.run(step)
+        model = whole.models[-1]
+    if alone is None or not (early or whole.is_better_alone(alone)):
+        return whole
+    sliding = whole.run_alone(alone, step)
+    if whole.is_misled(alone, sliding, whole.fitted_with(sliding.causes) if early else model):
+        return sliding
+    if early:
+        whole.run(step)
     return whole
 
 

@@ -214,7 +214,8 @@ class Grams:
         used = np.flatnonzero(mix.any(axis=1))
         part = mix[used]
         energy = part.T @ self._whole.energy[np.ix_(used, used)] @ part
-        return bounded((energy + _diagonal(ridge))[None], (part.T @ self._whole.score[used])[None], low, high)[0]
+        score = part.T @ self._whole.score[used]
+        return np.asarray(bounded((energy + _diagonal(ridge))[None], score[None], low, high)[0])
 
     def error(self, mix: Numbers, low: Numbers, high: Numbers, ridge: Numbers | None = None) -> tuple[float, Numbers]:
         """Return the held-out error with a combination of candidates."""
@@ -333,7 +334,7 @@ def bounded(energy: Numbers, score: Numbers, low: Numbers, high: Numbers) -> Num
     # energy: [f, d, d]; score: [f, d]
     count = score.shape[1]
     if count == 1:
-        return np.clip(score / np.maximum(energy[:, 0] * (1.0 + 1e-9), 1e-300), low, high)
+        return np.asarray(np.clip(score / np.maximum(energy[:, 0] * (1.0 + 1e-9), 1e-300), low, high))
     length = np.sqrt(np.maximum(np.diagonal(energy, axis1=1, axis2=2), 1e-300))
     scaled = energy / (length[:, :, None] * length[:, None, :])
     right, least, most = score / length, low * length, high * length
