@@ -12,7 +12,7 @@ from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Term
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
-from tendonfmu.diagnosis.search import Search
+from tendonfmu.diagnosis.search import Search, terms_of
 from tendonfmu.diagnosis.selection import by_gain, confirmed, names_with
 from tendonfmu.diagnosis.signal_choice import estimation_recordings
 from tendonfmu.diagnosis.sliding import settled, without_stuck
@@ -203,7 +203,7 @@ class _Bench:
         return self.holds(self.result(causes))
 
     def _fit(self, causes: Sequence[Cause], sliding: bool) -> FittedModel:
-        terms = [term for cause in causes for term in cause.terms]
+        terms = terms_of(causes)
         key = frozenset(map(id, terms)), sliding
         if key not in self._fits:
             fit_to = self._fit_to if sliding else self._everything

@@ -31,7 +31,7 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere, presliding_of_joints
-from tendonfmu.diagnosis.sliding import RUNS, Sliding, settled, sliding_alone
+from tendonfmu.diagnosis.sliding import MUCH_WORSE, RUNS, WORSE, Sliding, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import View
 from tendonfmu.model import Finger
@@ -138,7 +138,7 @@ class ExtensionSearch(CauseSearch):
 
     def _tried(self, cause: Cause, fitted: Data | None = None) -> Trial:
         """Fit the description with a further cause; `fitted` is one that was fitted with it."""
-        everything = [term for known in [*self.causes, cause] for term in known.terms]
+        everything = terms_of([*self.causes, cause])
         terms = possible(self.models[0].data, everything)
         if len(terms) < len(everything):
             return Trial(cause, None, np.array([np.inf]))
@@ -186,15 +186,14 @@ class ExtensionSearch(CauseSearch):
         sliding.run(step)
         return sliding
 
-    def fitted_with(self, causes: Sequence[Cause], recordings: Sequence[FitRecording] = ()) -> FittedModel:
-        """Fit the nominal model with some causes to these recordings, or to those of this search."""
-        terms = [term for cause in causes for term in cause.terms]
+    def fitted_with(self, terms: Sequence[Term], recordings: Sequence[FitRecording] = ()) -> FittedModel:
+        """Fit the nominal model with some terms to these recordings, or to those of this search."""
         return fit_extended(self.models[0], terms, recordings or self.fitted_to, self._settings)
 
-    def is_better_alone(self, alone: Sliding) -> bool:
-        """Return whether the causes leave much less where everything slides if they are fitted to that alone."""
-        model = self.models[-1]
-        return alone.leaves_less(model) and alone.is_better(self.fitted_with(self.causes, alone.recordings), model)
+    def is_better_alone(self, alone: Sliding, model: FittedModel, terms: Sequence[Term]) -> bool:
+        """Return whether a model's terms leave much less where everything slides if they are fitted to that alone."""
+        worse = alone.worse_where_stuck(model) > WORSE
+        return worse and alone.is_better(self.fitted_with(terms, alone.recordings), model)
 
     def is_misled(self, alone: Sliding, sliding: ExtensionSearch, model: FittedModel) -> bool:
         """Return whether a search in sliding samples leaves much less there than a model of all, but no more of all."""
@@ -238,6 +237,11 @@ def _to_fit(best: Cause) -> list[Cause]:
 def _effects(best: Cause) -> set[str]:
     """Return the effect of a cause and those that may replace it."""
     return {best.effect, *(rival.effect for rival in _to_fit(best))}
+
+
+def terms_of(causes: Sequence[Cause]) -> list[Term]:
+    """Return the terms of all causes."""
+    return [term for cause in causes for term in cause.terms]
 
 
 def _of_start(terms: tuple[Term, ...]) -> Cause:
@@ -310,14 +314,15 @@ def search(
 def _searched(whole: ExtensionSearch, alone: Sliding | None, step: Step) -> ExtensionSearch:
     """Search in all samples, or only where everything slides if stuck samples mislead."""
     model = whole.chosen.model
-    early = alone is not None and alone.leaves_less(model) and alone.is_better(alone.estimation.model, model)
+    early = alone is not None and whole.is_better_alone(alone, model, whole.chosen.start.terms)
     if not early:
         whole.run(step)
         model = whole.models[-1]
-    if alone is None or not (early or whole.is_better_alone(alone)):
+    asked = alone is not None and (early or alone.worse_where_stuck(model) > MUCH_WORSE)
+    if alone is None or not (asked or whole.is_better_alone(alone, model, terms_of(whole.causes))):
         return whole
     sliding = whole.run_alone(alone, step)
-    if whole.is_misled(alone, sliding, whole.fitted_with(sliding.causes) if early else model):
+    if whole.is_misled(alone, sliding, whole.fitted_with(terms_of(sliding.causes)) if early else model):
         return sliding
     if early:
         whole.run(step)

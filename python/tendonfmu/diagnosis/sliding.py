@@ -26,6 +26,7 @@ from tendonfmu.recordings import FitRecording, Signals
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 
 WORSE = 1.4  # times the error of the samples that slide: a smaller error of stuck ones does not mislead
+MUCH_WORSE = 3.0  # times that error: stuck samples may have led to causes that explain neither
 TIMES = tuple(
     0.001 * 2.0**k for k in range(9)
 )  # s, of presliding; a place moves for some 10 to 100 ms around a reversal
@@ -70,10 +71,10 @@ class Sliding:
         nominal = fit_numbers(chosen.nominal.data, self.recordings, chosen.settings, given=chosen.nominal.given)
         return replace(chosen, recordings=self.recordings, nominal=nominal, start=best.start, model=best.model)
 
-    def leaves_less(self, model: FittedModel) -> bool:
-        """Return whether a model that was fitted to all samples leaves much less here than in the stuck ones."""
+    def worse_where_stuck(self, model: FittedModel) -> float:
+        """Return how many times its error here a model that was fitted to all samples leaves in the stuck ones."""
         stuck = _squares(model.data, _without(self._all.recordings, self.recordings), self._all.grid)
-        return stuck > WORSE**2 * self._square(model)
+        return float(np.sqrt(stuck / max(self._square(model), 1e-300)))
 
     def is_better(self, alone: FittedModel, model: FittedModel) -> bool:
         """Return whether stuck samples mislead: a model fitted alone leaves much less here than one fitted to all."""
