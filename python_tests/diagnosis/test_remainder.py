@@ -87,16 +87,19 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
 
 
 def test_a_strong_line_in_smooth_signals_is_found() -> None:
-    """A filter that whitens smooth signals predicts a sine, too, and leaves nothing of it."""
+    """A filter that whitens smooth signals leaves nothing of a strong sine, but shows a weak one where no noise is."""
     series = make_series(5)
     rng = np.random.default_rng(5)
     noise = sosfiltfilt(
         butter(4, 6.0, fs=1.0 / series.step, output="sos"), rng.standard_normal((len(series.time), 2)), 0
     )
     residual = 1e-3 * noise / noise.std(axis=0)
-    residual[:, 0] += 3e-3 * np.sin(2.0 * np.pi * 1.5 * series.time)
+    for amplitude, frequency in ((3e-3, 1.5), (2e-5, 20.0)):
+        residual[:, 0] += amplitude * np.sin(2.0 * np.pi * frequency * series.time)
     found = measure_remainder(series, residual, bias_splines(series)).findings
-    assert [(finding.joint, finding.group) for finding in found] == [(1, "line")]
+    assert {(finding.joint, finding.group) for finding in found} == {(1, "line")}
+    assert found[0].line is not None
+    assert found[0].line.frequency == pytest.approx(1.5, abs=0.02)
 
 
 def test_the_map_is_over_what_is_followed() -> None:

@@ -154,10 +154,11 @@ def _lines(series: Series, residual: Numbers, prediction: Numbers, findings: lis
     for joint in range(joints):
         own = Whitener(filters.coefficients[:, joint : joint + 1], filters.scale[joint : joint + 1], filters.valid)
         left = residual[:, joint] - prediction[:, joint]
-        lines, wave = find_lines(series, left, own, level=LEVEL / joints)
-        if not lines:  # a filter that was fitted to smooth signals removes a strong line itself
-            lines, wave = find_lines(series, left, None, level=LEVEL / joints, least=STRONG)
-        prediction[:, joint] += wave
+        weak, wave = find_lines(series, left, own, level=LEVEL / joints)
+        # a filter that was fitted to smooth signals removes a strong line itself
+        strong, rest = find_lines(series, left - wave, None, level=LEVEL / joints, least=STRONG)
+        lines = sorted((*weak, *strong), key=lambda line: -line.share)
+        prediction[:, joint] += wave + rest
         findings += [Finding(joint + 1, "line", "", line) for line in lines]
         p_values += [min(1.0, joints * line.p_value) for line in lines]
     return p_values
