@@ -9,7 +9,7 @@ from typing import Any
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Term
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
 from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
 from tendonfmu.diagnosis.search import Search, terms_of
@@ -21,7 +21,8 @@ from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval, gain_interval
 
-# Times the least gain where everything slides: what is left there is small, and the form of any law is a part of it.
+# Times the least gain where the form of any friction law is a part of what is left: where everything slides, and for
+# effects that depend on what a law depends on, if how friction builds up was found, too.
 STRICTER = 5.0
 
 
@@ -50,18 +51,17 @@ def verify(
 ) -> Verified:
     """Measure the gain of each cause on unseen data and drop the weak ones."""
     bench = _Bench(given, result, training, tests, settings, seed)
-    least_gain *= STRICTER if result.only_sliding else 1.0
 
     def judge(causes: list[Cause]) -> tuple[list[Cause], list[int]]:
         fit, without = bench.fit(causes), bench.each_without(causes)
         gains = bench.gains(fit, without)
-        names = _names(causes, gains)
+        needed = _needed(causes, gains, result.only_sliding)
         weak = [
             k
             for k, (cause, gain) in enumerate(zip(causes, gains, strict=True))
             if not (
                 gain.low > 0.0
-                and gain.value >= least_gain * names[k]
+                and gain.value >= least_gain * needed[k]
                 and bench.runs_better(fit, without[k])
                 and result.estimation.least.shows_all(cause.effect, cause.terms, fit.data)
             )
@@ -87,13 +87,21 @@ def verify(
     )
 
 
-def _names(causes: Sequence[Cause], gains: Sequence[Interval]) -> list[int]:
-    """Return, for each cause, the number of names up to and including it, the largest gain first."""
-    counts, named = [1] * len(causes), list[str]()
+def _needed(causes: Sequence[Cause], gains: Sequence[Interval], only_sliding: bool) -> list[float]:
+    """Return how many times the least gain each cause needs.
+
+    That is the number of names up to and including it, the largest gain first, or more beside the form of a law.
+    """
+    needed, named = [1.0] * len(causes), list[str]()
+    builds_up = any(cause.effect == "presliding" for cause in causes)
     for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
-        counts[k] = names_with(causes[k].effect, named)
-        named.append(causes[k].effect)
-    return counts
+        effect = causes[k].effect
+        factor = STRICTER if only_sliding else 1.0
+        needed[k] = factor * names_with(effect, named)
+        if builds_up and effect in OF_LAW:
+            needed[k] = max(needed[k], STRICTER)
+        named.append(effect)
+    return needed
 
 
 def merged(causes: Sequence[Cause]) -> list[Cause]:

@@ -1,7 +1,7 @@
 """What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
 
 Play and the distance of presliding must be several times the noise of the positions. A delay must be more than half a
-sample, and more than the lag that filtering leaves.
+sample; forces that are early must be so by more than velocities lag that are computed from positions.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class LeastSizes:
     joint_noise: Numbers  # standard deviation of the noise of the joint positions, rad [n]
     tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
     step: float  # time between samples, s
-    lag: float  # lag of the filters, s
+    lag: float  # of velocities, s
 
     def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
         if effect == "time_delay":
-            return OF_SAMPLE * self.step + self.lag
+            return OF_SAMPLE * self.step
         if effect in ("backlash", "presliding"):
             if joint is not None:
                 return OF_NOISE * float(self.joint_noise[joint - 1])
@@ -52,7 +52,10 @@ class LeastSizes:
     def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
         """Return whether a fitted play or delay, a row of `extensions`, is large enough."""
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
-        return row is None or number is None or abs(row[number]) >= self.least(effect, place.joint, place.tendon)
+        if row is None or number is None:
+            return True
+        early = self.lag if effect == "time_delay" and row[number] < 0.0 else 0.0
+        return bool(abs(row[number]) >= self.least(effect, place.joint, place.tendon) + early)
 
     def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""

@@ -31,7 +31,7 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.signal_choice import Estimation, presliding_everywhere, presliding_of_joints
-from tendonfmu.diagnosis.sliding import MUCH_WORSE, RUNS, WORSE, Sliding, settled, sliding_alone
+from tendonfmu.diagnosis.sliding import RUNS, WORSE, Sliding, settled, sliding_alone
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import View
 from tendonfmu.model import Finger
@@ -313,14 +313,16 @@ def search(
 
 def _searched(whole: ExtensionSearch, alone: Sliding | None, step: Step) -> ExtensionSearch:
     """Search in all samples, or only where everything slides if stuck samples mislead."""
+    if alone is None:
+        whole.run(step)
+        return whole
     model = whole.chosen.model
-    early = alone is not None and whole.is_better_alone(alone, model, whole.chosen.start.terms)
+    early = whole.is_better_alone(alone, model, whole.chosen.start.terms)
     if not early:
         whole.run(step)
         model = whole.models[-1]
-    asked = alone is not None and (early or alone.worse_where_stuck(model) > MUCH_WORSE)
-    if alone is None or not (asked or whole.is_better_alone(alone, model, terms_of(whole.causes))):
-        return whole
+        if alone.worse_where_stuck(model) <= WORSE:
+            return whole
     sliding = whole.run_alone(alone, step)
     if whole.is_misled(alone, sliding, whole.fitted_with(terms_of(sliding.causes)) if early else model):
         return sliding

@@ -28,7 +28,7 @@ from tendonfmu.diagnosis.selection import CERTAIN, rms_gain
 from tendonfmu.diagnosis.series import Grid, Series, make_grid, sample_blocks
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import View, bias_of, look, nominal_scale, predicted_of, series_of
-from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
 from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
 from tendonfmu.statistics import Grams, Products, make_folds
@@ -101,7 +101,8 @@ def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSetti
         own = estimation_recordings(finger, recordings, best.signals)
         nominal = fit_numbers(finger.data, own, settings)
         model = fit_extended(nominal, start.terms, own, settings) if start.causes else nominal
-    least = least_sizes(given.data, recordings, float(np.median(np.diff(own[0].time))))
+    step = float(np.median(np.diff(own[0].time)))
+    least = least_sizes(given.data, recordings, step, lag_of(given.data, best.signals, own[0].kinematics, step))
     chosen = Estimation(best.signals, own, make_grid(own), least, nominal, start, model, settings, given.data)
     return _with_filter(chosen, recordings)
 
@@ -200,7 +201,17 @@ def estimation_recordings(finger: Finger, recordings: Sequence[FitRecording], si
     return listed
 
 
-def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
+def lag_of(data: Mapping[str, Any], signals: Signals, kinematics: int, step: float) -> float:
+    """Return by how much velocities lag behind the positions that they are computed from, s."""
+    if kinematics == 3:
+        return 0.0
+    cutoff = 0.0 if signals.cutoff else number_of(data, "velocity_filter_cutoff")
+    return step / 2 + (1.0 / (2.0 * np.pi * cutoff) if cutoff else 0.0)
+
+
+def least_sizes(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float, lag: float = 0.0
+) -> LeastSizes:
     """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
     joints: list[Numbers] = []
     tendons: list[Numbers] = []
@@ -217,7 +228,7 @@ def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], ste
             rate = 1.0 / float(np.median(np.diff(recording.time[part])))
             for values, noise in ((angle[part], joints), (reached[part], tendons)):
                 noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
-    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, 0.0)
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, lag)
 
 
 def _error(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, cutoff: float | None) -> float:

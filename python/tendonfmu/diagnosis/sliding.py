@@ -25,8 +25,7 @@ from tendonfmu.model import Finger, effects, sliding_velocity, velocity_threshol
 from tendonfmu.recordings import FitRecording, Signals
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 
-WORSE = 1.4  # times the error of the samples that slide: a smaller error of stuck ones does not mislead
-MUCH_WORSE = 3.0  # times that error: stuck samples may have led to causes that explain neither
+WORSE = 1.8  # times the error of the samples that slide: a smaller error of stuck ones does not mislead
 TIMES = tuple(
     0.001 * 2.0**k for k in range(9)
 )  # s, of presliding; a place moves for some 10 to 100 ms around a reversal

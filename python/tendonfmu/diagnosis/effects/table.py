@@ -386,6 +386,13 @@ CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")
 SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
 SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
 RUBBING = ("stribeck", *(candidate.name for candidate in CANDIDATES if "friction" in candidate.name))
+# what depends on speed, load, acceleration or travel, as every friction law does
+OF_LAW = (
+    "time_delay",
+    "inertia",
+    "backlash",
+    *(each for each in RUBBING if each not in ("edge_friction", "friction_drift")),
+)
 COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)
 BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
 
