@@ -79,6 +79,23 @@ def test_a_delay_of_a_hundredth_of_a_sample_is_not_shown(delay: float, shown: bo
     assert LeastSizes(np.zeros(2), np.zeros(4), 0.002, 0.0).shows_all("time_delay", [term], data) is shown
 
 
+@pytest.mark.parametrize(
+    ("effects", "sliding", "needed"),
+    [
+        (("presliding", "stribeck", "load_friction"), False, [1.0, 5.0, 5.0]),  # a law of another form has these, too
+        (("presliding", "edge_friction", "friction_drift"), False, [1.0, 1.0, 2.0]),  # no law depends on angle or time
+        (("gravity", "stribeck", "inertia"), False, [1.0, 2.0, 3.0]),
+        (("presliding", "gravity", "stribeck"), True, [5.0, 5.0, 10.0]),
+    ],
+)
+def test_an_effect_that_a_law_may_have_needs_more_beside_presliding(
+    effects: tuple[str, ...], sliding: bool, needed: list[float]
+) -> None:
+    causes = [Cause(Where(effect, None, None), "", "") for effect in effects]
+    gains = [Interval(0.9 - 0.1 * k, 0.0, 1.0) for k in range(len(causes))]
+    assert cause_gains._needed(causes, gains, sliding) == needed
+
+
 # --- experiments are planned for laws of the nominal description ------------------------------------------------------
 
 

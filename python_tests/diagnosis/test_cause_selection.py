@@ -311,7 +311,7 @@ SENSORS = LeastSizes(np.array([1e-4, 2e-4]), np.array([1e-6, 2e-6, 3e-6, 4e-6]),
 
 
 def test_least_sizes_are_those_of_the_sensors() -> None:
-    delay = OF_SAMPLE * 0.004 + 0.001
+    delay = OF_SAMPLE * 0.004
     assert SENSORS.least("time_delay", None, None) == pytest.approx(delay)
     assert SENSORS.least("backlash", 2, None) == pytest.approx(OF_NOISE * 2e-4)
     assert SENSORS.least("presliding", None, 3) == pytest.approx(OF_NOISE * 3e-6)
@@ -319,7 +319,9 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     shows = SENSORS.shows
     assert not shows("backlash", Place(2), {"width": 3.9 * 2e-4})
     assert shows("backlash", Place(2), {"width": -4.1 * 2e-4})
-    assert not shows("time_delay", Place(), {"delay": -0.9 * delay}) and shows("time_delay", Place(), {"delay": delay})
+    assert not shows("time_delay", Place(), {"delay": 0.9 * delay}) and shows("time_delay", Place(), {"delay": delay})
+    early = -delay - 0.001  # velocities lag by 1 ms
+    assert not shows("time_delay", Place(), {"delay": 0.9 * early}) and shows("time_delay", Place(), {"delay": early})
     assert shows("gravity", Place(1), {"sine": 1e-9}) and shows("backlash", Place(2), None)
 
 
@@ -331,8 +333,8 @@ def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:
         Made("gravity", 1),
     ]
     found = {each.effect: each for each in hypotheses_of(candidate_columns(columns[:, :, :4], made))}
-    # before the fit half of the least size will do: 4 times 0.1 mrad of noise; three quarters of 4 ms, and 1 ms of lag
-    for effect, step, least in (("backlash", 2e-4, 4e-4), ("time_delay", 0.01, 0.004)):
+    # before the fit half of the least size will do: 4 times 0.1 mrad of noise; three quarters of 4 ms
+    for effect, step, least in (("backlash", 2e-4, 4e-4), ("time_delay", 0.01, 0.003)):
         for times, resolved in ((0.95, False), (1.05, True)):
             magnitude = times * BEFORE_FIT * least / step
             assert SENSORS.resolved(found[effect], [magnitude]) == resolved
