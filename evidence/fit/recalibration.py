@@ -54,14 +54,14 @@ class Way:
 
 
 def ways(changes: Sequence[float]) -> list[Way]:
-    """Without effective samples (as it was), and from a previous fit with each of these allowances for change."""
+    """From a guess, and from a previous fit with each of these allowances for change."""
     plain = {"effective_samples": False}
     without = [
-        Way("each sample counts, prior 1", plain, plain),
-        Way("each sample counts, prior 0.1", plain | {"prior": 0.1}, plain),
+        Way("guessed, each sample counts", plain, plain),
+        *(Way(f"guessed, prior {prior:g}", {"start_values": "guessed", "prior": prior}, {}) for prior in (1.0, 0.1)),
     ]
     previous = [
-        Way(f"from the {source}, change {change:g}", {"change": change}, {"effective_samples": True}, source)
+        Way(f"from the {source}, change {change:g}", {"change": change}, {}, source)
         for source in ("report", "description")
         for change in changes
     ]
@@ -143,7 +143,7 @@ def sample_counts() -> list[list[str]]:
         chosen = {"even loads together": EVEN} | {f"run {name} alone": (name,) for name in ("00", "05", "09")}
         lines = []
         for name, names in chosen.items():
-            fit = fitted(STRUCTURE, [runs[run] for run in names], {"effective_samples": True})
+            fit = fitted(STRUCTURE, [runs[run] for run in names], {})
             counts = json.loads(report_text(fit.report_))["innovations"]["effective"]
             lines.append([name, f"{sum(counts['samples']):.0f}", f"{sum(counts['worth']):.0f}"])
         return lines

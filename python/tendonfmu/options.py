@@ -347,10 +347,20 @@ class FitOptions(Options):
     )
     # docs/evidence/recalibration.md shows the effect of larger and smaller values
     change: float = option(
-        0.02, Number(1e-6, 10.0), "with --from: expected relative change of the numbers since", metavar="SHARE"
+        0.02, Number(1e-6, 10.0), "of estimated numbers: expected relative change since", metavar="SHARE"
     )
-    effective_samples: bool | None = option(
-        None, _YES_OR_NONE, "count correlated residuals as fewer samples [default: with --from]"
+    start_values: str = option(
+        "auto",
+        Choice(("auto", "guessed", "estimated")),
+        "whether the given numbers were estimated before, and are the prior",
+        metavar="auto|guessed|estimated",
+        names=("--start",),
+    )
+    effective_samples: bool = option(
+        True,
+        _YES,
+        "count correlated residuals as fewer samples",
+        names=("--effective-samples/--no-effective-samples",),
     )
     passes: int | None = option(
         None, Number(1, whole=True, optional=True), "most passes over the data [default: 60; ekf: 2]", metavar="N"

@@ -168,9 +168,13 @@ def read_previous_fit(path: Path) -> PreviousFit:
     content = read_json(path, "a previous fit: its report, or the description that it wrote")
     if isinstance(content, dict) and content.get("format") == FIT_REPORT:
         return _of_report(path, content)
-    finger = read_finger(path)
+    return estimated_numbers(read_finger(path))
+
+
+def estimated_numbers(finger: Finger) -> PreviousFit:
+    """Return the numbers of a description that a fit wrote."""
     values = {number.path: number.value for number in estimable_numbers(finger.data)}
-    return PreviousFit(path, values, (), np.zeros((0, 0)), 1.0)
+    return PreviousFit(finger.path, values, (), np.zeros((0, 0)), 1.0)
 
 
 def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:

@@ -12,10 +12,13 @@ from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.files import FIT_REPORT
 from tendonfmu.estimate.methods import Learned, unknown_names
 from tendonfmu.estimate.verdicts import Fitted
-from tendonfmu.files import finite
+from tendonfmu.files import counted, finite
 from tendonfmu.model import Finger, native
 from tendonfmu.recordings import consistency, whiteness
 from tendonfmu.statistics import effective_samples
+
+LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
+_MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
 
 
 def build_report(
@@ -26,6 +29,7 @@ def build_report(
     options: Mapping[str, Any],  # options that shape the result, and `method`
     warnings: Sequence[str],
     numbers: Sequence[Fitted],
+    movement: Mapping[str, Any],  # what became of the given numbers
     innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
     training: Sequence[Evaluation],
     comparisons: Sequence[Evaluation],
@@ -52,6 +56,7 @@ def build_report(
             "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
             "matrix": _correlation(learned.covariance),
         },
+        "given_numbers": dict(movement),
         "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
         "residual": {
             "train": residual_entry(training, "train"),
@@ -99,3 +104,39 @@ def _correlation(covariance: Numbers) -> list[list[float]]:
     error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     matrix = covariance / np.outer(error, error)
     return [[float(f"{value:.4g}") for value in row] for row in matrix.tolist()]
+
+
+# --- in words --------------------------------------------------------------------------------------------------------
+
+
+def fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
+    """Return the warnings of the estimation, and the numbers that ended at a bound."""
+    more = "" if learned.converged else _MORE_PASSES
+    sentences = [f"{sentence}{more}" for sentence in learned.warnings]
+    at_bound = [number for number in numbers if number.at_bound]
+    if at_bound:
+        some = ", ".join(number.number.path for number in at_bound[:3])
+        more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
+        sentences.append(f"{counted(len(at_bound), 'number')} ended at a bound: {some}{more}")
+    return sentences
+
+
+def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
+    """Warn if the residuals contradict the noise settings, since the standard errors depend on these."""
+    nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
+    sentences = []
+    times = "-" if nis is None else f"{nis:.2g}" if nis < 100 else f"{nis:.0f}"
+    if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
+        sentences.append(
+            f"the residuals' variance is {times} times that of bias.noise_std, noise_std_per_force, noise_time and "
+            "drift_variance: standard errors are those of these settings, not of the data"
+        )
+    far = max((abs(value) for value in lag_one if value is not None), default=0.0)
+    if far > MOST_LAG_ONE:
+        samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
+        count = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
+        sentences.append(
+            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
+            f"effect, or the noise is correlated; {count}, treat the standard errors with caution"
+        )
+    return sentences

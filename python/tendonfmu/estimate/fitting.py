@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -20,11 +20,13 @@ from tendonfmu.estimate.files import (
     PreviousFit,
     Unfinished,
     check_given_once,
+    estimated_numbers,
     read_previous_fit,
     resumed_start,
     with_previous_values,
 )
-from tendonfmu.estimate.fit_report import build_report
+from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
+from tendonfmu.estimate.given_numbers import is_worse, movement, one_load, were_estimated
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.methods import (
     FrictionFitOptions,
@@ -40,7 +42,6 @@ from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers
-from tendonfmu.files import counted
 from tendonfmu.model import FingerSource, description_text, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
@@ -63,8 +64,6 @@ METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default
 SIDES = {"given": None, "symmetric": False, "asymmetric": True}  # as reports say it -> `asymmetric`
 # names in reports, and of earlier versions -> options
 EARLIER = {"max_passes": "passes", "parameter_drift": "drift", "start": "resume"}
-LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
-_MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
 
 
 class FitWarning(UserWarning):
@@ -157,6 +156,8 @@ class FrictionFit(Configured):
         previous = None if options.previous is None else read_previous_fit(Path(options.previous))
         if previous is not None:
             finger = with_previous_values(finger, previous)
+        elif were_estimated(finger, options.start_values):
+            previous = estimated_numbers(finger)
         choice = Choice(_sides(options), options.only, options.fix, options.share, options.scale)
         self.structure_ = build_structure(finger, choice)
         self.start_ = self.structure_.start
@@ -176,7 +177,7 @@ class FrictionFit(Configured):
             return self
         # an interruption while the result is judged must not lose the estimate
         self.unfinished_ = self._unfinished(Interrupted(learned.estimator, learned.z, learned.cost, by_user=True))
-        self._conclude(learned, compared, remarks)
+        self._conclude(learned, compared, remarks, previous is not None)
         self.unfinished_ = None
         for sentence in self.warnings_:
             warnings.warn(sentence, FitWarning, stacklevel=3)  # at the call of tendonfmu.fit
@@ -204,7 +205,7 @@ class FrictionFit(Configured):
         settings = Settings(
             options,
             passes=options.passes or passes,
-            effective=previous is not None if options.effective_samples is None else options.effective_samples,
+            effective=options.effective_samples,
             previous=previous,
             noise=bias_settings(self.start_.data).noise,
         )
@@ -231,20 +232,27 @@ class FrictionFit(Configured):
             description=fitted.data,
         )
 
-    def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str]) -> None:
-        self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
+    def _evaluated(self, learned: Learned) -> list[Evaluation]:
         self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
+        start, fitted = self.start_.data, self.description_.data
+        return [evaluate(start, fitted, recording) for recording in self.recordings_]
+
+    def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str], is_estimated: bool) -> None:
+        self.training_ = self._evaluated(learned)
+        keeps = is_worse(self.training_)
+        if keeps:
+            learned = replace(learned, z=learned.estimator.start)
+            self.training_ = self._evaluated(learned)
+        self.unknowns_, self.z_, self.z_covariance_ = learned.estimator.unknowns, learned.z, learned.covariance
         self.numbers_, self.covariance_ = self._judged(learned)
         self.parameters_ = {number.number.path: number.value for number in self.numbers_}
         self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
-        start, fitted = self.start_.data, self.description_.data
-        self.training_ = [evaluate(start, fitted, recording) for recording in self.recordings_]
-        self.comparisons_ = [evaluate(start, fitted, recording) for recording in compared]
+        self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
         is_known = self.options.uncertainty and bool(np.isfinite(learned.covariance).all())
         uncertainty = self._write_uncertainty(learned) if is_known else None
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
-        self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *_fit_sentences(learned, self.numbers_)]
+        self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *fit_sentences(learned, self.numbers_)]
         self.report_ = build_report(
             fitted=self.description_,
             learned=learned,
@@ -252,12 +260,15 @@ class FrictionFit(Configured):
             options=_reported(self.options),
             warnings=self.warnings_,
             numbers=self.numbers_,
+            movement=movement(
+                self.numbers_, self.options.change if is_estimated else None, keeps, one_load(self.training_)
+            ),
             innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
             training=self.training_,
             comparisons=self.comparisons_,
             uncertainty=uncertainty,
         )
-        self.warnings_ += _noise_sentences(self.report_["innovations"])
+        self.warnings_ += noise_sentences(self.report_["innovations"])
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
 
@@ -353,38 +364,6 @@ def _reported(options: FitOptions) -> dict[str, Any]:
 def _trained(evaluation: Evaluation) -> Numbers:
     """Return [N, n] standardised innovations of the samples trained on, NaN elsewhere."""
     return np.where(evaluation.recording.train[:, None], evaluation.fit.standardised, np.nan)
-
-
-def _fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
-    more = "" if learned.converged else _MORE_PASSES
-    sentences = [f"{sentence}{more}" for sentence in learned.warnings]
-    at_bound = [number for number in numbers if number.at_bound]
-    if at_bound:
-        some = ", ".join(number.number.path for number in at_bound[:3])
-        more = f" and {len(at_bound) - 3} more" if len(at_bound) > 3 else ""
-        sentences.append(f"{counted(len(at_bound), 'number')} ended at a bound: {some}{more}")
-    return sentences
-
-
-def _noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
-    """Warn if the residuals contradict the noise settings, since the standard errors depend on these."""
-    nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
-    sentences = []
-    times = "-" if nis is None else f"{nis:.2g}" if nis < 100 else f"{nis:.0f}"
-    if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
-        sentences.append(
-            f"the residuals' variance is {times} times that of bias.noise_std, noise_std_per_force, noise_time and "
-            "drift_variance: standard errors are those of these settings, not of the data"
-        )
-    far = max((abs(value) for value in lag_one if value is not None), default=0.0)
-    if far > MOST_LAG_ONE:
-        samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
-        count = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
-        sentences.append(
-            f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
-            f"effect, or the noise is correlated; {count}, treat the standard errors with caution"
-        )
-    return sentences
 
 
 def _series(evaluation: Evaluation, role: Any) -> FitSeries:

@@ -158,7 +158,8 @@ def fit(
     scale: str | Sequence[str] = (),
     previous: str | os.PathLike[str] | None = None,
     change: float = 0.02,
-    effective_samples: bool | None = None,
+    start_values: str = "auto",
+    effective_samples: bool = True,
     passes: int | None = None,
     tolerance: float = 0.3,
     drift: float = 0.0,
@@ -192,8 +193,11 @@ def fit(
         those of the description.
     previous, change
         Report or description of an earlier fit, as the prior (`--from`), and the expected relative change since.
+    start_values
+        Whether the given numbers were "estimated" before, and are the prior, or "guessed"; "auto": estimated if the
+        description says how uncertain its friction is.
     effective_samples
-        Whether correlated residuals count as fewer samples; None: only with `previous`.
+        Whether correlated residuals count as fewer samples.
     passes, tolerance
         Most passes over the data (None: 60, "ekf" 2), and for "batch" the last step in standard errors.
     drift
