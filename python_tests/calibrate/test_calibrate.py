@@ -29,7 +29,7 @@ from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
 from tendonfmu.recordings.smoothing import Signals
-from tendonfmu.report.numbers import together
+from tendonfmu.report.numbers import rounded, together
 from tendonfmu.tasks.steps import Steps
 
 Numbers = NDArray[np.float64]
@@ -145,6 +145,8 @@ def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibrati
     page = (out / "calibration.html").read_text(encoding="utf-8")
     assert verdict(report)[1] in page and page.count("The link&#39;s weight") == 1
     assert all((out / file).is_file() for file in report["files"])
+    sizes = [f">{rounded(1e3 * joint['friction']['coulomb'], 2)}</text>" for joint in finger.data["joints"]]
+    assert all(size in page for size in sizes), "friction is written on the drawing"
     recording = read_recording(out.parent / UNSEEN)
     short = replace(
         recording, time=recording.time[:50], groups={key: each[:50] for key, each in recording.groups.items()}
@@ -299,6 +301,15 @@ def motion(seconds: float, name: str = "a.parquet") -> Recording:
     )
 
 
+def test_the_shown_motion_is_the_typical_one_of_the_test(calibrated: tuple[Calibration, Path]) -> None:
+    shown = calibrated[0].shown
+    assert shown.recording == UNSEEN and 10.0 <= shown.time[-1] - shown.time[0] <= 20.0
+    before, after = (np.sqrt(np.nanmean(left**2)) for left in (shown.before, shown.after))
+    report = calibrated[0].report["error"]
+    assert after < 0.9 * before < np.nanstd(shown.torque)
+    assert after == pytest.approx(together(report["calibrated"]), rel=0.3)
+
+
 def test_long_recordings_are_diagnosed_in_part_and_judged_on_another() -> None:
     free = [motion(500.0), motion(1000.0, "b.parquet")]
     seen, judged = stretches_for_diagnosis(free, [])
@@ -323,13 +334,14 @@ def report(given: float, calibrated: float, causes: int, limit: float) -> dict[s
     return {
         "error": {"as_given": [given, given], "calibrated": [calibrated, calibrated]},
         "structure": {"causes": [{}] * causes},
-        "detection": {"held_out": {"limit": limit}},
+        "detection": {"held_out": {"limit": limit, "alarms": 0, "minutes": 27.0}},
     }
 
 
 def test_the_verdict_is_one_sentence_with_the_figures() -> None:
     tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
-    assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence and "5.33" in sentence
+    assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence
+    assert "No false alarms in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
     tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
     assert tone == "bad" and "no better" in sentence
 

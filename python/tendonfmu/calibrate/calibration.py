@@ -22,7 +22,7 @@ from typing import Any
 
 from tendonfmu.arrays import Data
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import errors_of, record_next, recording_of, structure_of, tuning_of
+from tendonfmu.calibrate.report import errors_of, record_next, recording_of, structure_of, tuning_of, typical_motion
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
@@ -41,7 +41,7 @@ from tendonfmu.recordings import (
     read_recording,
     require_noise,
 )
-from tendonfmu.report import diagnosis_page, together, write_diagnosis
+from tendonfmu.report import MotionShown, diagnosis_page, together, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
 Options = CalibrateOptions  # its name in earlier versions
@@ -75,6 +75,7 @@ class Calibration:
     report: dict[str, Any]  # `calibration.json`, without the list of files
     # the diagnosis; None if this call did not make it, because it was resumed or not asked for
     diagnosis: Diagnosis | None
+    shown: MotionShown  # what it leaves of a typical stretch of unseen motion
 
 
 def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
@@ -141,7 +142,8 @@ def calibrate(
     run = _Run(case, Path(folder), options, phases)
     report, data = run.report()
     report["seconds"] = perf_counter() - begun
-    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed)
+    shown = typical_motion(case.finger.data, data, case.judged, not case.tests)
+    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed, shown)
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
@@ -384,7 +386,7 @@ class _Run:
             file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
         report = detect_score_report.build_report(scored)
-        keys = (
+        keys = [
             "events",
             "found",
             "false_alarms",
@@ -393,7 +395,7 @@ class _Run:
             "found_share",
             "free_rms",
             "overhang",
-        )
+        ]
         return {
             **{key: report[key] for key in keys},
             "sizes": detect_score_report.by_size(scored, left),

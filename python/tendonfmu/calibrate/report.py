@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Data
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect import ContactTuning, contact_at_rest, tune_report
 from tendonfmu.diagnosis import Diagnosis, residual_of
 from tendonfmu.estimate import residuals
-from tendonfmu.recordings import FitRecording, rms
-from tendonfmu.report import cards_of, names_of
+from tendonfmu.recordings import FitRecording, flagged_stretches, rms
+from tendonfmu.report import MotionShown, cards_of, names_of
 
+SHOWN = 20.0  # s
 OF_TUNING = (
     "method",
     "false_alarms_per_hour",
@@ -60,6 +61,22 @@ def errors_of(
         residual.append(left)
         masks.append((recording.held_out if held_out else recording.tracked) & np.isfinite(left).all(axis=1))
     return list(rms(np.concatenate(residual), np.concatenate(masks)))
+
+
+def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording], held_out: bool) -> MotionShown:
+    """Return a stretch, of those that nothing was fitted to, whose error with the second model is the median."""
+    stretches: list[tuple[float, float, FitRecording, Flags, Numbers]] = []
+    for recording in recordings:
+        left, time = residual_of(after, recording), recording.time
+        for first, end in flagged_stretches(time, recording.held_out if held_out else recording.tracked):
+            for begin in np.arange(first, end, SHOWN):
+                rows = (time >= begin) & (time <= min(end, begin + SHOWN))
+                stretches.append((min(end - begin, SHOWN), float(np.nanmean(left[rows] ** 2)), recording, rows, left))
+    least = 0.5 * max(stretch[0] for stretch in stretches)
+    long = sorted((stretch for stretch in stretches if stretch[0] >= least), key=lambda stretch: stretch[1])
+    _, _, recording, rows, left = long[len(long) // 2]
+    given = residual_of(before, recording)
+    return MotionShown(recording.path.name, recording.time[rows], recording.target[rows], given[rows], left[rows])
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from tendonfmu.calibrate.calibration import DIAGNOSIS, Calibration
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
-from tendonfmu.report import Row, Table, render, rounded, together
+from tendonfmu.report import Row, Table, capital, drawn, friction_figure, motion_sheet, render, rounded, together
 
 Report = Mapping[str, Any]
 
@@ -39,14 +39,24 @@ def verdict(report: Report) -> tuple[str, str]:
     error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
     built = f", with {counted(causes, 'cause')} built into the model" if causes else ""
-    alarms = f"; at most {per_hour(report)} false alarms an hour are expected in such motion."
     if less < 0:
         return (
             "bad",
             f"The calibrated model is no better than {MODELS[_first(report)]}: {mnm(before)} mN·m before, {mnm(after)} "
-            f"now{alarms}",
+            f"now. {alarms(report)}",
         )
-    return "good" if less > 0.1 else "", f"{error}{built}{alarms}"
+    return "good" if less > 0.1 else "", f"{error}{built}. {alarms(report)}"
+
+
+def alarms(report: Report) -> str:
+    """Say how many false alarms there were in free motion, and what so much motion says of their rate."""
+    found = report["detection"]["held_out"]
+    counted_as = "no" if found["alarms"] == 0 else str(found["alarms"])
+    minutes = found["minutes"]
+    seen = f"{capital(counted_as)} false alarm{'s' * (found['alarms'] != 1)} in {minutes:.2g} min of free motion"
+    if found["limit"] is None:
+        return f"{seen}."
+    return f"{seen}; so much motion cannot say more than: fewer than {found['limit']:.3g} an hour."
 
 
 def _first(report: Report) -> str:
@@ -59,19 +69,19 @@ def mnm(value: float) -> str:
     return rounded(1e3 * value)
 
 
-def per_hour(report: Report) -> str:
-    """Write the upper limit of the rate of false alarms (1/h)."""
-    limit = report["detection"]["held_out"]["limit"]
-    return "an unknown number of" if limit is None else f"{limit:.3g}"
-
-
 def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     """Yield (value, unit, meaning), the most important first."""
     error, detection = report["error"], report["detection"]
+    found = detection["held_out"]
     before, after = (mnm(together(error[name])) for name in (_first(report), "calibrated"))
     data = "held-out parts" if error["held_out"] else "test recordings"
     yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
-    yield f"≤ {per_hour(report)}", "per hour", f"false alarms, with {100 * detection['confidence']:.0f} % confidence"
+    sure = f"; with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+    yield (
+        str(found["alarms"]),
+        f"in {found['minutes']:.2g} min",
+        f"false alarms in free motion{'' if found['limit'] is None else sure}",
+    )
     least = min(detection["smallest_torque"]["median"])
     yield mnm(least), "mN·m", "smallest sudden change of a joint torque that is reported, half of the time"
     pushes = report["pushes"]
@@ -212,7 +222,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / FINGER, description_text(dict(calibration.data)))
     build_fmu(folder / FINGER, folder / FMU)
-    write_text(folder / PAGE, calibration_page(calibration.report))
+    write_text(folder / PAGE, calibration_page(calibration))
     written = files_of(calibration.report)
     report = {**calibration.report, "files": list(written)}
     text = ",\n".join(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in report.items())
@@ -220,12 +230,15 @@ def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]
     return {folder / name: what for name, what in written.items()}
 
 
-def calibration_page(report: Mapping[str, Any]) -> str:
+def calibration_page(calibration: Calibration) -> str:
     """Return the HTML text of the page."""
+    report = calibration.report
     tone, sentence = verdict(report)
     return render(
         "calibration.html.jinja",
+        drawn([motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]),
         report=report,
+        finger=friction_figure(calibration.data),
         tone=tone,
         verdict=sentence,
         headline_numbers=list(tiles(report)),

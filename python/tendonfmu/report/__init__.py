@@ -12,6 +12,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import detect_text, diagnosis_page, diagnosis_text, excite_text, fit_page, fit_text
+    from .calibration_figures import MotionShown, motion_sheet
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
     from .diagnosis_page import cards_of, waterfall_of
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from .fit_page import write_fit_page
     from .fit_text import ResidualTable, residual_tables
     from .history import headline, history_report, rows_of_lines, write_history
-    from .numbers import Row, Table, column, html_of, percent, rms, rounded, together
+    from .marked_finger import friction_figure
+    from .numbers import Row, Table, capital, column, html_of, percent, rms, rounded, together
     from .page import Tile, drawn, render, write_figures
     from .run_page import check_page, run_report, write_run_page
     from .score_figures import write_score_figures

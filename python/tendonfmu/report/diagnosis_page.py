@@ -20,7 +20,6 @@ from tendonfmu.diagnosis import (
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
-from tendonfmu.report.diagnosis_finger import finger_figure
 from tendonfmu.report.diagnosis_text import (
     change_rows,
     confusion_sentence,
@@ -41,6 +40,7 @@ from tendonfmu.report.diagnosis_text import (
     unseen,
 )
 from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.report.marked_finger import finger_figure
 from tendonfmu.report.numbers import (
     Row,
     capital,

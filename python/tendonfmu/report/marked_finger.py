@@ -1,25 +1,28 @@
-"""Where the causes of a diagnosis sit: marks on a drawing of the finger, its keys and its caption."""
+"""A drawing of the finger with marks, its keys and its caption: causes of a diagnosis, or friction by place."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from markupsafe import Markup
 
+from tendonfmu.arrays import Data
 from tendonfmu.diagnosis import Cause, Diagnosis, reported_causes
 from tendonfmu.drawing import GREY
 from tendonfmu.files import are, counted, listed
-from tendonfmu.model import EDGE_RED, FingerDrawing, Mark, finger_drawing, finger_svg
+from tendonfmu.model import EDGE_RED, Effect, FingerDrawing, Mark, effects, finger_drawing, finger_svg
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.numbers import capital
+from tendonfmu.report.numbers import capital, rounded
 
 MOST_MARKS = 8  # of one cause; one at more places is only in the caption
+MOST_PLACES = 12  # whose friction is written on the drawing
 
 
 @dataclass(frozen=True)
 class FingerFigure:
-    """The finger with its causes."""
+    """A finger with marks."""
 
     drawing: Markup  # SVG
     keys: list[tuple[str, str, str]]  # (CSS class, colour, meaning) of the marks that are in the drawing
@@ -31,7 +34,7 @@ def finger_figure(diagnosis: Diagnosis) -> FingerFigure:
     causes = list(enumerate(reported_causes(diagnosis), start=1))
     marks = [mark for number, cause in causes for mark in _marks(number, cause)]
     drawing = finger_drawing(diagnosis.nominal_data)
-    return FingerFigure(finger_svg(drawing, marks), list(_keys(drawing)), " ".join(_sentences(diagnosis, causes)))
+    return FingerFigure(finger_svg(drawing, marks), list(keys_of(drawing)), " ".join(_sentences(diagnosis, causes)))
 
 
 def _sentences(diagnosis: Diagnosis, causes: Sequence[tuple[int, Cause]]) -> Iterator[str]:
@@ -69,7 +72,8 @@ def _elsewhere(cause: Cause) -> str:
     return f"at {counted(count, 'place')}, which the list names" if count else "everywhere"
 
 
-def _keys(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
+def keys_of(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
+    """Yield the marks of a finger: CSS class, colour, meaning."""
     tendons = drawing.tendons
     yield "square", GREY, "end of a tendon"
     if any(len(tendon.pulleys) for tendon in tendons):
@@ -80,3 +84,32 @@ def _keys(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
         yield "dot", EDGE_RED, "edge whose friction varies with the angle"
     if any(tendon.bidirectional for tendon in tendons):
         yield "dashed", GREY, "cable loop"
+
+
+def friction_figure(data: Data) -> FingerFigure:
+    """Draw the finger with its largest friction by place."""
+    places: list[tuple[float, Mark]] = []
+    for effect in effects(data):
+        size = max(_level(law) for law in effect.laws)
+        if effect.kind == "friction":
+            places.append((np.inf, Mark(rounded(1e3 * size, 2), effect.joint, None)))
+        elif effect.tendon:
+            places.append((size, _mark(effect, size)))
+    drawing = finger_drawing(data)
+    largest = sorted((place for place in places if place[0] > 0.0), key=lambda place: -place[0])[:MOST_PLACES]
+    fewer = " Only the largest are shown." if len(places) > MOST_PLACES else ""
+    caption = (
+        "Coulomb friction: of a joint in mN·m, of a pulley or an edge in % of the tendon force. The base is on the "
+        f"left.{fewer}"
+    )
+    return FingerFigure(finger_svg(drawing, [mark for _, mark in largest]), list(keys_of(drawing)), caption)
+
+
+def _mark(effect: Effect, size: float) -> Mark:
+    return Mark(f"{rounded(100.0 * size, 2)} %", effect.joint, effect.tendon, effect.kind == "edge_friction")
+
+
+def _level(law: Data) -> float:
+    """Return the Coulomb friction of a law, the larger of its two sides."""
+    sides = [law[side] for side in ("positive", "negative") if side in law] or [law]
+    return max(float(side.get("coulomb", 0.0)) for side in sides)
