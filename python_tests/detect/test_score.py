@@ -162,7 +162,9 @@ def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Tab
 
 def test_without_an_event_false_alarms_are_all(call: Call, pushes: Table) -> None:
     alarms = report_of(call("score", INDEX, written(pushes, "all.parquet"), "-o", "s.json"))["found"]
-    answer = call("score", INDEX, written(pushes, "free.parquet", contact=None), "-o", "s.json", "--figures", "fig")
+    nothing = {name: None for name in pushes if name.startswith("external")}
+    free = written(pushes, "free.parquet", contact=None, **nothing)
+    answer = call("score", INDEX, free, "-o", "s.json", "--figures", "fig")
     report = report_of(answer)
     assert "no event in column contact: false alarms only" in answer.err
     assert (report["events"], report["median_delay_s"], report["found_share"]["value"]) == (0, None, None)
@@ -171,6 +173,19 @@ def test_without_an_event_false_alarms_are_all(call: Call, pushes: Table) -> Non
     assert report["false_alarms"] >= alarms > 0
     assert report["false_alarms_per_minute"]["value"] == pytest.approx(report["false_alarms"] / 0.25, rel=1e-3)
     assert [file.name for file in Path("fig").iterdir()] == ["contacts.png"]
+
+
+def test_a_reference_sensor_labels_a_recording_that_has_no_label(call: Call, pushes: Table) -> None:
+    labelled = report_of(call("score", INDEX, written(pushes, "all.parquet"), "-o", "s.json"))
+    noise = np.random.default_rng(1).normal(0.0, 2e-4, len(pushes["time"]))
+    sensed = {name: values + noise + 0.05 for name, values in pushes.items() if name.startswith("external")}
+    answer = call("score", INDEX, written(pushes, "rec.parquet", contact=None, **sensed), "-o", "s.json")
+    report = report_of(answer)
+    assert "no column contact: contact is where external_torque is more than" in answer.err
+    keys = ("events", "found", "false_alarms")
+    assert [report[key] for key in keys] == [labelled[key] for key in keys]
+    onsets = [[event["onset_s"] for event in each["recordings"][0]["event_list"]] for each in (report, labelled)]
+    assert np.abs(np.subtract(*onsets)).max() < 0.05
 
 
 def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None:

@@ -23,12 +23,14 @@ from repository_paths import ROOT
 from tendonfmu.cli import main
 from tendonfmu.detect.alarm_level import allowed_alarms, cells_of, count_alarms, least_hours, level_for, rate_limit
 from tendonfmu.detect.bounds import SHARES, Bound, Line, evidence_line, given_line, level_of, search_for, searched_line
-from tendonfmu.detect.free_motion import FreePart, FreeRun
+from tendonfmu.detect.free_motion import FreePart, FreeRun, free_parts
 from tendonfmu.detect.noise import bias_noise, deviation, drift_variance, time_constant
 from tendonfmu.detect.tuning import RELEASE, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model import read_finger
 from tendonfmu.model.native import Instance
+from tendonfmu.recordings import read_recording
 from tendonfmu.recordings.residuals import BiasSettings, track
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
@@ -376,11 +378,24 @@ def still(table: Table) -> Table:
     return {name: column if name == "time" else 0 * column + column[0] for name, column in quiet.items()}
 
 
+@pytest.mark.parametrize("change", [dict, unlabelled])
+def test_contact_that_a_label_or_a_reference_sensor_shows_is_left_out(
+    call: Call, pushes: Table, tmp_path: Path, change: Any
+) -> None:
+    write_table(tmp_path / "rec.parquet", change(pushes))
+    recording = read_recording(tmp_path / "rec.parquet")
+    parts, sentences = free_parts(read_finger(INDEX), recording, 1)
+    counted = np.concatenate([part.time[part.counted] for part in parts])
+    times = pushes["time"][np.flatnonzero(pushes["contact"])]
+    assert len(counted) > 300 and not np.isin(counted, times).any()
+    last = times[np.searchsorted(times, counted, side="right") - 1][counted > times[0]]
+    assert (counted[counted > times[0]] - last > 2.0).all(), "the bias settles after a touch"
+    assert any("of contact are left out" in sentence for sentence in sentences)
+
+
 @pytest.mark.parametrize(
     ("change", "options", "words"),
     [
-        (dict, (), ("column contact, row 509", "expected 0")),
-        (unlabelled, (), ("column external_torque[", "N.m", "as in free motion")),
         (still, (), ("no motion", "velocity_threshold.joint = 0.01 rad/s")),
         (dict, ("--method", "paper"), ("method: 'paper'", "innovation or cusum or threshold")),
         (dict, ("--kinematics", "3"), ("no column joint_velocity[1]",)),

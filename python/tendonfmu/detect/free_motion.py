@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.detect.counting import sample_seconds, stretches
+from tendonfmu.detect.reference_sensor import touched
 from tendonfmu.errors import InputError
-from tendonfmu.files import counted
 from tendonfmu.model import NEVER, Finger, native, number_of
 from tendonfmu.options import KinematicsSource
-from tendonfmu.recordings import Held, Recording, prepare
+from tendonfmu.recordings import Held, Recording, flagged_rows, prepare
 
 Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
 
 SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
-BEYOND_NOISE = 6.0  # times the noise of a reference sensor: a larger mean over `SMOOTHED` is contact
-SMOOTHED = 0.05  # s
 STILL = 0.01  # least share of the time with motion; less says nothing about friction
 
 
@@ -75,14 +73,14 @@ class Clock:
 
 
 def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[list[FreePart], list[str]]:
-    """Divide a recording of free motion into parts without gaps."""
-    require_no_contact(recording)
+    """Divide a recording into parts of free motion without gaps; contact that it shows is left out."""
+    contact = touched(recording)
     groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
     prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
     _refuse_stillness(finger, recording, prepared.model.joint_speed)
     force = np.abs(groups["tendon_force"]).mean(axis=1)
     parts = []
-    for rows in prepared.parts:
+    for rows in (piece for part in prepared.parts for piece in _without(contact, part)):
         time = recording.time[rows]
         settled = time - time[0] >= SETTLING
         arrays = prepared.arrays(rows)
@@ -90,41 +88,16 @@ def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[l
         seconds, source = sample_seconds(time), KinematicsSource(kinematics)
         parts.append(FreePart(str(recording.path), arrays, force[rows], counted, seconds, source))
     sentences = [sentence.replace("are fitted as", "count as") for sentence in prepared.warnings]
+    if contact.any():
+        lost = float(sample_seconds(recording.time)[contact].sum())
+        sentences.append(f"{lost:.3g} s of contact are left out, and {SETTLING:g} s after each touch")
     return parts, sentences
 
 
-def require_no_contact(recording: Recording) -> None:
-    """Check that neither a label nor a reference sensor shows contact."""
-    label = recording.contact
-    if label is not None and label.any():
-        first = int(np.flatnonzero(label)[0])
-        raise InputError(
-            f"{recording.path}: column contact, row {first + 1}: 1 at {recording.time[first]:.6g} s, and in "
-            f"{counted(int(label.sum()), 'sample')}; expected 0 throughout: false alarms are counted in free motion"
-        )
-    reference = recording.groups.get("external_torque")
-    if reference is None:
-        return
-    off = np.abs(_smoothed(reference - np.median(reference, axis=0), recording.time))
-    # from differences, so that contact does not count as noise; 90 % of a normal distribution lies within 1.645 σ
-    step = np.diff(reference, axis=0) if len(reference) > 1 else np.zeros((1, reference.shape[1]))
-    noise = np.quantile(np.abs(step), 0.9, axis=0) / (1.645 * np.sqrt(2.0))
-    wrong = np.argwhere(off > BEYOND_NOISE * noise + 1e-9)
-    if len(wrong):
-        row, j = wrong[0]
-        raise InputError(
-            f"{recording.path}: column external_torque[{j + 1}], row {row + 1}: {reference[row, j]:.4g} N.m at "
-            f"{recording.time[row]:.6g} s; expected at most {BEYOND_NOISE * noise[j]:.2g} N.m from its median "
-            f"({BEYOND_NOISE:g} times its noise), as in free motion"
-        )
-
-
-def _smoothed(values: Numbers, time: Numbers) -> Numbers:
-    """Compute [N, n] the running mean over about `SMOOTHED`."""
-    width = 1 if len(time) < 2 else max(1, min(len(time), round(SMOOTHED / float(np.median(np.diff(time))))))
-    total = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
-    begin = np.clip(np.arange(len(values)) - width // 2, 0, len(values) - width)
-    return np.asarray((total[begin + width] - total[begin]) / width)
+def _without(contact: Flags, part: slice) -> Iterator[slice]:
+    """Yield the stretches of a part without contact."""
+    for begin, end in flagged_rows(~contact[part]):
+        yield slice(part.start + begin, part.start + end)
 
 
 def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> None:

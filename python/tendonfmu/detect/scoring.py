@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
+from tendonfmu.detect.reference_sensor import sensed_contact
 from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
@@ -138,7 +139,8 @@ def score_recordings(
     read = _read(sources, column, options.force)
     if not read:
         raise InputError("no recording; expected at least one")
-    warnings = [*_unlabelled(read, options.labels), *_without_force(read, options.force)]
+    read, warnings = _labelled(read, options.labels)
+    warnings += _without_force(read, options.force)
     factors = () if subject.packed else FACTORS
     done, total = 0, len(read) * (1 + len(factors))
 
@@ -193,12 +195,24 @@ def _read(sources: Sequence[RecordingSource], labels: str, force: str | None) ->
     return read
 
 
-def _unlabelled(read: Sequence[Recording], labels: str | None) -> list[str]:
-    """Report the recordings without a label. Raises InputError if a named column is in none."""
+def _labelled(read: Sequence[Recording], labels: str | None) -> tuple[list[Recording], list[str]]:
+    """Return the recordings, labelled by their reference sensor where they have no label, and what was done."""
     without = [str(recording.path) for recording in read if recording.contact is None]
     if labels is not None and len(without) == len(read):
         raise InputError(f"{', '.join(without)}: no column {labels}; expected a label, 0 or 1, in at least one")
-    return [f"{path}: no column {labels or LABEL}: the whole recording counts as free of contact" for path in without]
+    labelled, sentences = list[Recording](), []
+    for recording in read:
+        sensed = None if recording.contact is not None else sensed_contact(recording)
+        labelled.append(recording if sensed is None else replace(recording, contact=sensed[0]))
+        if sensed is not None:
+            beyond = ", ".join(f"{1e3 * each:.3g}" for each in sensed[1])
+            means = f"contact is where external_torque is more than {beyond} mN·m off its median (by joint)"
+        elif recording.contact is None:
+            means = "the whole recording counts as free of contact"
+        else:
+            continue
+        sentences.append(f"{recording.path}: no column {labels or LABEL}: {means}")
+    return labelled, sentences
 
 
 def _without_force(read: Sequence[Recording], force: str | None) -> list[str]:

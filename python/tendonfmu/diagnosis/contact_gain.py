@@ -25,6 +25,7 @@ from tendonfmu.detect import (
     free_parts,
     least_hours,
     pooled,
+    require_no_contact,
     run_track,
 )
 from tendonfmu.diagnosis.result import DetectionGain
@@ -91,6 +92,7 @@ def _free_motion(finger: Finger, recordings: Sequence[Recording], kinematics: in
 def _is_free(finger: Finger, recording: Recording, kinematics: int) -> bool:
     """Return whether a recording is free motion: long enough, moving, and without a load on a reference sensor."""
     try:
+        require_no_contact(recording)
         parts, _ = free_parts(finger, recording, kinematics)
     except InputError:
         return False

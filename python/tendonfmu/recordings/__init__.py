@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         LABEL,
         Recording,
         RecordingSource,
+        flagged_rows,
         flagged_stretches,
         listed_sources,
         read_recording,

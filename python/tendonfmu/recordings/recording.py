@@ -342,9 +342,13 @@ def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list
 def flagged_stretches(time: NDArray[np.float64], flags: NDArray[Any]) -> list[tuple[float, float]]:
     """Return the stretches of flagged samples."""
     # time: [N] (s); flags: [N]; returns begin and end of each stretch (s); it lasts until the next sample
+    return [(float(time[begin]), float(time[min(end, len(time) - 1)])) for begin, end in flagged_rows(flags)]
+
+
+def flagged_rows(flags: NDArray[Any]) -> list[tuple[int, int]]:
+    """Return the first row of each stretch of flagged samples [N], and the row after its last."""
     steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
-    begins, ends = np.flatnonzero(steps > 0), np.minimum(np.flatnonzero(steps < 0), len(time) - 1)
-    return [(float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)]
+    return list(zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True))
 
 
 def _labelled(recording: Recording, label: str) -> Recording:
