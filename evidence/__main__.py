@@ -33,7 +33,6 @@ from evidence.runner import ROOT, parser, say, write
 PACKAGES = {
     "requirements-foreign.lock": ("mujoco",),
     "requirements-diagnosis-peers.lock": ("pysindy",),
-    "requirements-fit-peers.lock": ("filterpy",),
     "requirements-peers.lock": ("pythonfmu",),
 }
 LINKED = ("evidence", "docs", "examples", "python_tests")  # that commands of the pages name

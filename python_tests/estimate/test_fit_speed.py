@@ -1,6 +1,6 @@
 """A loose guard of the fit's speed: a tenth of what docs/evidence/performance.md says, in CPU time.
 
-The figures themselves, beside peers: bench/compare_fit.py.
+The figures themselves: evidence/fit/speed.py.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Speed and memory of the fit, beside other ways to do the same, in one run:
+"""Speed and memory of the fit: python -m evidence.fit.speed --output fit.json
 
-    pip install --require-hashes -r requirements-fit-peers.lock    # filterpy; left out where it is not there
-    python -m evidence.fit.compare --output fit.json
-
-Each way runs in a process of its own. The peers (peers.py) take as many samples as they can finish, and their times are
-scaled by the samples. Before any time is worth anything they must agree with the product on those samples.
+Each way runs in a process of its own.
 """
 
 from __future__ import annotations
@@ -17,9 +13,9 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +23,6 @@ import numpy as np
 
 from evidence import tables
 from evidence.fit.made_data import model_torques, noise_scale
-from evidence.fit.peers import Task, Watch, least_squares_fit, outer_products, run_filter
 from evidence.runner import INDEX_FINGER, ROOT, parser, plain, say, write
 from tendonfmu.arrays import Array
 from tendonfmu.estimate import Choice, Estimator, FrictionFit, Structure, build_structure
@@ -46,12 +41,28 @@ ALTERNATE = 50.0  # s
 SPREAD = 0.3  # of the logarithm of each number of the truth about the description
 FILE = "recording"
 PRIOR_STD, TOLERANCE = 1.0, 0.1  # as `tendonfmu fit` has them
-MOST_CALLS = 40  # of scipy
-AGREEMENT = 0.05  # standard errors between two ways on the same samples
 GOALS = {"batch": 20.0, "ekf": 60.0}  # s
 MOST_MEMORY = 1e9  # bytes, of the product's ways
-# Of the peers' linear algebra: how their threads share a busy machine would be measured instead.
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # of what is not the product's own
+
+
+class Watch:
+    """Adds up the time spent inside of `with`."""
+
+    def __init__(self) -> None:
+        self.seconds = self.cpu_seconds = 0.0
+
+    def __enter__(self) -> Watch:
+        self._begin = time.perf_counter(), time.process_time()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.seconds += time.perf_counter() - self._begin[0]
+        self.cpu_seconds += time.process_time() - self._begin[1]
+
+    def times(self) -> dict[str, float]:
+        return {"seconds": self.seconds, "cpu_seconds": self.cpu_seconds}
+
 
 # --- the data ---------------------------------------------------------------------------------------------------------
 
@@ -160,45 +171,7 @@ def ekf(arrays: Mapping[str, Array], passes: int = 2, block: int = 8) -> dict[st
     return {"passes": passes} | watch.times() | {"z": learner.z, "std": np.sqrt(np.diag(learner.covariance))}
 
 
-def task_of(arrays: Mapping[str, Array]) -> Any:
-    """What the peers are given."""
-    chosen = structure()
-    bias = chosen.start.data["bias"]
-    estimator = Estimator(chosen.start.image, chosen.group, chosen.scale)
-    estimator.add_recording(**call_with(arrays))
-    columns = {
-        name: np.array([getattr(unknown, name) for unknown in estimator.unknowns])
-        for name in ("start", "lower", "upper", "scale")
-    }
-    force = arrays["tendon_force"]
-    return Task(
-        estimator=estimator,
-        time=arrays["time"],
-        measured=force @ np.array(chosen.start.moment_arms) - arrays["external_torque"],
-        noise=noise_scale(chosen.start.data, arrays["time"], force)[:, 0] ** 2,
-        drift=bias["drift_variance"],
-        initial=bias["initial_variance"],
-        **columns,
-    )
-
-
-def one_product(arrays: Mapping[str, Array]) -> dict[str, Any]:
-    """Jᵀ J of a dense Jacobian that is there: a lower bound of any pass that does not use its zeros."""
-    rows, columns = arrays["joint_position"].size, len(Estimator(structure().start.image, structure().group).unknowns)
-    return outer_products(rows, columns)
-
-
-def filtered(kind: str, arrays: Mapping[str, Array]) -> dict[str, Any]:
-    return run_filter(task_of(arrays), kind, PRIOR_STD, len(arrays["time"]))
-
-
 Function = Callable[[Mapping[str, Array]], dict[str, Any]]
-
-# the product's ways on the samples of a peer
-JUDGES: dict[str, Function] = {
-    "batch to the end": partial(batch, tolerance=1e-3),
-    "filter sample by sample": partial(ekf, passes=1, block=1),
-}
 
 
 @dataclass(frozen=True)
@@ -206,23 +179,12 @@ class Way:
     what: str
     samples: int  # that it takes
     run: Function | None  # None: the command, from the file
-    judge: str | None = None  # a key of JUDGES that it must agree with
 
 
 WAYS = {
     "command": Way("tendonfmu fit, file to report", FULL, None),
     "batch": Way("batch, to convergence", FULL, batch),
     "ekf": Way("EKF, both passes", FULL, ekf),
-    "product": Way("numpy JᵀJ of one pass, J given", 20_000, one_product),
-    "least_squares": Way(
-        "scipy least_squares, compiled Jacobian, dense",
-        8_000,
-        lambda arrays: least_squares_fit(task_of(arrays), PRIOR_STD, MOST_CALLS),
-        "batch to the end",
-    ),
-    "symmetric": Way("numpy EKF, P − W Wᵀ", 2_000, partial(filtered, "symmetric"), "filter sample by sample"),
-    "joseph": Way("numpy EKF, Joseph form", 300, partial(filtered, "joseph"), "filter sample by sample"),
-    "filterpy": Way("filterpy ExtendedKalmanFilter", 150, partial(filtered, "filterpy"), "filter sample by sample"),
 }
 
 
@@ -230,16 +192,13 @@ WAYS = {
 
 
 def measured(name: str, folder: Path, samples: int) -> dict[str, Any]:
-    """Figures of a way or a judge, in this process."""
-    function = JUDGES.get(name) or WAYS[name].run
+    """Figures of a way, in this process."""
+    function = WAYS[name].run
     if function is None:
         figures = command(folder)
     else:
         arrays = load(folder, samples)
-        try:
-            figures = function(arrays) | {"samples": len(arrays["time"])}
-        except ImportError as missing:
-            figures = {"missing": str(missing)}
+        figures = function(arrays) | {"samples": len(arrays["time"])}
     return figures | {"peak_memory": peak_memory()}
 
 
@@ -254,7 +213,7 @@ def peak_memory() -> int:
 
 def apart_from(name: str, folder: Path, samples: int) -> dict[str, Any]:
     """What `measured` gives, in a process of its own. Ends the program where it fails."""
-    words = [sys.executable, "-m", "evidence.fit.compare", "--one", name, str(folder), str(samples)]
+    words = [sys.executable, "-m", "evidence.fit.speed", "--one", name, str(folder), str(samples)]
     result = subprocess.run(words, stdout=subprocess.PIPE, text=True, env=os.environ | ONE_THREAD, cwd=ROOT)
     if result.returncode != 0:
         sys.exit(f"{name} failed")
@@ -262,24 +221,13 @@ def apart_from(name: str, folder: Path, samples: int) -> dict[str, Any]:
 
 
 def line_of(name: str, folder: Path, scale: float) -> dict[str, Any]:
-    """One line of the table, as JSON: seconds as measured and as scaled to all samples, memory, agreement."""
+    """One line of the table, as JSON: seconds as measured and as scaled to all samples, memory."""
     way = WAYS[name]
     figures = apart_from(name, folder, max(100, min(way.samples, round(FULL * scale))))
     line: dict[str, Any] = {"way": name, "what": way.what}
-    kept = ("missing", "samples", "seconds", "cpu_seconds", "peak_memory", "iterations", "passes", "converged", "cost")
+    kept = ("samples", "seconds", "cpu_seconds", "peak_memory", "iterations", "passes", "converged", "cost")
     line |= {key: figures[key] for key in kept if key in figures}
-    if "missing" in figures:
-        return line
     line |= {f"{key}_scaled": figures[key] * FULL / figures["samples"] for key in ("seconds", "cpu_seconds")}
-    if way.judge is not None:
-        judge = apart_from(way.judge, folder, figures["samples"])
-        # largest difference of the two estimates in standard errors
-        pairs = zip(figures["z"], judge["z"], judge["std"], strict=True)
-        line["apart"] = max(abs(value - expected) / std for value, expected, std in pairs)
-        if not line["apart"] < AGREEMENT:
-            sys.exit(
-                f"{name} and {way.judge} are {line['apart']:.3g} standard errors apart: no times are worth showing"
-            )
     return line
 
 
@@ -287,17 +235,13 @@ def line_of(name: str, folder: Path, scale: float) -> dict[str, Any]:
 
 
 def table_of(lines: list[dict[str, Any]]) -> str:
-    head = ["way", "samples", "iterations", "CPU s", "400 s: CPU s", "400 s: wall s", "peak memory", "apart"]
+    head = ["way", "samples", "iterations", "CPU s", "400 s: CPU s", "400 s: wall s", "peak memory"]
     rows = []
     for line in lines:
-        if "missing" in line:
-            rows.append([line["what"], f"not run: {line['missing']}", *[""] * 6])
-            continue
         scaled = [f"{line[key]:,.4g}" for key in ("cpu_seconds_scaled", "seconds_scaled")]
         memory = f"{line['peak_memory'] / 1e6:,.0f} MB"
-        apart = f"{line['apart']:.0e}" if "apart" in line else ""
         counts = [f"{line['samples']:,}", line.get("iterations", ""), f"{line['cpu_seconds']:.3g}"]
-        rows.append([line["what"], *counts, *scaled, memory, apart])
+        rows.append([line["what"], *counts, *scaled, memory])
     return tables.table(head, rows)
 
 
@@ -337,7 +281,7 @@ def main() -> None:
             say(f"{lines[-1]['what']}: {lines[-1].get('seconds', 0.0):.3g} s")
     print(table_of(lines))
     machine = f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
-    print(f"\n{machine}. Apart: from the product on the same samples, largest difference in standard errors.")
+    print(f"\n{machine}.")
     for miss in misses(lines):
         print(f"MISSED {miss}")
     if given.output is not None:
