@@ -66,6 +66,14 @@ def test_an_alarm_in_the_100_ms_after_an_event_is_neither_false_nor_finds_it(beg
     assert score.free_alarm_share == pytest.approx((4.0 - max(begin, 3.1)) / 8.9)
 
 
+@pytest.mark.parametrize(("begin", "after"), [(1.0, 0), (3.5, 1), (4.98, 1), (5.0, 0)])
+def test_false_alarms_within_2_s_after_an_event_are_told_apart(begin: float, after: int) -> None:
+    score = score_detection(TIME, flags((2.0, 3.0)), flags((begin, begin + 0.2)))
+    assert (len(score.false_alarms), score.alarms_after_events) == (1, after)
+    elsewhere = score_detection(TIME, flags((1.0, 1.5)), flags())  # the event of another recording
+    assert summarise(pooled([score, elsewhere])).alarms_after_events == after
+
+
 def test_overhang_is_free_time_only_and_belongs_to_the_event_where_the_alarm_began() -> None:
     """It runs through a second event, which is therefore missed."""
     score = score_detection(TIME, flags((2.0, 3.0), (4.0, 5.0)), flags((2.5, 6.0)))

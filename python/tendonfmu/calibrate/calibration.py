@@ -22,7 +22,15 @@ from typing import Any
 
 from tendonfmu.arrays import Data
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import errors_of, record_next, recording_of, structure_of, tuning_of, typical_motion
+from tendonfmu.calibrate.report import (
+    OF_SCORE,
+    errors_of,
+    record_next,
+    recording_of,
+    structure_of,
+    tuning_of,
+    typical_motion,
+)
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
@@ -386,18 +394,8 @@ class _Run:
             file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
         report = detect_score_report.build_report(scored)
-        keys = [
-            "events",
-            "found",
-            "false_alarms",
-            "free_minutes",
-            "median_delay_s",
-            "found_share",
-            "free_rms",
-            "overhang",
-        ]
         return {
-            **{key: report[key] for key in keys},
+            **{key: report[key] for key in OF_SCORE},
             "sizes": detect_score_report.by_size(scored, left),
             "warnings": list(scored.warnings),
         }

@@ -29,6 +29,17 @@ OF_TUNING = (
     "rest",
     "sensor_fault",
 )
+OF_SCORE = (
+    "events",
+    "found",
+    "false_alarms",
+    "false_alarms_after_events",
+    "free_minutes",
+    "median_delay_s",
+    "found_share",
+    "free_rms",
+    "overhang",
+)
 
 
 def structure_of(found: Diagnosis) -> dict[str, Any]:

@@ -166,6 +166,8 @@ def push_sentence(report: Report) -> str:
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
     many = "no false alarm" if alarms == 0 else counted(alarms, "false alarm")
+    if after := pushes["false_alarms_after_events"]:
+        many += f" ({after} within 2 s after a push)"
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
     return (

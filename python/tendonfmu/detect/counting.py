@@ -21,6 +21,7 @@ Spans = NDArray[np.int64]
 MERGED = 0.1  # s; labelled stretches, or alarms, closer than this are one
 SILENT = 0.2  # s before the onset of a found event that must have no sample of contact
 GRACE = 0.1  # s after an event in which an alarm is not false and time is not free
+AFTER = 2.0  # s after an event in which the hand may still feel what the touch did to its friction
 BLOCK = 2.0  # s of free time; longer than the correlation of residuals and alarms in free motion
 _EQUAL = 1e-9  # s; the times of a CSV are rounded to decimals
 
@@ -94,6 +95,7 @@ class DetectionScore:
     false_alarms: list[tuple[float, float]]  # (begin, end) of each, its first and last sample (s)
     free: FreeBlocks  # sums over the free time
     contact: ContactSums | None  # sums over the events; None without a reference sensor
+    alarms_after_events: int = 0  # false alarms that begin less than `AFTER` after the end of an event
 
     @property
     def found(self) -> int:
@@ -139,6 +141,7 @@ def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals 
         false_alarms=[(float(time[begin]), float(time[end])) for begin, end in false],
         free=_free_blocks(seconds, free, alarm, given.residual),
         contact=_contact_sums(spans, given),
+        alarms_after_events=sum(any(0.0 < time[at] - event.end < AFTER for event in events) for at in false[:, 0]),
     )
 
 
@@ -240,6 +243,7 @@ def pooled(scores: Sequence[DetectionScore]) -> DetectionScore:
         false_alarms=[alarm for score in scores for alarm in score.false_alarms],
         free=FreeBlocks(*_joined([score.free for score in scores])),
         contact=ContactSums(*_joined(contacts)) if contacts else None,
+        alarms_after_events=sum(score.alarms_after_events for score in scores),
     )
 
 

@@ -62,6 +62,7 @@ def _summary(summary: Summary) -> dict[str, Any]:
         "missed_in_alarm": summary.masked,
         "found_share": _estimate(summary.found_share),
         "false_alarms": summary.false_alarms,
+        "false_alarms_after_events": summary.alarms_after_events,
         "false_alarms_interval": _interval(summary.false_alarm_count),
         "false_alarms_per_minute": _estimate(summary.false_alarms_per_minute),
         "free_minutes": summary.free_minutes,

@@ -35,6 +35,7 @@ class Summary:
     masked: int  # number of events that had contact before their onset
     held: int  # number of found events whose alarm lasts to their end
     false_alarms: int  # number of false alarms, its interval, and their rate (1/min)
+    alarms_after_events: int  # those of them that begin soon after an event
     free_minutes: float  # free time (min), and the share of it in alarm
     found_share: Interval  # shares of the events, and of the found events
     held_share: Interval
@@ -67,6 +68,7 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
         masked=sum(not event.silent for event in score.events),
         held=held,
         false_alarms=alarms,
+        alarms_after_events=score.alarms_after_events,
         free_minutes=minutes,
         found_share=intervals.share(len(found), len(score.events)),
         held_share=intervals.share(held, len(found)),

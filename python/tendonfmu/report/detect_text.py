@@ -49,8 +49,9 @@ def score_lines(scored: Scored) -> Iterator[str]:
     summary = scored.summary
     if summary.events:
         yield from _event_lines(summary)
+    soon = f" ({summary.alarms_after_events} of them within 2 s after an event)" if summary.alarms_after_events else ""
     yield (
-        f"false alarms: {summary.false_alarms} in {summary.free_minutes:.3g} min of free time, "
+        f"false alarms: {summary.false_alarms}{soon} in {summary.free_minutes:.3g} min of free time, "
         f"{_estimate(summary.false_alarms_per_minute)} per minute; "
         f"in alarm {_estimate(summary.free_alarm_share, 100.0)} % of it"
     )
