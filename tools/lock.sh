@@ -17,5 +17,4 @@ compile requirements-wheel.lock --group wheel --constraints requirements.lock --
 compile requirements-peers.lock --group peers --constraints requirements.lock
 compile requirements-coupling.lock --group coupling --constraints requirements.lock
 compile requirements-foreign.lock --group foreign --constraints requirements.lock
-compile requirements-diagnosis-peers.lock --group diagnosis-peers --constraints requirements.lock
 compile requirements-site.lock --group site

@@ -77,11 +77,8 @@ def least_power(power: Numbers) -> float:
 # - correlation: the largest correlation, while its p-value (Student's t, Bonferroni over all columns) is below 1 %;
 # - bic: the largest fall of Schwarz's criterion (1978), while it falls;
 # - random_cv: the largest fall of the error in tenfold cross-validation over randomly split samples, while it falls;
-# - sindy: PySINDy's sequentially thresholded least squares over all columns at once (STLSQ, threshold a tenth of the
-#   residual's standard deviation per standard deviation of a column); causes by their coefficients.
 
 FOLDS = 10
-THRESHOLD = 0.1  # of STLSQ, both sides scaled to a standard deviation of 1
 
 Choice = Callable[[Plain, Numbers], Trial | None]
 
@@ -147,27 +144,6 @@ def by_random_cv(data: Plain, power: Numbers) -> Trial | None:
 
 
 STEPWISE: Mapping[str, Choice] = {"correlation": by_correlation, "bic": by_bic, "random_cv": by_random_cv}
-
-
-def by_sindy(data: Plain) -> list[Trial]:
-    """Causes with a coefficient that is left, the largest first."""
-    import pysindy
-
-    power = np.einsum("rc,rc->c", data.columns, data.columns)
-    every = [(number, trial) for trial in data.trials for number in trial.numbers]
-    numbers = [number for number, _ in every if power[number] > least_power(power)]
-    owner = [trial for number, trial in every if power[number] > least_power(power)]
-    scaled = data.columns[:, numbers] / np.sqrt(power[numbers] / len(data.target))
-    model = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=THRESHOLD, alpha=0.05), feature_library=pysindy.IdentityLibrary()
-    )
-    model.fit(scaled, t=1.0, x_dot=(data.target / data.target.std())[:, None])
-    size = np.abs(model.coefficients()[0])
-    named: list[Trial] = []
-    for k in np.argsort(-size):
-        if size[k] > 0.0 and owner[k].where not in [trial.where for trial in named]:
-            named.append(owner[k])
-    return named[:MOST_CAUSES]
 
 
 def shows(trial: Trial, power: Numbers) -> bool:

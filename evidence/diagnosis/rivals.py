@@ -1,13 +1,11 @@
 """`diagnose` and its rivals (rival_methods.py) on the same cases: python -m evidence.diagnosis.rivals -o FOLDER
 
 Foreign: the even cases in numpy and MuJoCo, without what refitting absorbs. The rivals work on the very residual and
-columns of `diagnose`. Needs requirements-diagnosis-peers.lock (without them sindy is left out) and
-requirements-foreign.lock. Writes FOLDER/rivals.md.
+columns of `diagnose`. Needs requirements-foreign.lock. Writes FOLDER/rivals.md.
 """
 
 from __future__ import annotations
 
-import contextlib
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -119,11 +117,9 @@ def rival_answers(case: Case) -> dict[str, Answer]:
 
 
 def answers_of(view: View) -> dict[str, Answer]:
-    """What each rival says of the residual; sindy only where it is installed."""
+    """What each rival says of the residual."""
     data = rival_methods.plain(view)
     trials = {name: rival_methods.stepwise(data, choose) for name, choose in rival_methods.STEPWISE.items()}
-    with contextlib.suppress(ModuleNotFoundError):
-        trials["sindy"] = rival_methods.by_sindy(data)
     answers = {name: Answer(_causes(trial.where for trial in named)) for name, named in trials.items()}
     parity = rival_methods.by_parity(data, moment_arms(view.data), view.series.step)
     unnamed = bool(parity.fired.any()) and not parity.causes
