@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .bounds import tail_levels
     from .counting import GRACE, DetectionScore, Event, pooled, score_detection
     from .free_motion import SETTLING, FreeRun, free_parts
-    from .reference_sensor import require_no_contact, sensed_contact
+    from .reference_sensor import require_no_contact
     from .scoring import Scored, Subject, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
     from .tuning import ContactTuning, TuneWarning
