@@ -53,11 +53,14 @@ def calibrated(folder: Path, number: int) -> Path:
 def calibration(folder: Path, number: int) -> Row:
     """What `calibrate` reports of a finger."""
     into = calibrated(folder, number)
-    pushes = json.loads((into / "calibration.json").read_text(encoding="utf-8"))["pushes"]
+    report = json.loads((into / "calibration.json").read_text(encoding="utf-8"))
+    pushes = report["pushes"]
     return {
         "finger": number,
         "sizes": {f"{size['from']:g}": (size["found"], size["events"]) for size in pushes["sizes"]},
         "alarms": pushes["false_alarms"],
+        "after": pushes["false_alarms_after_events"],
+        "promised": report["detection"]["held_out"]["limit"],
         "minutes": pushes["free_minutes"],
         "delay": pushes["median_delay_s"],
         "cpu": json.loads((into / "cpu.json").read_text(encoding="utf-8")),
@@ -69,6 +72,8 @@ def report(rows: Sequence[Row]) -> str:
         sizes = [[row["sizes"].get(f"{size:g}", (0, 0)) for row in group] for size in SIZES]
         cells = [f"{sum(found for found, _ in size)}/{sum(count for _, count in size)}" for size in sizes]
         cells.append(f"{sum(row['alarms'] for row in group)} in {sum(row['minutes'] for row in group):.1f}")
+        cells.append(str(sum(row["after"] for row in group)))
+        cells.append(", ".join(f"{row['promised'] * row['minutes'] / 60.0:.1f}" for row in group))
         cells.append(", ".join(tables.number(row["delay"], ".0f", 1e3) for row in group))
         return [name, *cells, ", ".join(f"{row['cpu']:.0f}" for row in group)]
 
@@ -77,7 +82,8 @@ def report(rows: Sequence[Row]) -> str:
         group = [row for row in rows if row["finger"] % 2 == parity]
         lines += [line(str(row["finger"]), [row]) for row in group]
         lines += [line(f"**all {name}**", group)] if len(group) > 1 else []
-    head = ["finger", "≥ 6 × rms", "3 to 6", "false alarms in min", "median delay, ms", "CPU time, s"]
+    head = ["finger", "≥ 6 × rms", "3 to 6", "false alarms in min", "within 2 s after a push", "promised"]
+    head += ["median delay, ms", "CPU time, s"]
     return tables.table(head, lines) + "\n"
 
 

@@ -66,8 +66,8 @@ MODEL = Words(
     error="",
     no_name="follows the recorded signals in a way that no known effect explains",
     left="remains: follows the signals, not explained",
-    small="These effects are in the recordings, but on test data each lowers the error by less than {least}. They are "
-    "not in the extended model.",
+    small="These effects are in the recordings, but on test data each lowers the error by less than {least}, or, if "
+    "friction builds up over a way, by no more than a friction law of another form would. They are not in the model.",
     uncertain="These effects are in the recordings, but test data do not show whether they matter: their gain may be "
     "0. They are not in the extended model.",
     source="Where the error comes from",
