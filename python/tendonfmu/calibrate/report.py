@@ -79,10 +79,14 @@ def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording]
     stretches: list[tuple[float, float, FitRecording, Flags, Numbers]] = []
     for recording in recordings:
         left, time = residual_of(after, recording), recording.time
-        for first, end in flagged_stretches(time, recording.held_out if held_out else recording.tracked):
+        known: Flags = np.isfinite(left).all(axis=1)
+        judged = np.asarray(known & (recording.held_out if held_out else recording.tracked))
+        for first, end in flagged_stretches(time, judged if judged.any() else known):
             for begin in np.arange(first, end, SHOWN):
                 rows = (time >= begin) & (time <= min(end, begin + SHOWN))
-                stretches.append((min(end - begin, SHOWN), float(np.nanmean(left[rows] ** 2)), recording, rows, left))
+                stretches.append(
+                    (min(end - begin, SHOWN), float(np.mean(left[rows & known] ** 2)), recording, rows, left)
+                )
     least = 0.5 * max(stretch[0] for stretch in stretches)
     long = sorted((stretch for stretch in stretches if stretch[0] >= least), key=lambda stretch: stretch[1])
     _, _, recording, rows, left = long[len(long) // 2]
