@@ -79,8 +79,8 @@ def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording]
     stretches: list[tuple[float, float, FitRecording, Flags, Numbers]] = []
     for recording in recordings:
         left, time = residual_of(after, recording), recording.time
-        known: Flags = np.isfinite(left).all(axis=1)
-        judged = np.asarray(known & (recording.held_out if held_out else recording.tracked))
+        known = np.asarray(np.isfinite(left).all(axis=1))
+        judged = known & (recording.held_out if held_out else recording.tracked)
         for first, end in flagged_stretches(time, judged if judged.any() else known):
             for begin in np.arange(first, end, SHOWN):
                 rows = (time >= begin) & (time <= min(end, begin + SHOWN))
