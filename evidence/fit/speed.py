@@ -41,8 +41,6 @@ ALTERNATE = 50.0  # s
 SPREAD = 0.3  # of the logarithm of each number of the truth about the description
 FILE = "recording"
 PRIOR_STD, TOLERANCE = 1.0, 0.1  # as `tendonfmu fit` has them
-GOALS = {"batch": 20.0, "ekf": 60.0}  # s
-MOST_MEMORY = 1e9  # bytes, of the product's ways
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # of what is not the product's own
 
 
@@ -245,22 +243,6 @@ def table_of(lines: list[dict[str, Any]]) -> str:
     return tables.table(head, rows)
 
 
-def misses(lines: list[dict[str, Any]]) -> list[str]:
-    """Goals that were not reached, in words."""
-    missed = []
-    for line in lines:
-        goal = GOALS.get(line["way"])
-        if goal is None:
-            continue
-        if not line["seconds_scaled"] <= goal:
-            missed.append(f"{line['what']}: {line['seconds_scaled']:.1f} s, goal {goal:g} s")
-        if not line["peak_memory"] <= MOST_MEMORY:
-            missed.append(f"{line['what']}: {line['peak_memory'] / 1e9:.2f} GB, goal {MOST_MEMORY / 1e9:g} GB")
-        if not line.get("converged", True):
-            missed.append(f"{line['what']}: not converged")
-    return missed
-
-
 def main() -> None:
     options = parser(__doc__, output=None)
     options.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
@@ -282,8 +264,6 @@ def main() -> None:
     print(table_of(lines))
     machine = f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
     print(f"\n{machine}.")
-    for miss in misses(lines):
-        print(f"MISSED {miss}")
     if given.output is not None:
         write(given.output, {"machine": machine, "ways": lines})
 
