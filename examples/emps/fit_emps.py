@@ -64,7 +64,9 @@ def fit(start: Path, file: Path, mass: float = MASS, decimation: int = DECIMATIO
     fix = ["bias.initial_torque"] if start.stem.endswith("asymmetric") else []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # residuals are not white: the same in every one of these fits
-        done = FrictionFit(start, kinematics=KINEMATICS, fix=fix).fit([read_emps(file, mass, decimation)])
+        # costs of several masses are compared: each sample counts in all of them
+        choice = FrictionFit(start, kinematics=KINEMATICS, fix=fix, effective_samples=False)
+        done = choice.fit([read_emps(file, mass, decimation)])
     return Model(mass, done.description_.data, done.cost_)
 
 

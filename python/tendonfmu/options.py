@@ -338,7 +338,12 @@ class FitOptions(Options):
     asymmetric: bool | None = option(
         None, _YES_OR_NONE, "fit the two sides of a law apart, or as one", names=("--asymmetric/--symmetric",)
     )
-    prior: float = option(1.0, Number(1e-6, 1e6), "prior: standard deviation / expected magnitude", metavar="RATIO")
+    prior: float | None = option(
+        None,
+        Number(1e-6, 1e6, optional=True),
+        "prior: standard deviation / expected magnitude [default: 1, times the root of samples by effective ones]",
+        metavar="RATIO",
+    )
     scale: Sequence[str] = option(
         (), _TEXTS, "expected magnitude, instead of the description's", metavar="PATTERN=VALUE"
     )

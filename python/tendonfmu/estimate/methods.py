@@ -49,6 +49,15 @@ class Settings:
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
 
+    @property
+    def prior(self) -> float:
+        """Return the prior's standard deviation / expected magnitude."""
+        return self.options.prior or 1.0
+
+    def prior_beside(self, share: float) -> float:
+        """Return the same where samples count for a share: a guess weighs no more because they weigh less."""
+        return self.prior / float(np.sqrt(share)) if self.options.prior is None else self.prior
+
 
 @dataclass(frozen=True)
 class FitProgress:
@@ -173,7 +182,7 @@ def learn_batch(
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
-    prior = settings.options.prior
+    prior = settings.prior
     if settings.previous is not None:
         estimator.set_known(_known_information(estimator, settings))
         prior = np.inf  # the known information contains the prior
@@ -185,6 +194,8 @@ def learn_batch(
     if any((each < 1).any() for each in weights):
         for number, (place, part) in enumerate(added):
             estimator.set_weights(number, weights[place][part.start])
+        if settings.previous is None:
+            prior = settings.prior_beside(np.mean(np.concatenate([weights[place][part] for place, part in added])))
         result = _fitted(estimator, result.z, prior, settings, watch, ", with effective samples")
         steps, passes = steps + result.steps, passes + result.passes
     return Learned(
@@ -214,7 +225,7 @@ def _known_information(estimator: Estimator, settings: Settings) -> Numbers:
     is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
     size[is_bias] = np.maximum(size[is_bias], settings.noise)
     has = np.array([unknown.path in previous.values for unknown in estimator.unknowns], dtype=bool)
-    variance = np.where(has, settings.options.change * size, settings.options.prior * scale) ** 2
+    variance = np.where(has, settings.options.change * size, settings.prior * scale) ** 2
     place = {name: k for k, name in enumerate(previous.names)}
     both = [k for k, name in enumerate(names) if name in place and has[k]]
     before = [place[names[k]] for k in both]
@@ -271,7 +282,7 @@ def learn_ekf(
             learner.begin_pass()
         innovations = _filter_once(learner, estimator, recordings, watch, number)
     z, covariance = learner.z, learner.covariance
-    plain = np.diag(1 / (settings.options.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
+    plain = np.diag(1 / (settings.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
     if settings.effective and settings.options.drift == 0:
@@ -282,7 +293,8 @@ def learn_ekf(
         first = np.array([unknown.start for unknown in learner.unknowns])
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
-        known = plain if settings.previous is None else _known_information(estimator, settings)
+        own = (settings.prior / settings.prior_beside(share)) ** 2 * plain
+        known = own if settings.previous is None else _known_information(estimator, settings)
         information = share * information
         covariance = np.asarray(np.linalg.inv(information + known), dtype=np.float64)
         z = _within(estimator, mean + covariance @ pull)
@@ -350,8 +362,6 @@ def _learner(structure: Structure, estimator: Estimator, settings: Settings, sta
         scale = np.where(np.isnan(scale), own, scale)
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
     try:
-        return Learner(
-            image, structure.group, scale, prior_std=settings.options.prior, parameter_drift=settings.options.drift
-        )
+        return Learner(image, structure.group, scale, prior_std=settings.prior, parameter_drift=settings.options.drift)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

@@ -154,7 +154,7 @@ def fit(
     fix: str | Sequence[str] = (),
     share: str | Sequence[str] = (),
     asymmetric: bool | None = None,
-    prior: float = 1.0,
+    prior: float | None = None,
     scale: str | Sequence[str] = (),
     previous: str | os.PathLike[str] | None = None,
     change: float = 0.02,
