@@ -9,7 +9,6 @@ import json
 import os
 import platform
 import re
-import resource
 import subprocess
 import sys
 import tempfile
@@ -23,7 +22,7 @@ import numpy as np
 
 from evidence import tables
 from evidence.fit.made_data import model_torques, noise_scale
-from evidence.runner import INDEX_FINGER, ROOT, parser, plain, say, write
+from evidence.runner import INDEX_FINGER, ROOT, parser, plain, write
 from tendonfmu.arrays import Array
 from tendonfmu.estimate import Choice, Estimator, FrictionFit, Structure, build_structure
 from tendonfmu.estimate.estimation import Learner
@@ -201,10 +200,7 @@ def measured(name: str, folder: Path, samples: int) -> dict[str, Any]:
 
 
 def peak_memory() -> int:
-    """Bytes, of this process."""
-    if sys.platform == "darwin":
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    # here getrusage counts what the parent had before it started this program
+    """Bytes, of this process on Linux, where getrusage counts what the parent had before it started this program."""
     known = re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text(encoding="utf-8"))
     return 1024 * int(known[1]) if known else 0
 
@@ -260,7 +256,6 @@ def main() -> None:
         make_data(Path(name), max(20.0, given.scale * FULL / RATE) + 3.0)
         for way in given.ways:
             lines.append(line_of(way, Path(name), given.scale))
-            say(f"{lines[-1]['what']}: {lines[-1].get('seconds', 0.0):.3g} s")
     print(table_of(lines))
     machine = f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
     print(f"\n{machine}.")
