@@ -341,7 +341,7 @@ class FitOptions(Options):
     prior: float | None = option(
         None,
         Number(1e-6, 1e6, optional=True),
-        "prior: standard deviation / expected magnitude [default: 1, times the root of samples by effective ones]",
+        "prior: standard deviation / expected magnitude [default: 1, wider if correlated samples count less]",
         metavar="RATIO",
     )
     scale: Sequence[str] = option(
