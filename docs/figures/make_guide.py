@@ -46,7 +46,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         tendonfmu(folder, *CALIBRATE)
-        keep(photograph(folder / "calibrated" / "calibration.html", 880), output / "calibrate.png")
+        keep(photograph(folder / "calibrated" / "calibration.html", 980), output / "calibrate.png")
         tendonfmu(folder, *DIAGNOSE)
         keep(photograph(folder / "diagnosis" / "diagnosis.html", 1130), output / "diagnose.png")
         tendonfmu(folder, *FIT)
@@ -79,7 +79,9 @@ def photograph(page: Path, height: int) -> Path:
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         raise SystemExit("make_guide.py: no Chromium found; expected chromium or google-chrome on the PATH")
-    options = ["--headless", "--no-sandbox", "--hide-scrollbars", f"--window-size=1280,{height}"]
+    # figures are drawn after the page has loaded
+    options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
+    options.append(f"--window-size=1280,{height}")
     subprocess.run([browser, *options, f"--screenshot={picture}", page.as_uri()], check=True, stderr=subprocess.DEVNULL)
     return picture
 

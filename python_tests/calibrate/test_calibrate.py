@@ -19,7 +19,7 @@ from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of
-from tendonfmu.calibrate.text import size_rows, verdict, write_calibration
+from tendonfmu.calibrate.text import size_rows, tiles, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
@@ -330,7 +330,7 @@ def test_short_recordings_are_diagnosed_whole() -> None:
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
-def report(given: float, calibrated: float, causes: int, limit: float) -> dict[str, Any]:
+def report(given: float, calibrated: float, causes: int, limit: float | None) -> dict[str, Any]:
     return {
         "error": {"as_given": [given, given], "calibrated": [calibrated, calibrated]},
         "structure": {"causes": [{}] * causes},
@@ -342,6 +342,11 @@ def test_the_verdict_is_one_sentence_with_the_figures() -> None:
     tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
     assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence
     assert "No false alarms in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
+    unknown = report(0.0142, 0.00614, 3, None)
+    unknown["detection"] |= {"confidence": 0.9, "smallest_torque": {"median": [0.01]}}
+    assert verdict(unknown)[1].endswith("27 min of free motion.")
+    values = list(tiles(unknown | {"pushes": None, "error": unknown["error"] | {"held_out": True}}))
+    assert values[1] == ("0", "in 27 min", "false alarms in free motion")
     tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
     assert tone == "bad" and "no better" in sentence
 

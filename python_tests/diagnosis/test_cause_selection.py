@@ -16,6 +16,8 @@ from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, LARGEST_SECANT, hypotheses
 from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
+from tendonfmu.diagnosis.signal_choice import lag_of
+from tendonfmu.recordings import Signals
 from tendonfmu.statistics.block_grams import standard_error
 
 Numbers = NDArray[np.float64]
@@ -323,6 +325,13 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     early = -delay - 0.001  # velocities lag by 1 ms
     assert not shows("time_delay", Place(), {"delay": 0.9 * early}) and shows("time_delay", Place(), {"delay": early})
     assert shows("gravity", Place(1), {"sine": 1e-9}) and shows("backlash", Place(2), None)
+
+
+def test_velocities_lag_behind_positions_by_half_a_sample_and_the_filter() -> None:
+    data = {"velocity_filter_cutoff": 20.0}
+    assert lag_of(data, Signals(), 2, 0.004) == pytest.approx(0.002 + 1.0 / (40.0 * np.pi))
+    assert lag_of(data, Signals(10.0), 1, 0.004) == pytest.approx(0.002), "smoothed both ways"
+    assert lag_of(data, Signals(), 3, 0.004) == 0.0, "velocities are measured"
 
 
 def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:

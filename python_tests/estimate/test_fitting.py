@@ -279,6 +279,34 @@ def test_given_numbers_that_do_better_where_nothing_was_fitted_are_kept() -> Non
     assert held_out["rms"] == pytest.approx(held_out["start_rms"])
 
 
+@pytest.mark.parametrize(
+    ("said", "known", "is_prior"),
+    [("auto", True, True), ("auto", False, False), ("guessed", True, False), ("estimated", False, True)],
+)
+def test_numbers_that_were_estimated_are_the_prior(said: str, known: bool, is_prior: bool) -> None:
+    """A description that says how uncertain its friction is was written by a fit."""
+    finger = json.loads(json.dumps(moved_start()))
+    if known:
+        finger["contact"]["uncertainty"] = [[[0.01] * (len(finger["tendons"]) + 3)] for _ in finger["joints"]]
+    fit = shared(finger, start_values=said, change=1e-4).fit(made_recording())
+    report = fit.report_["given_numbers"]
+    assert report["start"] == ("estimated" if is_prior else "guessed") and not report["kept"]
+    assert report["moved"] + len(report["stayed"]) == len(fit.parameters_)
+    off = [abs(value / get_number(finger, path) - 1.0) for path, value in fit.parameters_.items()]
+    assert (max(off) < 0.02) == is_prior
+    paragraph = report["paragraph"]
+    assert ("were estimated before" in paragraph) == is_prior and f"{report['moved']} number" in paragraph
+
+
+@pytest.mark.parametrize("swing", [0.0, 0.5])
+def test_a_guess_that_is_fitted_to_one_load_may_be_worse_under_another(swing: float) -> None:
+    recording = made_recording()
+    force = recording.groups["tendon_force"]
+    force[:] = 5.0 * (1.0 + swing * np.sin(recording.time))[:, None]
+    said = shared(moved_start()).fit(recording).report_["given_numbers"]["paragraph"]
+    assert ("under another load" in said) == (swing == 0.0)
+
+
 # --- structure --------------------------------------------------------------------------------------------------------
 
 

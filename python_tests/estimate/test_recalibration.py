@@ -170,6 +170,19 @@ def test_from_a_description_numbers_count_as_known_to_within_the_change(
         assert found.standard_errors_[coulomb] == pytest.approx(0.03 * found.parameters_[coulomb], rel=0.02)
 
 
+@pytest.mark.parametrize("prior", [None, 0.05])
+def test_a_guess_weighs_no_more_because_samples_weigh_less(prior: float | None) -> None:
+    """Unless the user says how much it weighs."""
+    recording = held_noise(7, 10.0, 0.05)
+    found, plain = (
+        fitted(moved_start(), recording, method="ekf", prior=prior, effective_samples=each) for each in (True, False)
+    )
+    assert sum(found.report_["innovations"]["effective"]["worth"]) < 0.5 * len(recording) * 2
+    assert np.allclose(found.z_, plain.z_, rtol=1e-6) == (prior is None)
+    if prior is None:
+        assert (np.diag(found.z_covariance_) > 1.5 * np.diag(plain.z_covariance_)).all()
+
+
 def test_what_may_have_changed_more_moves_more(previous: tuple[FrictionFit, Path, Path]) -> None:
     _, report, _ = previous
     changed = copy.deepcopy(TRUTH)

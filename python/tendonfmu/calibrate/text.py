@@ -76,12 +76,10 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     before, after = (mnm(together(error[name])) for name in (_first(report), "calibrated"))
     data = "held-out parts" if error["held_out"] else "test recordings"
     yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
-    sure = f"; with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
-    yield (
-        str(found["alarms"]),
-        f"in {found['minutes']:.2g} min",
-        f"false alarms in free motion{'' if found['limit'] is None else sure}",
-    )
+    meaning = "false alarms in free motion"
+    if found["limit"] is not None:
+        meaning += f"; with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+    yield str(found["alarms"]), f"in {found['minutes']:.2g} min", meaning
     least = min(detection["smallest_torque"]["median"])
     yield mnm(least), "mN·m", "smallest sudden change of a joint torque that is reported, half of the time"
     pushes = report["pushes"]
@@ -166,7 +164,7 @@ def push_sentence(report: Report) -> str:
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
     many = "no false alarm" if alarms == 0 else counted(alarms, "false alarm")
-    if after := pushes["false_alarms_after_events"]:
+    if after := pushes.get("false_alarms_after_events"):  # earlier folders do not say
         many += f" ({after} within 2 s after a push)"
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
