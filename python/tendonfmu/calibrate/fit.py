@@ -47,6 +47,7 @@ from tendonfmu.recordings import FitRecording, Recording, Signals
 DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
 JUDGED = 45.0  # s, in all, to judge it on
 SHORTEST = 15.0  # s, least length of a stretch
+CLEARLY_LESS = 0.9  # of the error of a fit to all samples, which one to sliding samples must stay below
 
 
 @dataclass(frozen=True)
@@ -69,29 +70,41 @@ def fit_all(
     uncertainty: bool = True,
     only_sliding: bool = False,
 ) -> CalibratedFit:
-    """Fit a diagnosed finger to all recordings of free motion. Raises InputError."""
+    """Fit a diagnosed finger to all recordings of free motion, or only where everything slides if that is better.
+
+    Contact is detected in stuck samples, too, so these count unless they mislead clearly. Raises InputError.
+    """
     data = signals.description(finger.data)
     if not unknowns(data):
         return CalibratedFit(finger.data, (), ())
-    estimated = estimation_recordings(replace(finger, data=data), recordings, signals)
+    start = replace(finger, data=data)
+    estimated = estimation_recordings(start, recordings, signals)
     grid = make_grid(estimated)
     events, out = events_of(data, estimated, grid, seed)
-    if only_sliding:
-        sliding = without_stuck(finger, recordings, signals)
-        estimated = estimation_recordings(replace(finger, data=data), sliding, signals)
-    estimated = [without_blocks(recording, k, grid, out) for k, recording in enumerate(estimated)]
-    clean = predicted_of(data, estimated, grid, series_of(data, estimated, grid, out))
-    structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
-    fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-    online = replace(fitted, data=signals.restored(fitted.data, finger.data))
-    if only_sliding:
-        online = replace(online, data=settled(online.data, lambda data: squared_residual(data, recordings)))
-    if uncertainty and np.isfinite(learned.covariance).all():
-        judged = [evaluate(data, fitted.data, recording) for recording in estimated]
-        directions, _ = parameter_uncertainty(structure, learned, fitted.data, judged)
-        level = (finger.data["contact"] or {}).get("uncertainty_level")
-        online = with_uncertainty(online, directions, level)
-    return CalibratedFit(online.data, events, tuple(learned.warnings))
+
+    def fitted(chosen: Sequence[FitRecording]) -> CalibratedFit:
+        kept = [without_blocks(recording, k, grid, out) for k, recording in enumerate(chosen)]
+        clean = predicted_of(data, kept, grid, series_of(data, kept, grid, out))
+        structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
+        result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
+        online = replace(result, data=signals.restored(result.data, finger.data))
+        if uncertainty and np.isfinite(learned.covariance).all():
+            judged = [evaluate(data, result.data, recording) for recording in kept]
+            directions, _ = parameter_uncertainty(structure, learned, result.data, judged)
+            level = (finger.data["contact"] or {}).get("uncertainty_level")
+            online = with_uncertainty(online, directions, level)
+        return CalibratedFit(online.data, events, tuple(learned.warnings))
+
+    whole = fitted(estimated)
+    if not only_sliding:
+        return whole
+
+    def square(of: Data) -> float:
+        return squared_residual(of, recordings)
+
+    alone = fitted(estimation_recordings(start, without_stuck(finger, recordings, signals), signals))
+    alone = replace(alone, data=settled(alone.data, square))
+    return alone if square(alone.data) < CLEARLY_LESS**2 * square(whole.data) else whole
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:
