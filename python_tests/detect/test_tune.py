@@ -135,6 +135,20 @@ def test_bounds_keep_a_known_rate() -> None:
     assert np.median(true) > 0.3 * WISHED, "bounds far higher than the rate asks for"
 
 
+@pytest.mark.parametrize(("size", "given", "expected"), [(3.0, None, 1.0), (3.0, 3.0, 3.0), (0.003, None, None)])
+def test_an_uncertainty_larger_than_the_residual_does_not_hide_pushes(
+    size: float, given: float | None, expected: float | None
+) -> None:
+    """Its level falls to 1 where that lets lighter pushes through, unless the description says a level."""
+    data = json.loads(INDEX.read_text(encoding="utf-8"))
+    joints, tendons = len(data["joints"]), len(data["tendons"])
+    data["contact"] |= {"uncertainty": [[[size] * (tendons + 3)]] * joints, "uncertainty_level": given}
+    tuning = ContactTuning(data, false_alarms_per_hour=WISHED)
+    with pytest.warns(TuneWarning):
+        contact = tuning.tune([FREE, FREE_X4]).description_.data["contact"]
+    assert contact.get("uncertainty_level") == expected
+
+
 def free_part(source: str, force: float, minutes: float) -> FreePart:
     samples = round(60 * 100 * minutes)
     time = np.arange(samples) / 100.0

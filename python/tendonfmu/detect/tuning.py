@@ -59,6 +59,8 @@ STUCK_TIME_PRESLIDING = 0.06  # s, if presliding models how friction reverses af
 RELEASE = {"release_ratio": 1.0, "hold_time": 0.05}  # 1, s
 # min of free motion: 60 of the slow means that contact.drift compares with, more than a fit could adapt to
 LEAST_DRIFT = 10.0
+USUAL_LEVEL, LOW_LEVEL = 3.0, 1.0  # standard deviations of the modelled friction in the residual's bound
+CLEAR = 0.05  # of the lightest push found, by which the low level must be better
 START_SHARE = 1.0  # bias.start_share: before the start all friction may point in either direction
 _STEP, _STEPS = 1.05, 12  # factor on the level, and most steps, until the running finger keeps the rate
 _DIGITS = 6
@@ -239,10 +241,9 @@ class ContactTuning(Configured):
     def _choose(self) -> None:
         """Choose the lines of `contact.innovation` and `contact.threshold`, and their levels."""
         contact = self.start_.data["contact"]
-        uncertainty = contact.get("uncertainty_level")
-        level = 3.0 if uncertainty is None else float(uncertainty)
         second = self.allowed_ // SECOND_SHARE
-        slow = search_for(self.runs_, self.cells_, "residual", self.rate_, level)
+        level = contact.get("uncertainty_level")
+        slow = self._residual(USUAL_LEVEL if level is None else float(level))
         self.searches_: dict[str, Search] = {"residual": slow}
         self.lines_: dict[str, Line] = {}
         self.levels_: dict[str, Level] = {}
@@ -256,7 +257,14 @@ class ContactTuning(Configured):
         line = searched_line(fast, self.allowed_)
         if self.progress is not None:
             self.progress(1, 25)
-        self.lines_["residual"] = behind = given_line(slow, SHARES, second)
+        behind = given_line(slow, SHARES, second)
+        if slow.uncertain is not None and level is None and self.cells_.groups > 1:
+            low = self._residual(LOW_LEVEL)
+            other = given_line(low, SHARES, second)
+            if other.mean_log < behind.mean_log - CLEAR:
+                behind, self.searches_["residual"] = other, low
+                self._data["contact"] = {**self._data["contact"], "uncertainty_level": LOW_LEVEL}
+        self.lines_["residual"] = behind
         self.levels_["residual"] = above = level_of(behind, self.cells_, second)
         if self.method == "cusum":
             line = evidence_line(fast, line, [run.part for run in self.runs_], self.options.evidence_time)
@@ -270,6 +278,10 @@ class ContactTuning(Configured):
         self.lines_["innovation"] = line
         self.levels_["innovation"] = level_of(line, self.cells_, self.allowed_, others, held)
         self.searches_["innovation"] = fast
+
+    def _residual(self, level: float) -> Search:
+        """Prepare the search of the residual's bound beside `level` standard deviations of the modelled friction."""
+        return search_for(self.runs_, self.cells_, "residual", self.rate_, level)
 
     def _choose_drift(self, allowed: int) -> None:
         """Choose the line of `contact.drift` for slow loads; jumps of friction and stiction do not raise it."""
