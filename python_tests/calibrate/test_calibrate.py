@@ -19,7 +19,7 @@ from tendonfmu.calibrate import calibration
 from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
 from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import errors_of
-from tendonfmu.calibrate.text import size_rows, tiles, verdict, write_calibration
+from tendonfmu.calibrate.text import calibration_page, size_rows, tiles, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError
@@ -308,6 +308,20 @@ def test_the_shown_motion_is_the_typical_one_of_the_test(calibrated: tuple[Calib
     report = calibrated[0].report["error"]
     assert after < 0.9 * before < np.nanstd(shown.torque)
     assert after == pytest.approx(together(report["calibrated"]), rel=0.3)
+
+
+def test_the_shown_push_is_a_found_one(calibrated: tuple[Calibration, Path]) -> None:
+    """Its torque rises from its onset on, and the delay is the median one."""
+    result, folder = calibrated
+    push = result.push
+    assert push is not None and push.joint in result.report["joints"]
+    time, felt = np.array(push.time), np.abs(push.felt)
+    assert felt[(time > push.delay) & (time < push.end)].max() > 3.0 * np.median(felt[time < 0.0])
+    assert 0.0 <= push.delay < push.end and push.delay == pytest.approx(
+        result.report["pushes"]["median_delay_s"], abs=0.1
+    )
+    assert "contact reported after" in (folder / "calibration.html").read_text(encoding="utf-8")
+    assert "Labelled pushes" in calibration_page(replace(result, push=None))  # none is found
 
 
 def test_long_recordings_are_diagnosed_in_part_and_judged_on_another() -> None:

@@ -30,6 +30,7 @@ from tendonfmu.calibrate.report import (
     structure_of,
     tuning_of,
     typical_motion,
+    typical_push,
 )
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
@@ -49,7 +50,7 @@ from tendonfmu.recordings import (
     read_recording,
     require_noise,
 )
-from tendonfmu.report import MotionShown, diagnosis_page, together, write_diagnosis
+from tendonfmu.report import MotionShown, PushShown, diagnosis_page, together, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
 Options = CalibrateOptions  # its name in earlier versions
@@ -57,6 +58,7 @@ USUAL = CalibrateOptions()
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
 HELD = Held(0.2, 10.0)  # part of the recordings to measure the errors on if there are no tests
+BIAS_TIME = 2.0  # s: a fitted model needs no faster bias, and that learns pushes (docs/evidence/detection.md)
 NOTHING_ASKED: dict[str, Any] = {
     "verdict": "not done: the structure is that of the earlier calibration",
     "causes": [],
@@ -84,6 +86,7 @@ class Calibration:
     # the diagnosis; None if this call did not make it, because it was resumed or not asked for
     diagnosis: Diagnosis | None
     shown: MotionShown  # what it leaves of a typical stretch of unseen motion
+    push: PushShown | None  # a typical push of those that it finds
 
 
 def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
@@ -151,7 +154,7 @@ def calibrate(
     report, data = run.report()
     report["seconds"] = perf_counter() - begun
     shown = typical_motion(case.finger.data, data, case.judged, not case.tests)
-    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed, shown)
+    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed, shown, run.push)
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
@@ -235,6 +238,7 @@ class _Run:
         self._steps = Steps(folder, {**case.made_from, **_of_all(options)})
         self._seconds: dict[str, float] = {}
         self.diagnosed: Diagnosis | None = None
+        self.push: PushShown | None = None
 
     def report(self) -> tuple[dict[str, Any], Data]:
         """Return the report, and the calibrated description."""
@@ -255,6 +259,8 @@ class _Run:
             pushed = self._step(
                 "pushes", "score", files, lambda step: self._score(tuned, fitted["error"]["calibrated"], step)
             )
+            example = pushed.pop("example", None)  # earlier folders have none
+            self.push = None if example is None else PushShown(**example)
         report = {
             "format": FORMAT,
             "finger": case.finger.name,
@@ -319,12 +325,15 @@ class _Run:
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
         case = self._case
-        nominal, extended = (self._fitted(lacks, name) for name in ("nominal", "extended"))
+        smoothed = Signals(**lacks["smoothing"])
+        extended = self._fitted(lacks, "extended", smoothed)
+        # without presliding, raw signals often serve the given structure better: it gets the better ones
+        nominal = [case.errors(self._fitted(lacks, "nominal", signals).data) for signals in {smoothed, Signals()}]
         error = {
             "held_out": not case.tests,
             "bias_only": case.errors(None),
             "as_given": case.errors(case.finger.data),
-            "fitted": case.errors(nominal.data),
+            "fitted": min(nominal, key=together),
             "calibrated": case.errors(extended.data),
         }
         touched = [
@@ -358,13 +367,13 @@ class _Run:
             "warnings": [*fitted.warnings, kept],
         }
 
-    def _fitted(self, lacks: dict[str, Any], name: str) -> CalibratedFit:
+    def _fitted(self, lacks: dict[str, Any], name: str, signals: Signals) -> CalibratedFit:
         """Fit the nominal or the extended description to all recordings."""
         case, options = self._case, self._options
         return fit_all(
             described(case.finger, lacks[name]),
             case.free,
-            Signals(**lacks["smoothing"]),
+            signals,
             FitSettings(threads=options.jobs, path=case.finger.path),
             given=case.finger.data,
             seed=options.seed,
@@ -379,6 +388,7 @@ class _Run:
             false_alarms_per_hour=options.false_alarms_per_hour,
             confidence=options.confidence,
             kinematics=options.kinematics,
+            bias_time=BIAS_TIME,
             progress=lambda done, total: step(done / max(total, 1)),
         )
         with warnings.catch_warnings():
@@ -398,4 +408,5 @@ class _Run:
             **{key: report[key] for key in OF_SCORE},
             "sizes": detect_score_report.by_size(scored, left),
             "warnings": list(scored.warnings),
+            "example": typical_push(scored),
         }

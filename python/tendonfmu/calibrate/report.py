@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.detect import ContactTuning, contact_at_rest, tune_report
+from tendonfmu.detect import ContactTuning, Scored, contact_at_rest, tune_report
 from tendonfmu.diagnosis import Diagnosis, residual_of
 from tendonfmu.estimate import residuals
 from tendonfmu.recordings import FitRecording, flagged_stretches, rms
 from tendonfmu.report import MotionShown, cards_of, names_of
 
 SHOWN = 20.0  # s
+BEFORE, AFTER, POINTS = 0.5, 1.0, 1000  # s around a push that is shown, and samples of it at most
 OF_TUNING = (
     "method",
     "false_alarms_per_hour",
@@ -92,6 +93,34 @@ def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording]
     _, _, recording, rows, left = long[len(long) // 2]
     given = residual_of(before, recording)
     return MotionShown(recording.path.name, recording.time[rows], recording.target[rows], given[rows], left[rows])
+
+
+def typical_push(scored: Scored) -> dict[str, Any] | None:
+    """Return the found push with the median delay, as `PushShown` takes it; None if none is found."""
+    found = [
+        (event.delay, event, track)
+        for track, score in zip(scored.tracks, scored.scores, strict=True)
+        for event in score.events
+        if event.found
+    ]
+    if not found:
+        return None
+    _, event, track = sorted(found, key=lambda each: each[0])[len(found) // 2]
+    time, felt = track.recording.time, track.outputs["compensated_torque"]
+    during = (time >= event.onset) & (time <= event.end)
+    j = int(np.argmax(np.abs(felt[during] if track.external is None else track.external[during]).max(axis=0)))
+    rows = np.flatnonzero((time >= event.onset - BEFORE) & (time <= event.end + AFTER))
+    rows = rows[:: max(1, len(rows) // POINTS)]
+    return {
+        "recording": track.recording.path.name,
+        "onset": event.onset,
+        "joint": scored.subject.finger.joint_names[j],
+        "end": event.end - event.onset,
+        "delay": event.delay,
+        "time": (time[rows] - event.onset).tolist(),
+        "felt": felt[rows, j].tolist(),
+        "sensor": None if track.external is None else track.external[rows, j].tolist(),
+    }
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:

@@ -11,7 +11,18 @@ from tendonfmu.calibrate.calibration import DIAGNOSIS, Calibration
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
-from tendonfmu.report import Row, Table, capital, drawn, friction_figure, motion_sheet, render, rounded, together
+from tendonfmu.report import (
+    Row,
+    Table,
+    capital,
+    drawn,
+    friction_figure,
+    motion_sheet,
+    push_sheet,
+    render,
+    rounded,
+    together,
+)
 
 Report = Mapping[str, Any]
 
@@ -234,9 +245,12 @@ def calibration_page(calibration: Calibration) -> str:
     """Return the HTML text of the page."""
     report = calibration.report
     tone, sentence = verdict(report)
+    sheets = [motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]
+    if calibration.push is not None:
+        sheets.append(push_sheet(calibration.push))
     return render(
         "calibration.html.jinja",
-        drawn([motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]),
+        drawn(sheets),
         report=report,
         finger=friction_figure(calibration.data),
         tone=tone,

@@ -1,7 +1,8 @@
-"""What a calibrated model leaves of a typical stretch of motion, as curves."""
+"""What a calibrated model leaves of a typical stretch of motion, and a push that it finds, as curves."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,20 @@ class MotionShown:
     torque: Numbers  # of the tendons, less a known load, N·m [N, n]
     before: Numbers  # what the model that was given leaves of it, before the bias sees the sample, N·m [N, n]
     after: Numbers  # what the calibrated model leaves, N·m [N, n]
+
+
+@dataclass(frozen=True)
+class PushShown:
+    """A push that is found, at the joint that bears most of it; times from its onset, s."""
+
+    recording: str
+    onset: float  # in the recording, s
+    joint: str
+    end: float
+    delay: float
+    time: Sequence[float]  # [N]
+    felt: Sequence[float]  # the compensated torque, N·m [N]
+    sensor: Sequence[float] | None  # that of a reference sensor, N·m [N]
 
 
 def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
@@ -54,4 +69,34 @@ def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
         panels=panels,
         caption="A stretch with a typical error, which no number was fitted to. What is left is what the finger would "
         "feel although nothing touches it.",
+    )
+
+
+def push_sheet(shown: PushShown) -> Sheet:
+    """Draw what is felt at a joint while it is pushed, and when contact is reported."""
+    factor, unit = torque_unit(float(np.max(np.abs(shown.felt))))
+    time, curves = 1e3 * np.asarray(shown.time), [("after", shown.felt)]
+    if shown.sensor is not None:
+        curves.insert(0, ("measured", shown.sensor))
+    panel = Panel(
+        title=shown.joint,
+        note=f"contact reported after {1e3 * shown.delay:.0f} ms",
+        alt=f"Joint {shown.joint}: the torque felt during a push; contact is reported {1e3 * shown.delay:.0f} ms after "
+        "its onset.",
+        x_label="time from the onset (ms)",
+        y_label=f"torque ({unit})",
+        size="wide",
+        curves=tuple(Curve(style, time, factor * np.asarray(values)) for style, values in curves),
+        stripes={"label_stripe": [(0.0, 1e3 * shown.end)]},
+        line=1e3 * shown.delay,
+    )
+    keys = [("after", "torque felt: the torque that the tendons have to hold, less friction")]
+    keys += [("measured", "reference sensor")] if shown.sensor is not None else []
+    return Sheet(
+        section="push",
+        name="push",
+        title=f"{shown.recording}, at {shown.onset:.1f} s",
+        keys=(*keys, ("label_stripe", "pushed, as labelled")),
+        panels=[panel],
+        caption="The push with the median delay of those that are found. The line is where contact is reported.",
     )
