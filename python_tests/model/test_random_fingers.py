@@ -175,3 +175,18 @@ def test_booleans_and_nan_never_agree_by_tolerance() -> None:
     for name in ("joint_contact", "slack"):
         assert not agreement.compare(outputs, changed(outputs, name, 9, 0.0)).agrees
     assert not agreement.compare(outputs, changed(outputs, "bias_torque", 9, np.nan)).agrees
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_zero_shifts_the_readings_of_its_tendon(source: int) -> None:
+    """Angles and contact at rest take the readings less their zeros; with measured angles nothing else changes."""
+    description, recording = random_case(3)
+    zeros = 1e-3 * np.arange(1, len(description["tendons"]) + 1)
+    bare = [{key: value for key, value in tendon.items() if key != "zero"} for tendon in description["tendons"]]
+    moved = [tendon | {"zero": zero} for tendon, zero in zip(bare, zeros, strict=True)]
+    shifted = recording | {"tendon_position": recording["tendon_position"] + zeros}
+    for other in OTHERS[:1]:
+        as_is = other(description | {"tendons": bare}, recording, source)
+        out = other(description | {"tendons": moved}, shifted, source)
+        for name, values in as_is.items():
+            np.testing.assert_allclose(out[name], values, rtol=0.0, atol=1e-7 * max(1.0, np.abs(values).max()))

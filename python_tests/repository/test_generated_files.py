@@ -128,7 +128,9 @@ def test_the_compiled_runtime_has_the_numbers_of_the_table() -> None:
         "tendons": [{"stiffness": 5000, "moment_arms": [0.01]}],
         "contact": {"threshold": [0.1]},
     }
+    tendon = {"stiffness": 5000, "moment_arms": [0.01]}
     full = plain | {
+        "tendons": [tendon | {"zero": 0.0}, tendon],
         "position_filter": {"noise": [1e-4]},
         "velocity_threshold": {"hysteresis": 0.0},
         "sensor_fault": {},
@@ -139,7 +141,7 @@ def test_the_compiled_runtime_has_the_numbers_of_the_table() -> None:
             "method": "innovation",
             "innovation": {"time": 0.1, "threshold": [0.1]},
             "friction_bound": {},
-            "uncertainty": [[[None] * 4]],
+            "uncertainty": [[[None] * 5]],
             "deviation": [None],
             "hold_time": 0.0,
             "drift": {"threshold": [0.1]},

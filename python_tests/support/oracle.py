@@ -103,6 +103,9 @@ class FingerOracle:
         dt = 0.0 if first else time - self.time
         out = Step(forced or {})
         x0 = inputs.get("tendon_position")
+        if x0 is not None:
+            x0 = np.asarray(x0, dtype=float) - np.array([tendon.zero for tendon in self.tendons])
+            inputs = {**inputs, "tendon_position": x0}
         inputs = self.extensions.signals(time, inputs, first)
         f0 = np.asarray(inputs["tendon_force"], dtype=float)
 

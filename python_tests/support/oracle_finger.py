@@ -83,6 +83,7 @@ class Tendon:
     """Constants of one tendon; pulley[j] is F_A of joint j, edge[j] is F_B before joint j."""
 
     stiffness: float
+    zero: float
     bidirectional: bool
     pulley: list[Effect | None]
     edge: list[Effect | None]
@@ -183,6 +184,7 @@ def read_tendons(description: Mapping[str, Any]) -> list[Tendon]:
     return [
         Tendon(
             stiffness=float(entry["stiffness"]),
+            zero=float(given(entry, "zero", 0.0)),
             bidirectional=bool(given(entry, "bidirectional", False)),
             pulley=read_effects(entry.get("pulley_friction"), n, threshold),
             edge=read_effects(entry.get("edge_friction"), n, threshold),

@@ -150,7 +150,15 @@ def random_finger(seed: int) -> Description:
         description["contact"]["threshold_per_force"] = rng.uniform(0.0, 1e-3, n).tolist()
     if rng.random() < 0.5:
         description["extensions"] = []
+    add_zeros(np.random.default_rng([seed, 11]), description["tendons"])
     return description
+
+
+def add_zeros(rng: np.random.Generator, tendons: list[Description]) -> None:
+    """Give some tendons of every fourth finger a zero of their positions."""
+    if rng.random() < 0.25:
+        for tendon in tendons:
+            tendon |= {"zero": rng.uniform(-2e-3, 2e-3)} if rng.random() < 0.7 else {}
 
 
 def friction_scale(R: Array) -> Array:

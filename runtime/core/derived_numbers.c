@@ -80,6 +80,7 @@ static void derive_tendon(derivation* d, const model_item* item) {
         to->moment_arm[j * lanes + item->tendon] = values[j];
       }
       break;
+    case ITEM_TENDON_ZERO: to->tendon_zero[item->tendon] = values[0]; break;
     case ITEM_PULLEY_FRICTION:
       pack_law(to->pulley_law + ((item->joint + 1) * lanes + item->tendon) * LAW_NUMBERS, values, item->law);
       break;
@@ -306,6 +307,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .release_time = -1.0,
                                                .rest_innovation_rate = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
+                                               .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
                                                .has_start_share = (options & MODEL_HAS_START_SHARE) != 0,
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
                                                .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,

@@ -52,6 +52,7 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->stiffness = take_numbers(c, lanes);
   d->inverse_stiffness = take_numbers(c, lanes);
   d->bidirectional = take_numbers(c, lanes);
+  d->tendon_zero = take_numbers(c, lanes);
   d->moment_arm = take_numbers(c, n * lanes);
   d->inverse_routing = take_numbers(c, n * lanes);
   d->pulley_law = take_numbers(c, n * lanes * LAW_NUMBERS);

@@ -32,7 +32,7 @@ typedef struct finger_settings {
   double noise_time;       /* < 0: noise per sample */
   int has_start_share;
   double start_share; /* of friction as it stood before the first sample */
-  int has_initial_torque;
+  int has_initial_torque, has_tendon_zero;
   double hysteresis;
   int filters_position;
   double jerk_density; /* rad²/s⁵ */
@@ -95,6 +95,7 @@ typedef struct derived_numbers {
   double* stiffness;         /* [M] k; 0 in spare lanes */
   double* inverse_stiffness; /* [M] 1/k */
   double* bidirectional;     /* [M] 1 or 0 */
+  double* tendon_zero;       /* [M] taken from x0 */
   double* moment_arm;        /* [n × M] r_ij */
   double* inverse_routing;   /* [n × M] R⁺ */
   double* pulley_law;     /* [n × M × LAW_NUMBERS] row j: the pulley whose tendon moves with slot j, at joint j−1 */

@@ -19,6 +19,7 @@ typedef enum model_item_kind {
   ITEM_LOAD_FRICTION, /* joints[j].load_friction */
   ITEM_STIFFNESS, /* tendons[i].stiffness */
   ITEM_MOMENT_ARMS, /* tendons[i].moment_arms[j] */
+  ITEM_TENDON_ZERO, /* tendons[i].zero */
   ITEM_PULLEY_FRICTION, /* tendons[i].pulley_friction[j] */
   ITEM_EDGE_ANGLES, /* tendons[i].edge_friction[j].angles[k] */
   ITEM_EDGE_FRICTION, /* tendons[i].edge_friction[j] */

@@ -48,6 +48,7 @@ static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* wor
   const uint32_t n = w->shape->joints;
   emit(w, (model_item){.kind = ITEM_STIFFNESS, .tendon = tendon}, 1);
   emit(w, (model_item){.kind = ITEM_MOMENT_ARMS, .tendon = tendon}, n);
+  emit(w, (model_item){.kind = ITEM_TENDON_ZERO, .tendon = tendon}, w->shape->options & MODEL_HAS_TENDON_ZERO ? 1 : 0);
   ++word; /* flags */
   for (uint32_t j = 0; j < n; ++j) {
     emit_law(w, (model_item){.kind = ITEM_PULLEY_FRICTION, .tendon = tendon, .joint = j}, *word++);

@@ -25,5 +25,6 @@ enum {
   MODEL_HAS_DRIFT = 1 << 21,
   MODEL_BOUNDS_PRESLIDING = 1 << 22, /* beside MODEL_HAS_FRICTION_BOUND */
   MODEL_HAS_SENSOR_FAULT = 1 << 23,
-  MODEL_OPTION_BITS = (1 << 24) - 1
+  MODEL_HAS_TENDON_ZERO = 1 << 24, /* of any tendon; then every one has it */
+  MODEL_OPTION_BITS = (1 << 25) - 1
 };

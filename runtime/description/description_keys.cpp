@@ -13,7 +13,7 @@ const std::vector<std::string>& keys_of(const std::string& object) {
     {"", {"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault"}},
     {"joints", {"name", "cover", "friction", "load_friction"}},
     {"joints.cover", {"stiffness", "rest_angle"}},
-    {"tendons", {"name", "stiffness", "moment_arms", "pulley_friction", "edge_friction", "bidirectional"}},
+    {"tendons", {"name", "stiffness", "moment_arms", "zero", "pulley_friction", "edge_friction", "bidirectional"}},
     {"tendons.edge_friction", {"angles"}},
     {"velocity_threshold", {"tendon", "joint", "hysteresis"}},
     {"position_filter", {"noise", "jerk_density"}},
@@ -47,6 +47,7 @@ std::vector<number_key> numbers_of(const std::string& object) {
   static const std::multimap<std::string, number_key> numbers = {
     {"", {"tip", false, false, "m", MODEL_HAS_LINKS}},
     {"tendons", {"moment_arms", true, true, "m", 0}},
+    {"tendons", {"zero", false, false, "m", MODEL_HAS_TENDON_ZERO}},
     {"velocity_threshold", {"hysteresis", false, false, "1", MODEL_HAS_HYSTERESIS}},
     {"position_filter", {"noise", true, true, "rad", 0}},
     {"bias", {"initial_variance", false, false, "N2.m2", MODEL_HAS_INITIAL_VARIANCE}},

@@ -315,7 +315,10 @@ finger_shape read_shape(const json_node& document) {
   for (std::size_t i = 0; i < tendons.size(); ++i) {
     read_tendon(tendons.element(i), finger.shape.joints, finger.words);
   }
-  finger.shape.options =
+  for (std::size_t i = 0; i < tendons.size(); ++i) {
+    finger.shape.options |= given_options(tendons.element(i), "tendons");
+  }
+  finger.shape.options |=
       read_bias_options(document.member("bias"), finger.shape.joints) |
       read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
       given_options(document.member("velocity_threshold"), "velocity_threshold") |

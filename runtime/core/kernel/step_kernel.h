@@ -26,20 +26,31 @@ HOT_INLINE int row_in_range(const double* row, size_t lanes) {
   return inside == 15;
 }
 
+HOT_INLINE int uses_positions(const tendonfmu_finger* f) {
+  return (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest ||
+         f->derived.settings.watches_sensors;
+}
+
 HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
-  if (!row_in_range(s->force, f->tendon_lanes) ||
-      ((f->derived.settings.watches_rest || f->derived.settings.watches_sensors) &&
-       !row_in_range(s->position, f->tendon_lanes))) {
+  if (!row_in_range(s->force, f->tendon_lanes) || (uses_positions(f) && !row_in_range(s->position, f->tendon_lanes))) {
     return 0;
   }
   if (source == TENDONFMU_TENDON_POSITIONS) {
-    return row_in_range(s->position, f->tendon_lanes);
+    return 1;
   }
   return row_in_range(s->angle, f->joint_lanes) &&
          (source != TENDONFMU_JOINT_VELOCITIES ||
           row_in_range(s->velocity + f->joints * f->tendon_lanes, f->joint_lanes));
+}
+
+/* x0 from the reading at which all joints are at 0 */
+HOT_INLINE void take_zeros(tendonfmu_finger* f) {
+  double* position = f->scratch.position;
+  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+    quad_store(position + i, quad_sub(quad_load(position + i), quad_load(f->derived.tendon_zero + i)));
+  }
 }
 
 /* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s), 0 with a position filter */
@@ -289,6 +300,9 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
 
   if (!inputs_in_range(f)) {
     return SAMPLE_OUT_OF_RANGE;
+  }
+  if (f->derived.settings.has_tendon_zero && uses_positions(f)) {
+    take_zeros(f);
   }
   if (f->derived.settings.watches_rest) {
     copy_row(f->scratch.motor_position, f->scratch.position, f->tendon_lanes);
