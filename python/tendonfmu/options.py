@@ -329,6 +329,9 @@ class FitOptions(Options):
     holdout: float = option(0.0, Number(0.0, 0.9), "share of the time not used in the fit", metavar="SHARE")
     holdout_block: float = option(10.0, Number(1.0), "longest block left out", metavar="SECONDS")
     kinematics: int = _kinematics()
+    routing: bool = option(
+        False, _YES, "first learn moment arms, stiffness and zeros, by joint_position", names=("--routing",)
+    )
     # patterns of paths: which numbers are estimated, kept, and share one value
     only: Sequence[str] = option((), _TEXTS, "estimate only these numbers; may be repeated", metavar="PATTERN")
     fix: Sequence[str] = option((), _TEXTS, "keep these numbers fixed; may be repeated", metavar="PATTERN")

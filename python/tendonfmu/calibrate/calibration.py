@@ -46,9 +46,12 @@ from tendonfmu.recordings import (
     Held,
     Signals,
     admit,
+    learn_routing,
     prepare,
     read_recording,
     require_noise,
+    routed,
+    routing_entry,
 )
 from tendonfmu.report import MotionShown, PushShown, diagnosis_page, together, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
@@ -170,6 +173,7 @@ class _Case:
     tests: list[FitRecording]
     pushes: list[Path]
     sentences: list[str]
+    routing: dict[str, Any] | None  # what was learned of it and changed; None if it was as described
 
     @property
     def judged(self) -> list[FitRecording]:
@@ -218,13 +222,16 @@ def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], o
     read, others, touched = ([read_recording(path) for path in group] for group in (free, tests, pushes))
     for recording in (*read, *others):
         require_no_contact(recording)
+    given, learned = finger, learn_routing(finger, [*read, *others])
+    finger, moved = routed(given, learned)
+    routing = routing_entry(given, learned) if moved else None
     sentences = admit(finger, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
     held = Held() if tests else HELD
     seen = [prepare(finger, recording, options.kinematics, held) for recording in read]
     unseen = [prepare(finger, recording, options.kinematics, Held()) for recording in others]
     require_noise(finger, seen)
     check_unseen(read, others)
-    return _Case(finger, previous, seen, unseen, pushes, sentences)
+    return _Case(finger, previous, seen, unseen, pushes, sentences, routing)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -267,6 +274,7 @@ class _Run:
             "joints": case.finger.joint_names,
             "recordings": [recording_of(recording) for recording in case.free],
             "tests": [recording_of(recording) for recording in case.tests],
+            "routing": case.routing,
             "error": fitted["error"],
             "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
             "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},

@@ -188,6 +188,7 @@ def push_sentence(report: Report) -> str:
 def lines(report: Report) -> Iterator[str]:
     """Yield the lines for the terminal."""
     yield verdict(report)[1]
+    yield from (report.get("routing") or {}).get("sentences", ())
     if report["pushes"] is not None:
         yield push_sentence(report)
     for sentence in report["next"]:

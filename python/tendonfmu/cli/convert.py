@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from tendonfmu.recordings import Inspection, Proposal
 
+FINGER = "finger"  # what `describe` makes from names alone
 TABLE = "table"  # the format whose columns a map describes
 INSPECT = "inspect"
 JOINT = "joint"
@@ -218,9 +219,19 @@ def _written(output: Path, count: int, duration: float, notes: list[str]) -> dic
 
 @command()
 def describe(
-    what: Annotated[str, typer.Argument(metavar="joint", help="a servo, one axis of an arm, a linear drive")],
+    what: Annotated[
+        str, typer.Argument(metavar="joint|finger", help="a servo, an axis of an arm, a linear drive; or a finger")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.json", help="description to write")],
-    name: Annotated[str, typer.Option(help="name of the machine and of its joint")],
+    name: Annotated[str, typer.Option(help="name of the machine, or of the finger")],
+    joints: Annotated[str | None, typer.Option(metavar="NAME,NAME", help="finger: its joints, base first")] = None,
+    tendon: Annotated[
+        list[str] | None,
+        typer.Option(metavar='"NAME JOINT+ JOINT-"', help="finger: a tendon and the joints that its pull turns"),
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option(metavar="TABLE.txt", help="finger: a line for each tendon, in place of --tendon")
+    ] = None,
     recording: Annotated[
         Path | None, typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet")
     ] = None,
@@ -244,18 +255,23 @@ def describe(
         float, typer.Option(min=1e-4, max=10.0, help="m; 1 if the recording has torque as tendon force")
     ] = 1.0,
 ) -> None:
-    """Write the description of a machine with one joint, for logs of torque and angle.
+    """Write a description to begin with: of a machine with one joint, or of a finger.
 
-    Its numbers are starting values; fit estimates them. With --recording they
-    come from the machine's own motion.
+    Its numbers are starting values; fit estimates them. With --recording those
+    of one joint come from the machine's own motion. The moment arms, stiffness
+    and zeros of a finger are learned from joint encoders by calibrate, or by
+    fit --routing.
     """
     from tendonfmu.files import check_format, check_output, write_text
     from tendonfmu.recordings import describe_recorded_joint, description_text, joint_description, read_recording
 
-    if what != JOINT:
-        raise InputError(f"describe: {what!r}: unknown kind of machine; expected {JOINT}")
+    if what not in (JOINT, FINGER):
+        raise InputError(f"describe: {what!r}: unknown kind of machine; expected {JOINT} or {FINGER}")
     if not name.strip() or any(ord(letter) < 32 for letter in name):
-        raise InputError(f"describe {JOINT}: --name = {name!r}: expected a name")
+        raise InputError(f"describe {what}: --name = {name!r}: expected a name")
+    if what == FINGER:
+        _describe_finger(output, name, joints, tendon or [], table)
+        return
     numbers = {"torque": torque, "speed": speed, "coulomb": coulomb, "viscous": viscous, "inertia": inertia}
     if recording is None:
         check_output(output)
@@ -282,5 +298,25 @@ def describe(
     say(
         f"{output}: {name}, coulomb {law['coulomb']:g} N.m, viscous {law['viscous']:g} N.m.s/rad to start from; "
         "`tendonfmu fit` estimates them"
+    )
+    print_json(lambda: document)
+
+
+def _describe_finger(output: Path, name: str, joints: str | None, tendons: list[str], table: Path | None) -> None:
+    """Write the description of a finger whose numbers nobody knows yet."""
+    from tendonfmu.files import check_output, counted, write_text
+    from tendonfmu.model import description_text, starting_finger
+
+    if not joints or (table is None) == (not tendons):
+        raise InputError(f"describe {FINGER}: expected --joints, and either --tendon for each tendon or --table")
+    inputs = [] if table is None else [table]
+    check_output(output, *inputs)
+    text = "" if table is None else table.read_text(encoding="utf-8")
+    lines = tendons or [line for line in text.splitlines() if line.strip()]
+    document = starting_finger(name, [joint.strip() for joint in joints.split(",")], lines)
+    write_text(output, description_text(document))
+    say(
+        f"{output}: {name}, {counted(len(document['joints']), 'joint')} and {counted(len(lines), 'tendon')}; every "
+        "number is a guess: `tendonfmu calibrate` learns them from motion with joint_position"
     )
     print_json(lambda: document)

@@ -29,6 +29,7 @@ def build_report(
     options: Mapping[str, Any],  # options that shape the result, and `method`
     warnings: Sequence[str],
     numbers: Sequence[Fitted],
+    routing: Mapping[str, Any] | None,  # what was learned of it; None if not asked for
     movement: Mapping[str, Any],  # what became of the given numbers
     innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
     training: Sequence[Evaluation],
@@ -56,6 +57,7 @@ def build_report(
             "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
             "matrix": _correlation(learned.covariance),
         },
+        "routing": routing,
         "given_numbers": dict(movement),
         "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
         "residual": {

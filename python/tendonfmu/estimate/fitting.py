@@ -42,7 +42,7 @@ from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers
-from tendonfmu.model import FingerSource, description_text, read_finger
+from tendonfmu.model import Finger, FingerSource, description_text, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
     FitRecording,
@@ -57,6 +57,9 @@ from tendonfmu.recordings import (
     read_recordings,
     refuse_stillness,
     require_noise,
+    require_routing,
+    routed,
+    routing_entry,
     slack_sentences,
 )
 
@@ -153,6 +156,11 @@ class FrictionFit(Configured):
         self.finished_ = False
         self.unfinished_: Unfinished | None = None
         finger = read_finger(self.finger)
+        given, compared_with = listed_sources(recordings), listed_sources(compare)
+        check_given_once(given, compared_with)
+        self.routing_: dict[str, Any] | None = None
+        if options.routing:
+            finger, self.routing_ = _with_routing(finger, given)
         previous = None if options.previous is None else read_previous_fit(Path(options.previous))
         if previous is not None:
             finger = with_previous_values(finger, previous)
@@ -162,8 +170,6 @@ class FrictionFit(Configured):
         self.structure_ = build_structure(finger, choice)
         self.start_ = self.structure_.start
         held = Held(options.holdout, options.holdout_block, strict=True)
-        given, compared_with = listed_sources(recordings), listed_sources(compare)
-        check_given_once(given, compared_with)
         training, others = read_recordings(given), read_recordings(compared_with, "compare")
         if not training:
             raise InputError("no recording; expected at least one")
@@ -260,6 +266,7 @@ class FrictionFit(Configured):
             options=_reported(self.options),
             warnings=self.warnings_,
             numbers=self.numbers_,
+            routing=self.routing_,
             movement=movement(
                 self.numbers_, self.options.change if is_estimated else None, keeps, one_load(self.training_)
             ),
@@ -335,6 +342,12 @@ class FrictionFit(Configured):
         """Return the fitted description as JSON, as `tendonfmu fit -o` writes it."""
         self._require_fitted()
         return description_text(self.description_.data)
+
+
+def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, dict[str, Any]]:
+    """Return the finger with the routing that the recordings show, and what the report says of it."""
+    learned = require_routing(given, read_recordings(sources))
+    return routed(given, learned)[0], routing_entry(given, learned)
 
 
 def _with_present_names(options: Mapping[str, Any]) -> dict[str, Any]:

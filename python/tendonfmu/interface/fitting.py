@@ -150,6 +150,7 @@ def fit(
     holdout: float = 0.0,
     holdout_block: float = 10.0,
     kinematics: int = 1,
+    routing: bool = False,
     only: str | Sequence[str] = (),
     fix: str | Sequence[str] = (),
     share: str | Sequence[str] = (),
@@ -183,6 +184,8 @@ def fit(
         Share of the time that is not used in the fit, and longest block left out (s).
     kinematics
         1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
+    routing
+        Whether moment arms, stiffness and zeros are learned first, by the measured joint positions.
     only, fix, share
         Patterns of the numbers to estimate, to keep, and of the laws that share one set of values; `share` also takes
         "tendons" and "pulleys". A pattern is a path in which * stands for anything.

@@ -65,5 +65,6 @@ if TYPE_CHECKING:
     from .plausibility import Finding, description_findings, is_direct_drive
     from .routing_geometry import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing, finger_drawing
     from .routing_svg import Mark, finger_svg
+    from .starting_finger import starting_finger
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -32,9 +32,9 @@ class Finding:
     """Something that is wrong, or probably is."""
 
     severity: str  # "error" (no fit of it is sound) or "warning"
-    # of a recording: "sign", "exchange", "scale", "clock", "unfit", "columns", "pushing", "against", "held", "clipped",
-    # "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover", "friction", "angles"
-    # or "threshold"
+    # of a recording: "sign", "exchange", "scale", "clock", "unfit", "routing", "columns", "pushing", "against", "held",
+    # "clipped", "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover",
+    # "friction", "angles" or "threshold"
     kind: str
     path: Path  # the recording or description
     columns: tuple[str, ...]  # columns of the recording, or keys of the description

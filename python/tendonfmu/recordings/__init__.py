@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .converters.table import Conversion, convert_table
     from .faults import gaps
     from .match import UNFIT_FOR_SEARCH, admit, belongs
-    from .match_text import check_report, recording_report, refusal_report
+    from .match_text import check_report, recording_report, refusal_report, routing_entry
     from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences
     from .recording import (
         GROUP_PER,
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         track,
         whiteness,
     )
+    from .routing import learn_routing, require_routing, routed
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import Signals, smoothing_of, zero_phase
 

@@ -30,6 +30,7 @@ from tendonfmu.recordings.kinematics import (
     FEWEST,
     GAIN,
     SAME,
+    UNITS,
     Balance,
     Correction,
     Repair,
@@ -38,6 +39,7 @@ from tendonfmu.recordings.kinematics import (
     velocity_corrections,
 )
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
+from tendonfmu.recordings.routing import TendonRouting, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
@@ -53,6 +55,7 @@ AGAINST = 0.15  # of the power at a joint; sound recordings have 0.6 and more, t
 STILL = 0.02  # rad; joints that move less are not judged
 SLACK = 0.01  # of the largest force of a tendon; below, it is slack and does not follow its joints
 OPPOSED = 0.5  # the sum of torque and reference leaves less than this share of what the difference leaves
+SAME_RATIO = 1.1  # between the ratios of all springs and that of a unit
 LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
@@ -166,6 +169,12 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
     balance, moves = _balance(finger, recording)
     if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
+        learned = [] if done else _routing(finger, recording)
+        if routed(finger, learned)[1]:
+            severity = "error" if left > unfit else "warning"
+            return [text.routing(recording.path, finger, each, severity) for each in learned if each.differs], recording
+        if (unit := _unit_of_forces(learned)) is not None:
+            return [text.force_unit(recording.path, balance.group("tendon_force"), *unit)], recording
         if left > UNFIT:  # a correction that removes only a part of the misfit is a guess
             worst = done[0].misfit if done else left
             return [text.unfit(recording.path, worst, "error" if worst > unfit else "warning", balance)], recording
@@ -183,6 +192,24 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         if correction is not None:
             recording = _mended(recording, correction)
     return findings, recording
+
+
+def _routing(finger: Finger, recording: Recording) -> list[TendonRouting]:
+    """Learn the routing; where a tendon pushes, the zero of its force is wrong, and nothing is known of its own."""
+    pushes = (recording.groups["tendon_force"] < 0.0).mean(axis=0) > PUSHES
+    return [
+        replace(each, zero=replace(each.zero, is_known=False)) if pushes[each.tendon] else each
+        for each in learn_routing(finger, [recording])
+    ]
+
+
+def _unit_of_forces(learned: Sequence[TendonRouting]) -> tuple[float, str] | None:
+    """Return the factor and name of the unit of the forces if all springs seem as much too stiff or too soft."""
+    ratios = [each.stiffness.described / each.stiffness.value for each in learned if each.stiffness.is_known]
+    if not ratios or len(ratios) < len(learned) or max(ratios) > SAME_RATIO * min(ratios):
+        return None
+    near = (unit for unit in UNITS["tendon_force"] if 1 / SAME_RATIO < float(np.median(ratios)) / unit[0] < SAME_RATIO)
+    return next(near, None)
 
 
 def _likeliest(finger: Finger, recording: Recording, repair: Repair) -> Repair:

@@ -12,11 +12,12 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.files import are, counted, percent
-from tendonfmu.model import Finding
+from tendonfmu.model import Finding, Finger
 from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.faults import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording
+from tendonfmu.recordings.routing import Learned, TendonRouting, routed
 
 FORMAT = "tendonfmu-check-1"
 SAME = 1e-6  # relative difference of two factors of one unit
@@ -146,6 +147,78 @@ def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
         'into the map "unit": "m" and "scale", the radius of its pulley in m'
     )
     return Finding(severity, "unfit", path, (f"tendon_position[{worst}]",), seen, probably, write)
+
+
+def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -> Finding:
+    """Describe numbers of a tendon that the joint positions contradict."""
+    i = learned.tendon
+    seen = f"tendon {finger.tendon_names[i]}: " + "; ".join(routing_sentences(finger, learned))
+    write = "learn them with tendonfmu fit --routing or tendonfmu calibrate"
+    return Finding(
+        severity,
+        "routing",
+        path,
+        (f"tendon_position[{i + 1}]",),
+        seen,
+        "numbers of the description that nobody measured",
+        write,
+    )
+
+
+def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
+    """Yield what is off at a tendon: arms and stiffness in per cent of the described ones, the zero in mm."""
+    for j, arm in learned.arms.items():
+        if arm.differs:
+            yield f"moment arm at joint {finger.joint_names[j]} is {_off(arm)} than described"
+        if j in learned.varying:
+            share = percent(learned.varying[j])
+            yield f"moment arm at joint {finger.joint_names[j]} changes by {share} with its angle"
+    if learned.stiffness.differs:
+        yield f"stiffness is {_off(learned.stiffness)} than described ({learned.stiffness.value:.4g} N/m)"
+    if (zero := learned.zero).differs:
+        off = zero.value - zero.described
+        force = -off * learned.stiffness.value
+        yield f"zero is off by {1e3 * off:.4g} ± {1e3 * zero.half:.2g} mm, or that of its force by {force:.3g} N"
+
+
+def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str, Any]:
+    """Report what was learned of the routing: every number, and sentences on what is off and what is not known."""
+    changed = {number.path for number in routed(finger, learned)[1]}
+    sentences = [
+        f"routing: tendon {finger.tendon_names[each.tendon]}: {'; '.join(said)}"
+        for each in learned
+        if (said := list(routing_sentences(finger, each)))
+    ]
+    unknown = [path for each in learned for path in each.unknown]
+    if unknown:
+        sentences.append(f"routing: the motion does not tell {', '.join(unknown)}; the described values stay")
+    numbers = [
+        {
+            "path": number.path,
+            "described": number.described,
+            "value": number.value if number.is_known else None,
+            "half_width": number.half if number.is_known else None,
+            "known": number.is_known,
+            "changed": number.path in changed,
+        }
+        for each in learned
+        for number in each.numbers
+    ]
+    return {"numbers": numbers, "sentences": sentences or ["routing: as described"]}
+
+
+def _off(number: Learned) -> str:
+    """Say by how much a number is larger or smaller: "9.1 to 11 % larger"."""
+    ends = [100.0 * (number.value + side * number.half) / number.described - 100.0 for side in (-1.0, 1.0)]
+    low, high = (f"{value:.3g}" for value in sorted(map(abs, ends)))
+    return f"{low if low == high else f'{low} to {high}'} % {'larger' if sum(ends) > 0 else 'smaller'}"
+
+
+def force_unit(path: Path, columns: Sequence[str], factor: float, unit: str) -> Finding:
+    """Describe forces whose unit the stretch of the springs contradicts."""
+    correction = Correction("scale", tuple(columns), factor, unit)
+    seen = "the springs stretch as if all of them were by the same factor stiffer or softer than described"
+    return _of_correction(path, correction, seen, f"{_cause(correction)}, or stiffness in another unit than N/m")
 
 
 def against(path: Path, share: Numbers, joints: Sequence[str], turning: Sequence[Correction]) -> Finding:

@@ -105,6 +105,7 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     rounds = "" if report["method"] == "ekf" else f", {counted(report['passes'], 'pass', 'passes')} over the data"
     yield f"{method}{rounds}, {report['seconds']:.3g} s."
     yield from _how_well(tables)
+    yield from (report.get("routing") or {}).get("sentences", ())
     if "given_numbers" in report:  # reports of earlier versions have none
         yield report["given_numbers"]["paragraph"]
     count, of = report["identified"]["count"], report["identified"]["of"]
@@ -282,6 +283,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
     if sum(worth) < sum(samples):
         by_joint = ", ".join(f"{count:.0f}" for count in worth)
         yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
+    yield from (report["routing"] or {}).get("sentences", ())
     yield report["given_numbers"]["paragraph"]
     if report["uncertainty"]:
         yield _uncertainty(report["uncertainty"])

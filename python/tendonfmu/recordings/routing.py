@@ -1,0 +1,321 @@
+"""Moment arms, stiffness and zeros of the tendons, learned from recordings with joint encoders.
+
+Every sample of a taut tendon satisfies x0 = zero + R q + f0/k, whatever friction, contact and weight are. A regression
+of x0 on q and f0 therefore gives the tendon's row of R, 1/k and its zero. Both sides are noisy: the noise of q and f0,
+measured around a smooth curve, is taken out of their moments, else large noise would make the numbers too small
+(W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
+that are read some milliseconds apart do no harm. The intervals are those of sums over blocks of 2 s, so that they hold
+for correlated residuals, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import stdtrit
+
+from tendonfmu.arrays import Flags, Indices, Numbers
+from tendonfmu.errors import InputError
+from tendonfmu.model import Finger, finger_from_data
+from tendonfmu.recordings.faults import gaps, still_runs
+from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.signal_noise import FEWEST, white_noise
+from tendonfmu.recordings.smoothing import zero_phase
+
+BLOCK = 2.0  # s; longer than residuals of sensors are correlated
+FEWEST_BLOCKS = 8
+LEVEL = 0.975  # of Student's t: intervals of 95 %
+SPEED_CUTOFF = 10.0  # Hz, of the speeds
+SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
+KNOWN = 0.3  # of a number; one with a wider interval is not determined
+OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
+LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
+VARIES = 0.03  # of an arm, by which it changes over the motion
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A number that recordings show: its estimate, half of its 95 % interval, and what is described."""
+
+    path: str
+    value: float
+    half: float
+    described: float
+    is_known: bool  # whether the recordings determine it
+    material: float  # a smaller difference is none
+
+    @property
+    def differs(self) -> bool:
+        """Whether the described number is another one."""
+        off = abs(self.value - self.described)
+        return self.is_known and off > max(self.half, self.material)
+
+
+@dataclass(frozen=True)
+class TendonRouting:
+    """What recordings show of a tendon's way to the joints."""
+
+    tendon: int  # from 0
+    arms: Mapping[int, Learned]  # by joint, from 0; of the joints that it passes
+    stiffness: Learned
+    zero: Learned
+    varying: Mapping[int, float]  # joints at which the arm changes with the angle, by so much of it over the motion
+
+    @property
+    def numbers(self) -> list[Learned]:
+        """All its numbers."""
+        return [*self.arms.values(), self.stiffness, self.zero]
+
+    @property
+    def differs(self) -> bool:
+        """Whether any of its numbers is another one than described."""
+        return any(number.differs for number in self.numbers)
+
+    @property
+    def unknown(self) -> list[str]:
+        """Paths of the numbers that the motion cannot tell."""
+        return [number.path for number in self.numbers if not number.is_known]
+
+
+def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
+    """Learn the routing of every tendon from the recordings with joint positions.
+
+    Parameters
+    ----------
+    finger
+        Says which tendon passes which joint (a moment arm that is not 0), and the numbers to compare with.
+    recordings
+        Those without `joint_position` do not count.
+
+    Returns
+    -------
+    list of TendonRouting
+        In the order of the tendons, without those that are slack or whose recordings are too short.
+    """
+    measured = [each for each in recordings if "joint_position" in each.groups and len(each) >= FEWEST]
+    samples = [found for recording in measured if (found := _samples(recording)) is not None]
+    if not samples:
+        return []
+    learned = (_of_tendon(finger, i, samples) for i in range(len(finger.tendon_names)))
+    return [each for each in learned if each is not None]
+
+
+def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
+    """Learn the routing, which was asked for. Raises InputError if the recordings do not show it."""
+    learned = learn_routing(finger, recordings)
+    if not learned:
+        raise InputError(
+            f"{recordings[0].path}: no routing can be learned; expected joint_position, and "
+            f"{FEWEST_BLOCKS * BLOCK:g} s of motion with taut tendons"
+            if recordings
+            else "no recording; expected at least one"
+        )
+    if any(_is_absurd(number) for each in learned for number in each.numbers if number.is_known):
+        raise InputError(
+            f"{recordings[0].path}: the columns do not belong to the description, so no routing can be learned; "
+            "tendonfmu check says what is wrong"
+        )
+    return learned
+
+
+def routed(finger: Finger, learned: Sequence[TendonRouting]) -> tuple[Finger, list[Learned]]:
+    """Return the finger with the numbers that differ, and these; the given one if its columns must be wrong."""
+    known = [number for each in learned for number in each.numbers if number.is_known]
+    if any(_is_absurd(number) for number in known):
+        return finger, []
+    moved = [number for number in known if number.differs]
+    if not moved:
+        return finger, []
+    data = {**finger.data, "tendons": [dict(tendon) for tendon in finger.data["tendons"]]}
+    for each in learned:
+        tendon = data["tendons"][each.tendon]
+        arms = list(tendon["moment_arms"])
+        for j, number in each.arms.items():
+            arms[j] = _rounded(number) if number.differs else arms[j]
+        tendon["moment_arms"] = arms
+        tendon |= {"stiffness": _rounded(each.stiffness)} if each.stiffness.differs else {}
+        tendon |= {"zero": _rounded(each.zero)} if each.zero.differs else {}
+    return finger_from_data(data, finger.path), moved
+
+
+def _is_absurd(number: Learned) -> bool:
+    if number.path.endswith("zero"):
+        return False
+    ratio, most = number.value / number.described, LARGEST["stiffness" in number.path]
+    return not 1.0 / most < ratio < most
+
+
+def _rounded(number: Learned) -> float:
+    """Round to a digit more than its interval shows."""
+    digits = int(np.ceil(np.log10(max(abs(number.value) / max(number.half, 1e-15), 1.0)))) + 2
+    return float(f"{number.value:.{digits}g}")
+
+
+# --- samples ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """What the regression reads of a recording: signals [N, m] and [N, n], their noise, and blocks [N]."""
+
+    position: Numbers
+    force: Numbers
+    angle: Numbers
+    position_speed: Numbers
+    force_speed: Numbers
+    force_noise: Numbers
+    angle_noise: Numbers
+    block: Indices
+    sound: Flags  # [N, m] no sensor of the tendon, and no encoder, is held
+
+
+def _samples(recording: Recording) -> _Samples | None:
+    groups, time = recording.groups, recording.time
+    try:
+        noise = {name: white_noise(time, groups[name]) for name in ("tendon_force", "joint_position")}
+    except InputError:  # gaps everywhere
+        return None
+    return _Samples(
+        groups["tendon_position"],
+        groups["tendon_force"],
+        groups["joint_position"],
+        _speeds(time, groups["tendon_position"]),
+        _speeds(time, groups["tendon_force"]),
+        noise["tendon_force"],
+        noise["joint_position"],
+        np.floor((time - time[0]) / BLOCK).astype(np.int64),
+        _changing(time, groups["tendon_force"])
+        & _changing(time, groups["tendon_position"])
+        & np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None],
+    )
+
+
+def _changing(time: Numbers, values: Numbers) -> Flags:
+    """Return the samples [N, c] in which a column does not repeat one value for long."""
+    changing = np.ones(values.shape, dtype=bool)
+    for k, column in enumerate(values.T):
+        for begin, end in still_runs(time, column):
+            changing[begin:end, k] = False
+    return changing
+
+
+def _speeds(time: Numbers, values: Numbers) -> Numbers:
+    """Compute the smooth derivatives [N, c] between gaps; 0 in pieces too short to smooth."""
+    speeds = np.zeros_like(values)
+    for begin, end in pairwise([0, *gaps(time), len(time)]):
+        if end - begin >= FEWEST:
+            rate = 1.0 / float(np.median(np.diff(time[begin:end])))
+            smooth = zero_phase(values[begin:end], SPEED_CUTOFF, rate)
+            speeds[begin:end] = np.gradient(smooth, time[begin:end], axis=0)
+    return speeds
+
+
+# --- one tendon -------------------------------------------------------------------------------------------------------
+
+
+def _of_tendon(finger: Finger, i: int, samples: Sequence[_Samples]) -> TendonRouting | None:
+    tendon = finger.data["tendons"][i]
+    arms = np.asarray(tendon["moment_arms"], dtype=float)
+    joints = np.flatnonzero(arms)
+    force = np.concatenate([each.force[:, i] for each in samples])
+    sound = np.concatenate([each.sound[:, i] for each in samples])
+    taut = np.asarray((np.abs(force) > SLACK * np.abs(force).max()) & sound)
+    first = np.cumsum([0, *(int(each.block[-1]) + 1 for each in samples)])
+    block = np.concatenate([each.block + at for each, at in zip(samples, first[:-1], strict=True)])[taut]
+    if not taut.any() or len(np.unique(block)) < FEWEST_BLOCKS or not force.any():
+        return None
+    angle = np.concatenate([each.angle[:, joints] for each in samples])[taut]
+    speeds = [
+        np.concatenate([each.position_speed[:, i] for each in samples])[taut],
+        np.concatenate([each.force_speed[:, i] for each in samples])[taut],
+    ]
+    position = np.concatenate([each.position[:, i] for each in samples])[taut]
+    size = [float(len(each.block)) for each in samples]
+    noise = [np.average([each.angle_noise[j] ** 2 for each in samples], weights=size) for j in joints]
+    noise.append(np.average([each.force_noise[i] ** 2 for each in samples], weights=size))
+    columns = np.column_stack([angle, force[taut], *speeds])
+    found = _regression(columns, np.array([*noise, 0.0, 0.0]), position, block)
+    if found is None:
+        return None
+    value, half = found
+    is_whole = all(np.isfinite(half[: len(joints)]))  # else the zero has a part of a joint that stands still
+    learned = {
+        int(j): _arm(f"tendons[{i + 1}].moment_arms[{j + 1}]", value[k], half[k], float(arms[j]))
+        for k, j in enumerate(joints)
+    }
+    at = len(joints)
+    arm = float(np.abs(arms).max())
+    return TendonRouting(
+        i,
+        learned,
+        _stiffness(f"tendons[{i + 1}].stiffness", value[at], half[at], float(tendon["stiffness"])),
+        Learned(
+            f"tendons[{i + 1}].zero",
+            value[-1],
+            half[-1],
+            float(tendon.get("zero") or 0.0),
+            is_whole and half[-1] < KNOWN * arm,
+            OTHER[2] * arm,
+        ),
+        dict(_varying(columns, np.array([*noise, 0.0, 0.0]), position, block, joints)),
+    )
+
+
+def _arm(path: str, value: float, half: float, described: float) -> Learned:
+    return Learned(path, value, half, described, half < KNOWN * abs(value), OTHER[0] * abs(described))
+
+
+def _stiffness(path: str, compliance: float, half: float, described: float) -> Learned:
+    is_known = half < KNOWN * compliance
+    value = 1.0 / compliance if compliance > 0.0 else described
+    return Learned(path, value, half * value**2, described, is_known, OTHER[1] * described)
+
+
+def _varying(
+    columns: Numbers, noise: Numbers, position: Numbers, block: Indices, joints: Indices
+) -> Iterator[tuple[int, float]]:
+    """Yield (joint, share) where the arm changes with the joint's angle: x0 then has a part with its square."""
+    count = len(joints)
+    middle = columns[:, :count].mean(axis=0)
+    squares = (columns[:, :count] - middle) ** 2
+    found = _regression(np.column_stack([columns, squares]), np.append(noise, np.zeros(count)), position, block)
+    if found is None:
+        return
+    value, half = found
+    for k, j in enumerate(joints):
+        bend, arm = value[columns.shape[1] + k], abs(value[k])
+        change = 2.0 * abs(bend) * float(np.ptp(columns[:, k])) / max(arm, 1e-12)
+        if abs(bend) > 1.5 * half[columns.shape[1] + k] and change > VARIES and half[k] < KNOWN * arm:
+            yield int(j), change
+
+
+def _regression(
+    columns: Numbers, noise: Numbers, target: Numbers, block: Indices
+) -> tuple[list[float], list[float]] | None:
+    """Regress on noisy columns and a constant, which comes last: estimates [p + 1] and halves of their intervals."""
+    # columns: [N, p]; noise: [p] variances of the columns; target: [N]; block: [N]
+    used = columns.var(axis=0) > np.maximum(4.0 * noise, 1e-24)  # others stand still; what they do is not known
+    middle, scale = columns[:, used].mean(axis=0), columns[:, used].std(axis=0)
+    design = np.column_stack([(columns[:, used] - middle) / scale, np.ones(len(columns))])
+    of_noise = np.diag(np.append(noise[used] / scale**2, 0.0))
+    moments = design.T @ design - len(design) * of_noise
+    _, number = np.unique(block, return_inverse=True)
+    blocks, free = int(number.max()) + 1, int(number.max()) + 1 - design.shape[1]
+    if free < 1 or np.linalg.eigvalsh(moments)[0] < 1e-9 * len(design):
+        return None
+    inverse = np.linalg.inv(moments)
+    beta = inverse @ (design.T @ target)
+    scores = np.zeros((blocks, len(beta)))
+    np.add.at(scores, number, design * (target - design @ beta)[:, None])
+    scores += np.bincount(number)[:, None] * (of_noise @ beta)
+    covariance = inverse @ (scores.T @ scores) @ inverse * blocks / free
+    turn = np.diag(np.append(1.0 / scale, 1.0))
+    turn[-1, :-1] = -middle / scale
+    value, half = np.zeros(len(used) + 1), np.full(len(used) + 1, np.inf)
+    at = np.append(used, True)
+    value[at] = turn @ beta
+    half[at] = stdtrit(free, LEVEL) * np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
+    return value.tolist(), half.tolist()

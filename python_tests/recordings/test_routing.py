@@ -1,0 +1,230 @@
+"""Moment arms, stiffness and zeros are learned from joint encoders, with intervals that hold."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from command import Call
+from repository_paths import ROOT
+from tendonfmu.calibrate.calibration import Options, _read
+from tendonfmu.model import Finger, finger_from_data, read_finger
+from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
+
+INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
+FREE = ROOT / "examples" / "demo_recording" / "index_finger_free.parquet"
+STEP = 1e-6  # m, of the motors' encoders
+ARMS = np.array([[0.009, 0.006], [-0.008, -0.007], [0.010, -0.005]])
+STIFFNESS = np.array([3000.0, 4000.0, 6000.0])
+ZEROS = np.array([0.0125, 0.0, -0.002])
+
+
+@pytest.fixture(scope="module")
+def index() -> tuple[Finger, Recording]:
+    return read_finger(INDEX), read_recording(FREE)
+
+
+def changed(finger: Finger, **numbers: float) -> Finger:
+    """The index finger with all arms, all stiffnesses and the zero of the third tendon off."""
+    data = json.loads(json.dumps(dict(finger.data)))
+    for i, tendon in enumerate(data["tendons"]):
+        tendon["moment_arms"] = [
+            arm * (1 + numbers.get("arms", 0.0) * (-1) ** (i + j)) for j, arm in enumerate(tendon["moment_arms"])
+        ]
+        tendon["stiffness"] *= numbers.get("stiffness", 1.0)
+    return finger_from_data(data)
+
+
+def made_up(
+    seed: int, encoder: float = 1e-4, curved: float = 0.0, still: bool = False, stiff: float = 1.0
+) -> tuple[Finger, Recording]:
+    """A minute at 100 Hz of a finger that shares no code with the rest, and its true description."""
+    draws = np.random.default_rng(seed)
+    time = np.arange(6000) / 100.0
+    phases, rates = draws.uniform(0.0, 6.0, (2, 3)), draws.uniform(0.2, 0.9, (2, 3))
+    angle = np.stack(
+        [
+            0.4 * np.sin(rate[:, None] * time + phase[:, None]).sum(axis=0)
+            for rate, phase in zip(rates, phases, strict=True)
+        ],
+        axis=1,
+    )
+    if still:
+        angle[:, 1] = 0.3
+    force = 12.0 + 6.0 * np.sin(draws.uniform(0.3, 1.5, 3) * time[:, None] + draws.uniform(0, 6, 3))
+    force += 2.0 * np.sign(np.gradient(angle[:, :1], axis=0))  # friction that turns round
+    position = angle @ ARMS.T + force / (stiff * STIFFNESS) + ZEROS
+    position[:, 0] += curved * angle[:, 0] ** 2
+    groups = {
+        "tendon_force": force + 0.05 * draws.standard_normal(force.shape),
+        "tendon_position": STEP * np.round(position / STEP),
+        "joint_position": angle + encoder * draws.standard_normal(angle.shape),
+    }
+    data = {
+        "format": "tendonfmu-finger-1",
+        "name": "made_up",
+        "joints": [{"name": "near"}, {"name": "far"}],
+        "tendons": [
+            {"stiffness": k, "moment_arms": arms, "zero": zero}
+            for k, arms, zero in zip((stiff * STIFFNESS).tolist(), ARMS.tolist(), ZEROS.tolist(), strict=True)
+        ],
+        "contact": {"threshold": [0.1, 0.1]},
+    }
+    return finger_from_data(data), Recording(Path("made_up.csv"), time, groups)
+
+
+@pytest.mark.parametrize("encoder", [1e-5, 1e-2])
+def test_intervals_cover_the_truth(encoder: float) -> None:
+    """In 95 of 100 cases, and with coarse encoders, too, whose noise would make the arms too small."""
+    covered = []
+    for seed in range(20):
+        finger, recording = made_up(seed, encoder)
+        numbers = [number for each in learn_routing(finger, [recording]) for number in each.numbers]
+        assert len(numbers) == 12 and all(number.is_known for number in numbers)
+        covered += [abs(number.value - number.described) <= number.half for number in numbers]
+    assert 0.90 <= np.mean(covered) <= 0.99
+
+
+def test_a_finger_begun_wrong_gets_its_routing_back(index: tuple[Finger, Recording]) -> None:
+    """Arms off by 20 % and stiffness by a factor of 2: within 1 and 5 %, zeros within 3 steps of the encoder."""
+    finger, recording = index
+    given = changed(finger, arms=0.2, stiffness=2.0)
+    found, moved = routed(given, learn_routing(given, [recording]))
+    assert len(moved) == 8 + int(np.count_nonzero(finger.moment_arms))
+    np.testing.assert_allclose(found.moment_arms, finger.moment_arms, rtol=0.01)
+    stiffness = [[tendon["stiffness"] for tendon in each.data["tendons"]] for each in (found, finger)]
+    np.testing.assert_allclose(*stiffness, rtol=0.05)
+    assert all(abs(tendon.get("zero") or 0.0) < 3.0 * STEP for tendon in found.data["tendons"])
+
+
+def test_what_is_right_stays(index: tuple[Finger, Recording]) -> None:
+    finger, recording = index
+    assert routed(finger, learn_routing(finger, [recording])) == (finger, [])
+    assert not belongs(finger, [recording])
+
+
+def test_a_zero_is_found_and_said(index: tuple[Finger, Recording]) -> None:
+    finger, recording = index
+    position = recording.groups["tendon_position"] + np.where(np.arange(8) == 2, 0.0125, 0.0)
+    moved = replace(recording, groups={**recording.groups, "tendon_position": position})
+    (finding,) = belongs(finger, [moved])
+    assert (finding.kind, finding.severity) == ("routing", "warning")
+    assert "tendon mcp_extensor_radial: zero is off by 12.5 ± " in finding.line()
+    found, _ = routed(finger, learn_routing(finger, [moved]))
+    assert found.data["tendons"][2]["zero"] == pytest.approx(0.0125, abs=3.0 * STEP)
+    assert not belongs(found, [moved])
+
+
+def test_arm_stiffness_and_unit_are_named(index: tuple[Finger, Recording]) -> None:
+    finger, recording = index
+    lines = [finding.line() for finding in belongs(changed(finger, arms=0.1, stiffness=0.625), [recording])]
+    assert len(lines) == 8
+    assert "moment arm at joint mcp_abduction is 9.09 to 9.1 % smaller than described" in lines[0]
+    assert "stiffness is 59.9 to 60 % larger than described" in lines[1]
+    grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
+    (unit,) = belongs(finger, [replace(recording, groups=grams)])
+    assert unit.severity == "error" and '"unit": "gf"' in unit.line()
+
+
+def test_a_unit_of_forces_shows_in_stiff_springs_too() -> None:
+    """Whose stretch is too small a part of the positions for the balance of the columns."""
+    finger, recording = made_up(5, encoder=1e-5, stiff=20.0)
+    assert not belongs(finger, [recording])
+    grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
+    (unit,) = belongs(finger, [replace(recording, groups=grams)])
+    assert (unit.kind, unit.severity) == ("scale", "error") and '"unit": "gf"' in unit.line()
+
+
+def test_what_the_motion_cannot_tell_stays() -> None:
+    finger, recording = made_up(3, still=True)
+    learned = learn_routing(finger, [recording])
+    assert learned[0].unknown == ["tendons[1].moment_arms[2]", "tendons[1].zero"]
+    assert routed(finger, learned)[1] == []
+    slack = {**recording.groups, "tendon_force": recording.groups["tendon_force"] * [1.0, 0.0, 1.0]}
+    assert [each.tendon for each in learn_routing(finger, [replace(recording, groups=slack)])] == [0, 2]
+    alone = {name: values for name, values in recording.groups.items() if name != "joint_position"}
+    assert learn_routing(finger, [replace(recording, groups=alone)]) == []
+
+
+def test_an_arm_that_varies_is_seen_and_no_other() -> None:
+    finger, recording = made_up(4, curved=1e-3)
+    learned = learn_routing(finger, [recording])
+    assert [list(each.varying) for each in learned] == [[0], [], []]
+    assert learned[0].varying[0] == pytest.approx(
+        2e-3 * np.ptp(recording.groups["joint_position"][:, 0]) / 0.009, rel=0.1
+    )
+
+
+def test_reversed_columns_are_not_taken_for_the_routing(index: tuple[Finger, Recording]) -> None:
+    finger, recording = index
+    flipped = {
+        **recording.groups,
+        "tendon_position": recording.groups["tendon_position"] * np.where(np.arange(8), 1, -1),
+    }
+    wrong = replace(recording, groups=flipped)
+    assert routed(finger, learn_routing(finger, [wrong])) == (finger, [])
+    assert [finding.kind for finding in belongs(finger, [wrong])] == ["sign"]
+
+
+# --- the commands -----------------------------------------------------------------------------------------------------
+
+
+def test_fit_learns_the_routing_and_reports_it(tmp_path: Path, call: Call, index: tuple[Finger, Recording]) -> None:
+    given, fitted, report = (tmp_path / f"{name}.json" for name in ("given", "fitted", "report"))
+    given.write_text(json.dumps(dict(changed(index[0], arms=0.2).data)), encoding="utf-8")
+    said = call(
+        "fit", given, FREE, "-o", fitted, "--report", report, "--routing", "--only", "joints[1].friction.coulomb"
+    )
+    assert said.status == 0 and "routing: tendon mcp_flexor_radial: moment arm at joint mcp_abduction" in said.out
+    np.testing.assert_allclose(read_finger(fitted).moment_arms, index[0].moment_arms, rtol=0.01)
+    document = json.loads(report.read_text(encoding="utf-8"))
+    schema = json.loads((ROOT / "python/tendonfmu/schema/fit_report.schema.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, schema)
+    assert sum(number["changed"] for number in document["routing"]["numbers"]) == int(
+        np.count_nonzero(index[0].moment_arms)
+    )
+
+
+def test_fit_without_joint_positions_says_so(tmp_path: Path, call: Call) -> None:
+    two = ROOT / "examples" / "demo_recording"
+    said = call(
+        "fit", two / "two_joints.json", two / "two_joints_training.parquet", "-o", tmp_path / "f.json", "--routing"
+    )
+    assert said.status == 2 and "no routing can be learned; expected joint_position" in said.err
+
+
+def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:
+    given = tmp_path / "given.json"
+    given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")
+    case = _read(given, None, [[FREE], [], []], Options())
+    np.testing.assert_allclose(case.finger.moment_arms, index[0].moment_arms, rtol=0.01)
+    assert case.routing is not None and len(case.routing["sentences"]) == 8
+    assert _read(INDEX, None, [[FREE], [], []], Options()).routing is None
+
+
+def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
+    table, out = tmp_path / "tendons.txt", tmp_path / "finger.json"
+    table.write_text("FDP mcp+ pip+\n\nEDC mcp- pip-\nFDS mcp+\n", encoding="utf-8")
+    given: list[Any] = ["describe", "finger", "--name", "index", "--joints", "mcp, pip", "-o", out]
+    assert call(*given, "--table", table).status == 0
+    finger = read_finger(out)
+    assert np.sign(finger.moment_arms).tolist() == [[1, 1], [-1, -1], [1, 0]]
+    assert finger.tendon_names == ["FDP", "EDC", "FDS"] and finger.joint_names == ["mcp", "pip"]
+    out.unlink()
+    for line, reason in (
+        ("FDP mcp+ dip+", "'dip+' is none of the joints mcp, pip with + or -"),
+        ("FDP mcp", "'mcp' is none of the joints"),
+        ("FDP", "expected a name and the joints"),
+        ("FDP mcp+", "not of full column rank"),
+    ):
+        said = call(*given, "--tendon", line)
+        assert said.status == 2 and reason in said.err and said.err.count("\n") == 1 and not out.exists()
+    assert call(*given).status == 2
+    assert call(*given, "--tendon", "A mcp+", "--tendon", "A pip+").err.count("given twice") == 1
+    assert call(*given, "--table", tmp_path / "nowhere.txt").status == 2
