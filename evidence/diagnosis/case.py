@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,6 @@ class Case:
     reference: Sequence[pd.DataFrame] = ()
     gain_recordings: Sequence[pd.DataFrame] = ()  # of other motions, for the true gain of the extended model
     facts: Mapping[str, Any] = field(default_factory=dict)  # columns of the case's row
-    experiment: Callable[[Mapping[str, Any]], pd.DataFrame] | None = None  # records a motion that a diagnosis asks for
 
     def diagnosed(self, *more: pd.DataFrame) -> Diagnosis:
         recordings, test = [*self.recordings, *more], list(self.test)

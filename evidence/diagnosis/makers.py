@@ -6,13 +6,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from evidence.diagnosis.case import Case
 from evidence.diagnosis.hidden_effects import UNKNOWN, placed, scaled
-from evidence.fingers.matched_rig import Hand, Unreachable, perform, random_hand, record
-from evidence.fingers.matched_strength import shown_strength
+from evidence.fingers.matched_rig import Hand, Unreachable, random_hand, record
 from evidence.judge import Truth
 
 VISIBLE = 0.02  # share that survives refitting, from which an effect counts as one that can be seen
@@ -20,7 +18,6 @@ ABSORBED = 0.005  # and up to which it counts as absorbed
 SLOW_TENSION = 8.0  # s: hands whose pretension hardly changes hide what scales with it
 ATTEMPTS = 40  # fingers and places, of which the first suitable one is taken
 OTHER_MOTION = 1_000_000  # added to the seed of the motion
-PUSH = (0.08, 0.2)  # N·m, unlabelled contacts
 
 
 @dataclass(frozen=True)
@@ -28,7 +25,7 @@ class Plan:
     """A case to be made."""
 
     name: str
-    group: str  # null, single, double, absorbed (one effect that refitting hides), unknown (not on the list), contact
+    group: str  # null, single, double, absorbed (one effect that refitting hides), unknown (not on the list)
     seed: int
     maker: Callable[..., Case]  # a function of this module, called where the case runs
     arguments: Mapping[str, Any]
@@ -72,15 +69,9 @@ def single(seed: int, options: Options, effect: str, strength: float) -> Case:
 
 
 def absorbed(seed: int, options: Options, effect: str) -> Case:
-    """One effect that refitting absorbs, at its usual size; and how strong it is where a motion shows it best."""
+    """One effect that refitting absorbs, at its usual size."""
     hand, label = _suitable(effect, None, seed, options, absorbed=True)
-
-    def experiment(motion: Mapping[str, Any]) -> pd.DataFrame:
-        frame: pd.DataFrame = pd.DataFrame(perform(hand, motion, seed).columns)
-        return frame
-
-    facts = _facts_of(label) | {"shown_strength": shown_strength(hand, seed, options.seconds)}
-    return replace(_case(hand, seed, options, (_truth_of(label),), facts), experiment=experiment)
+    return _case(hand, seed, options, (_truth_of(label),), _facts_of(label))
 
 
 def double(seed: int, options: Options, effects: Sequence[str], strength: float) -> Case:
@@ -108,19 +99,6 @@ def double(seed: int, options: Options, effects: Sequence[str], strength: float)
         facts = {"strength": labels[0]["strength"], "second": labels[1]["strength"]}
         return _case(both, seed, options, tuple(map(_truth_of, labels)), facts)
     raise Unreachable(f"{effects}: no finger of {ATTEMPTS} with both; expected another seed")
-
-
-def contact(seed: int, options: Options) -> Case:
-    """Nothing hidden, but somebody touches the finger a few times and no label says so."""
-    hand = _fitting_hand((), seed, 0, options)
-    rng = np.random.default_rng([seed, 64])
-    time = np.arange(round(options.seconds * hand.rate)) / hand.rate
-    load = np.zeros((len(time), options.joints))
-    for begin in np.sort(rng.uniform(2.0, options.seconds - 2.0, 3)):
-        length, joint = rng.uniform(0.3, 1.0), int(rng.integers(options.joints))
-        phase = np.clip((time - begin) / length, 0.0, 1.0)
-        load[:, joint] += rng.uniform(*PUSH) * rng.choice([-1.0, 1.0]) * np.sin(np.pi * phase)
-    return _case(hand, seed, options, external=load)
 
 
 def _fitting_hand(effects: Collection[str], seed: int, attempt: int, options: Options) -> Hand:
@@ -165,7 +143,6 @@ def _case(
     options: Options,
     truths: tuple[Truth, ...] = (),
     facts: Mapping[str, Any] | None = None,
-    external: Any = None,
 ) -> Case:
     """The recording, and those of other motions that are asked for."""
     motions = (options.test > 0) + options.gain_recordings
@@ -175,7 +152,7 @@ def _case(
     return Case(
         machine="matched",
         finger=hand.nominal,
-        recordings=[pd.DataFrame(record(hand, seed, options.seconds, external=external).columns)],
+        recordings=[pd.DataFrame(record(hand, seed, options.seconds).columns)],
         kinematics=hand.source,
         truths=truths,
         test=frames[:1],

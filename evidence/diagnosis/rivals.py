@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from evidence.diagnosis import makers, rival_methods
-from evidence.diagnosis.campaign import row_of
 from evidence.diagnosis.case import Case, causes_of, leaves_unnamed
 from evidence.diagnosis.foreign_cases import is_absorbed, is_outside, make
 from evidence.diagnosis.hidden_effects import BUILDERS, UNKNOWN
@@ -105,7 +104,9 @@ def run_case(plan: Plan) -> dict[str, Any]:
     causes = causes_of(diagnosis)
     diagnosed = Answer(causes, unnamed=leaves_unnamed(diagnosis.verdict, causes))
     answers = {OWN: diagnosed, **rival_answers(case)}
-    return row_of(plan, case) | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
+    effects = [effect for truth in case.truths for effect in truth.effects[:1]]
+    row = {"group": plan.group, "rig": case.machine, "seed": case.seed, "true_effects": effects, **case.facts}
+    return row | {"answers": {who: judged(case, answer) for who, answer in answers.items()}}
 
 
 def rival_answers(case: Case) -> dict[str, Answer]:

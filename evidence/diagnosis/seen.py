@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from evidence.diagnosis import foreign_cases
-from evidence.diagnosis.campaign import COVERAGE, HEADINGS, Line, rate, true_gain
 from evidence.diagnosis.case import Case, leaves_unnamed, run_command
 from evidence.fingers.common_finger import Hidden, Signals, describe, random_finger
 from evidence.fingers.families import FAMILIES as NUMBERED
@@ -30,6 +30,10 @@ from evidence.fingers.foreign import Array, Nominal, frame, noisy, quantised, rm
 from evidence.judge import SYNONYMS, UNKNOWN, Truth, judge
 from evidence.runner import parser, publish, run_cases, say, write
 from evidence.tables import NOTHING, Row, number, page, table, values_of, where
+from tendonfmu.diagnosis import residual_of
+from tendonfmu.model import read_finger
+from tendonfmu.recordings import Held, prepare, read_recording
+from tendonfmu.statistics.intervals import share
 
 FAMILIES = {"dahl": "numpy_dahl", "lugre": "numpy_lugre", "pulleys": "mujoco_pulleys"}
 ALSO = {"pulleys": ("inertia",)}  # beside presliding, what a simulator has and no description can say
@@ -50,6 +54,9 @@ START = {  # size with which a case's own is estimated
 }
 NULL, SENSORS = "none", "calibration"
 EFFECTS = (NULL, SENSORS, *START)
+COVERAGE = "the gain's interval covers the true gain"
+HEADINGS = ("rate", "goal", "found", "cases", "95 % interval")
+Line = list[str]
 ORDER = [effect for k, name in enumerate(EFFECTS[1:]) for effect in ((NULL, name) if k % 3 == 0 else (name,))]
 MOST = 6.0  # times that size, where more could hardly be overlooked by its owner
 TERMLESS = ("unknown", "contact")  # causes without a term in the extended model have no gain of their own
@@ -202,6 +209,27 @@ def judged(report: dict[str, Any], truth: Truth, effect: str) -> dict[str, Any]:
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
+
+
+def true_gain(models: Sequence[Mapping[str, Any]], case: Case) -> float:
+    """1 − rms of the extended / rms of the nominal model, over all joints of the gain recordings."""
+    finger = read_finger(case.finger)
+    sums = np.zeros(2)
+    for unseen in case.gain_recordings:
+        recording = prepare(finger, read_recording(unseen), case.kinematics, Held())
+        for k, data in enumerate(models):
+            sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
+    return 1.0 - math.sqrt(sums[1] / sums[0])
+
+
+def rate(what: str, goal: str, rows: Iterable[Row], holds: Callable[[Row], Any]) -> Line:
+    """The share of the rows for which `holds` is true; rows for which the question does not arise are left out."""
+    answers = [bool(answer) for answer in map(holds, rows) if answer is not None]
+    if not answers:
+        return [what, goal, NOTHING, "0", NOTHING]
+    known = share(sum(answers), len(answers))
+    interval = f"{100 * known.low:.1f} to {100 * known.high:.1f} %"
+    return [what, goal, f"{100 * known.value:.1f} %", f"{sum(answers)}/{len(answers)}", interval]
 
 
 def rates(rows: Sequence[Row]) -> list[Line]:

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -332,19 +331,6 @@ def record(
     pretensions = pretension(rng, time, arms, level * hand.level, hand.tension_time)
     load = 0.0 if external is None else external
     return recorded(hand, time, encoders, pretensions, load, rng, QUIET if quiet else hand.noise)
-
-
-def perform(hand: Hand, motion: Mapping[str, Any], seed: int) -> Made:
-    """A recording that carries out a motion of `diagnose.result.Experiment` or `Invisible`. The known load stands in it
-    as `external_torque`, as a reference sensor would have it."""
-    from tendonfmu.diagnosis.experiments.discrimination import performed_of  # the rig shares no other code with it
-
-    _, plan = performed_of(hand.nominal, motion, hand.rate)
-    rng = np.random.default_rng([seed, 66])
-    made = recorded(hand, plan.time, plan.joint_position, plan.tension, plan.load, rng, hand.noise)
-    if plan.load.any():
-        made.columns.update({f"external_torque[{j + 1}]": torque for j, torque in enumerate(plan.load.T)})
-    return made
 
 
 def recorded(
