@@ -167,7 +167,7 @@ def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path:
     assert call("describe", "joint", "--name", "joint", "--recording", "rec.parquet", "-o", "other.json").status == 0
     assert json.loads((tmp_path / "one.json").read_text()) == json.loads((tmp_path / "other.json").read_text())
     for arguments, words in (
-        (["finger", "--name", "a"], ["'finger'", "joint"]),
+        (["servo", "--name", "a"], ["'servo'", "joint or finger"]),
         (["joint", "--name", " "], ["--name"]),
         (["joint", "--name", "a", "--recording", "rec.parquet", "--torque", "3"], ["--torque", "--recording"]),
         (["joint", "--name", "a", "--recording", "absent.csv"], ["absent.csv"]),
