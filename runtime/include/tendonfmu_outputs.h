@@ -7,7 +7,7 @@
  * Begin with = {0} and set what is wanted by name: later versions add arrays at the end, so a program is compiled with
  * the header of its library. */
 typedef struct tendonfmu_outputs {
-  /* [n] N·m: Torque of the tendons at joint i without friction and bias: estimate of the external torque */
+  /* [n] N·m: Estimate of the external torque at joint i as the tendons have to hold it: minus the torque on the finger */
   double* compensated_torque;
   /* [n] N·m: Torque of the tendons at joint i, the transposed moment arms times the tendon forces */
   double* joint_torque;

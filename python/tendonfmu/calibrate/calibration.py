@@ -23,6 +23,7 @@ from typing import Any
 from tendonfmu.arrays import Data
 from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibrate.report import (
+    OF_PUSH,
     OF_SCORE,
     errors_of,
     record_next,
@@ -415,6 +416,16 @@ class _Run:
         return {
             **{key: report[key] for key in OF_SCORE},
             "sizes": detect_score_report.by_size(scored, left),
+            "list": [
+                {"recording": Path(each["path"]).name, **{key: event[key] for key in OF_PUSH}}
+                for each in report["recordings"]
+                for event in each["event_list"]
+            ],
+            "false_alarm_list": [
+                {"recording": Path(each["path"]).name, **alarm}
+                for each in report["recordings"]
+                for alarm in each["false_alarm_list"]
+            ],
             "warnings": list(scored.warnings),
             "example": typical_push(scored),
         }

@@ -33,6 +33,8 @@ OF_TUNING = (
 OF_SCORE = (
     "events",
     "found",
+    "found_at_release",
+    "free_alarm_share",
     "false_alarms",
     "false_alarms_after_events",
     "free_minutes",
@@ -41,6 +43,7 @@ OF_SCORE = (
     "free_rms",
     "overhang",
 )
+OF_PUSH = ("onset_s", "end_s", "largest_torque", "joint", "found", "at_release", "silent_before", "delay_s")
 
 
 def structure_of(found: Diagnosis) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from tendonfmu.report import (
     friction_figure,
     motion_sheet,
     push_sheet,
+    pushes_sheet,
     render,
     rounded,
     together,
@@ -179,10 +180,29 @@ def push_sentence(report: Report) -> str:
         many += f" ({after} within 2 s after a push)"
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
+    late = pushes.get("found_at_release")  # earlier folders do not say
+    late = f", {late} of them only as they end," if late else ""
+    share = (pushes.get("free_alarm_share") or {}).get("value")
+    on = "" if share is None else f", of which {100 * share:.2g} % are in alarm, most of it after pushes"
     return (
-        f"{pushes['found']} of {pushes['events']} labelled pushes are found, with {many} in "
-        f"{pushes['free_minutes']:.1f} min without contact."
+        f"{pushes['found']} of {pushes['events']} labelled pushes are found{late} with {many} in "
+        f"{pushes['free_minutes']:.1f} min without contact{on}."
     )
+
+
+def push_rows(report: Report) -> list[Row]:
+    """Return a row per push: recording, onset, largest torque, joint, and what became of it."""
+    rows: list[Row] = []
+    for each in (report["pushes"] or {}).get("list") or []:
+        size = "–" if each["largest_torque"] is None else mnm(each["largest_torque"])
+        joint = "–" if each["joint"] is None else report["joints"][each["joint"] - 1]
+        late = ", as it ended" if each["at_release"] else ""
+        found = f"after {1e3 * each['delay_s']:.0f} ms{late}" if each["found"] else "missed"
+        why = "" if each["silent_before"] else ": contact before"
+        rows.append(
+            (each["recording"], f"{each['onset_s']:.2f}", size, joint, found + (why if not each["found"] else ""))
+        )
+    return rows
 
 
 def lines(report: Report) -> Iterator[str]:
@@ -249,6 +269,9 @@ def calibration_page(calibration: Calibration) -> str:
     sheets = [motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]
     if calibration.push is not None:
         sheets.append(push_sheet(calibration.push))
+    pushed = report["pushes"] or {}
+    if pushed.get("list"):  # earlier folders have none
+        sheets.append(pushes_sheet(pushed["list"], pushed["false_alarm_list"]))
     return render(
         "calibration.html.jinja",
         drawn(sheets),
@@ -264,6 +287,7 @@ def calibration_page(calibration: Calibration) -> str:
         sensors=sensor_sentence(report),
         push=push_sentence(report) if report["pushes"] is not None else "",
         sizes=size_rows(report),
+        every_push=push_rows(report),
         recordings=recording_rows(report),
         files=files_of(report),
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ SILENT = 0.2  # s before the onset of a found event that must have no sample of 
 GRACE = 0.1  # s after an event in which an alarm is not false and time is not free
 AFTER = 2.0  # s after an event in which the hand may still feel what the touch did to its friction
 BLOCK = 2.0  # s of free time; longer than the correlation of residuals and alarms in free motion
+RELEASED = 0.5  # of an event's largest reference torque: once it has fallen below for good, the load goes
+LATE = 0.8  # of an event's length, after which its load goes if there is no reference
 _EQUAL = 1e-9  # s; the times of a CSV are rounded to decimals
 
 
@@ -51,6 +54,9 @@ class Event:
     compensated: Numbers | None = None  # [n] torques at the alarm (N·m)
     external: Numbers | None = None
     force: float = math.nan  # force at the alarm (N)
+    largest: float = math.nan  # largest torque of the reference sensor in the event (N·m), and its joint, from 0
+    joint: int | None = None
+    released: bool = False  # whether the alarm begins only as the load goes
 
     @property
     def found(self) -> bool:
@@ -184,6 +190,7 @@ def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Num
         end=float(time[last]),
         silent=not alarm[before:first].any(),
         overhang=float(sum(hanging[end + 1] - hanging[begin] for begin, end in begun)),
+        **_load(time, first, last, given.external),
     )
     inside = begun[begun[:, 0] <= last]
     if not len(inside):
@@ -197,7 +204,24 @@ def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Num
         compensated=None if given.compensated is None else given.compensated[begin],
         external=None if given.external is None else given.external[begin],
         force=math.nan if given.force is None else float(given.force[begin]),
+        released=bool(time[begin] > _lasts(time, first, last, given.external)),
     )
+
+
+def _load(time: Numbers, first: int, last: int, external: Numbers | None) -> dict[str, Any]:
+    """Return the largest torque of the reference sensor in an event, and the joint that bears it."""
+    if external is None:
+        return {}
+    size = np.abs(external[first : last + 1]).max(axis=0)
+    return {"largest": float(size.max()), "joint": int(size.argmax())}
+
+
+def _lasts(time: Numbers, first: int, last: int, external: Numbers | None) -> float:
+    """Return the time up to which an event's load lasts: at `RELEASED` of its largest, or of its length (s)."""
+    if external is None:
+        return float(time[last] - (1.0 - LATE) * (time[last] - time[first]))
+    size = np.abs(external[first : last + 1]).max(axis=1)
+    return float(time[first + np.flatnonzero(size >= RELEASED * size.max())[-1]])
 
 
 def _free_blocks(seconds: Numbers, free: Flags, alarm: Flags, residual: Numbers | None) -> FreeBlocks:

@@ -170,8 +170,24 @@ def score_recordings(
         summaries=[summarise(score, options.seed) for score in scores],
         summary=summary,
         roc=None if subject.packed else roc(score_at),
-        warnings=[*warnings, *([] if summary.events else [f"no event in column {column}: false alarms only"])],
+        warnings=[
+            *warnings,
+            *([] if summary.events else [f"no event in column {column}: false alarms only"]),
+            *_opposed(summary, subject.finger.joint_names),
+        ],
     )
+
+
+def _opposed(summary: Summary, joints: Sequence[str]) -> list[str]:
+    """Warn if the estimated torque falls where that of the reference sensor rises."""
+    slopes = [] if summary.contact is None else summary.contact.slope
+    names = [name for name, slope in zip(joints, slopes, strict=False) if slope.high < 0.0]
+    if not names:
+        return []
+    return [
+        f"compensated_torque falls where external_torque rises at {', '.join(names)}: expected minus the torque on the "
+        'finger, as the tendons have to hold it; write "sign": -1 into the map if the sensor gives the torque on it'
+    ]
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ class Summary:
     events: int  # number of labelled contacts, and of those found
     found: int
     masked: int  # number of events that had contact before their onset
+    released: int  # number of found events whose alarm begins only as the load goes
     held: int  # number of found events whose alarm lasts to their end
     false_alarms: int  # number of false alarms, its interval, and their rate (1/min)
     alarms_after_events: int  # those of them that begin soon after an event
@@ -66,6 +67,7 @@ def summarise(score: DetectionScore, seed: int = 0) -> Summary:
         events=len(score.events),
         found=len(found),
         masked=sum(not event.silent for event in score.events),
+        released=sum(event.released for event in found),
         held=held,
         false_alarms=alarms,
         alarms_after_events=score.alarms_after_events,

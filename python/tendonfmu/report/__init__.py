@@ -12,7 +12,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import detect_text, diagnosis_page, diagnosis_text, excite_text, fit_page, fit_text
-    from .calibration_figures import MotionShown, PushShown, motion_sheet, push_sheet
+    from .calibration_figures import MotionShown, PushShown, motion_sheet, push_sheet, pushes_sheet
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
     from .diagnosis_page import cards_of, waterfall_of

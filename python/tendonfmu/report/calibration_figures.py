@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import Curve, Panel, Sheet
+from tendonfmu.drawing import Curve, Panel, Sheet, line_of
 from tendonfmu.report.numbers import rms, rounded, torque_unit
 
 
@@ -100,3 +101,31 @@ def push_sheet(shown: PushShown) -> Sheet:
         panels=[panel],
         caption="The push with the median delay of those that are found. The line is where contact is reported.",
     )
+
+
+def pushes_sheet(pushes: Sequence[Mapping[str, Any]], alarms: Sequence[Mapping[str, Any]]) -> Sheet:
+    """Draw when pushes were found and missed, and false alarms, a row per recording."""
+    names = list(dict.fromkeys(each["recording"] for each in pushes))
+    kinds = {
+        "alarm": ("push, found", [each for each in pushes if each["found"]], "onset_s"),
+        "missed": ("push, missed", [each for each in pushes if not each["found"]], "onset_s"),
+        "false_alarm": ("alarm without a push", list(alarms), "begin_s"),
+    }
+    curves, keys = [], []
+    for style, (meaning, stretches, begin) in kinds.items():
+        for row, name in enumerate(names):
+            spans = [(each[begin], each["end_s"]) for each in stretches if each["recording"] == name]
+            curves += [Curve(style, *line_of(spans, row))] if spans else []
+        keys += [(style, meaning)] if stretches else []
+    panel = Panel(
+        title="Pushes and false alarms",
+        alt="When pushes were found and missed, and when there was an alarm without a push",
+        x_label="time (s)",
+        y_label="",
+        size="wide",
+        height=100 + 36 * len(names),
+        curves=tuple(curves),
+        rows=tuple(names),
+        zoom="pushes",
+    )
+    return Sheet("pushes", "pushes", "All pushes", keys, [panel])

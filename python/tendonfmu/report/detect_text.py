@@ -70,7 +70,8 @@ def _event_lines(summary: Summary) -> Iterator[str]:
     missed = summary.events - summary.found
     why = f", {summary.masked} of them in an alarm from before" if summary.masked else ""
     share = _estimate(summary.found_share, 100.0)
-    yield f"events: {summary.found} of {summary.events} found, {share} %; {missed} missed{why}"
+    late = f", {summary.released} of them only as the load goes" if summary.released else ""
+    yield f"events: {summary.found} of {summary.events} found{late}, {share} %; {missed} missed{why}"
     if not summary.found:
         return
     delay = summary.delay
