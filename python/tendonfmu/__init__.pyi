@@ -2,6 +2,9 @@ from .detect import TuneWarning as TuneWarning
 from .errors import InputError as InputError
 from .errors import InputWarning as InputWarning
 from .estimate import FitWarning as FitWarning
+from .interface import CalibrateResult as CalibrateResult
+from .interface import CalibrationWarning as CalibrationWarning
+from .interface import CheckResult as CheckResult
 from .interface import Diagnosis as Diagnosis
 from .interface import DiagnosisWarning as DiagnosisWarning
 from .interface import FitResult as FitResult
@@ -12,6 +15,9 @@ from .interface import ScoreResult as ScoreResult
 from .interface import ScoreWarning as ScoreWarning
 from .interface import TuneResult as TuneResult
 from .interface import build as build
+from .interface import calibrate as calibrate
+from .interface import check as check
+from .interface import convert as convert
 from .interface import diagnose as diagnose
 from .interface import fit as fit
 from .interface import run as run

@@ -15,11 +15,11 @@ import pytest
 from numpy.typing import NDArray
 
 from command import Call, DemoRun
-from tendonfmu.calibrate import calibration
-from tendonfmu.calibrate.calibration import Calibration, Options, calibrate
-from tendonfmu.calibrate.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import errors_of
-from tendonfmu.calibrate.text import calibration_page, size_rows, tiles, verdict, write_calibration
+from tendonfmu.calibration import calibration
+from tendonfmu.calibration.calibration import Calibration, Options, calibrate
+from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
+from tendonfmu.calibration.report import errors_of
+from tendonfmu.calibration.text import calibration_page, size_rows, tiles, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.errors import InputError

@@ -58,7 +58,7 @@ FIRST = {
     "describe": "tendonfmu.recordings.describe_recorded_joint",
     "excite": "tendonfmu.excite.training_motion.excite",
     "fit": "tendonfmu.interface.fit",
-    "calibrate": "tendonfmu.calibrate.calibrate",
+    "calibrate": "tendonfmu.calibration.calibrate",
     "diagnose": "tendonfmu.interface.diagnose",
     "tune": "tendonfmu.interface.tune",
     "score": "tendonfmu.interface.score",

@@ -268,7 +268,7 @@ def test_the_calibrated_finger_is_one_that_calibrate_takes_and_writes(
     description: dict[str, Any], calibrated: dict[str, Any]
 ) -> None:
     """The format of today, the finger that it was made from, and the keys that a calibration leaves."""
-    from tendonfmu.calibrate.fit import earlier_finger
+    from tendonfmu.calibration.fit import earlier_finger
 
     given = read_finger(EXAMPLES / "fingers" / "index_finger.json")
     earlier = earlier_finger(given, FOLDER / "index_finger_calibrated.json")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from evidence.fingers import sticking_finger
-from tendonfmu.calibrate.fit import fit_all
+from tendonfmu.calibration.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.remainder import Remainder, unexplained_of

@@ -140,3 +140,19 @@ def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_p
         assert first.startswith(f"tendonfmu: warning: {file}: ignored columns: 'current', 'phase'; a recording has ")
         assert not [line for line in rest if "warning" in line]
     assert call("run", FINGER, file, "-o", tmp_path / "out.csv", "--quiet").err == ""
+
+
+@pytest.mark.filterwarnings("ignore::tendonfmu.interface.calibrating.CalibrationWarning")
+def test_calibrate(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """In memory and from files: the same finger; what it writes is what the command writes."""
+    previous = tmp_path / "previous.json"
+    previous.write_text(FINGER.read_text(), encoding="utf-8")
+    file = tmp_path / "monday.parquet"
+    frame.to_parquet(file)
+    found, again = (tf.calibrate(FINGER, given, previous=previous) for given in (frame, file))
+    left = [each.report["error"]["calibrated"] for each in (found, again)]
+    assert left[0] == pytest.approx(left[1], rel=1e-6)
+    written = found.write(tmp_path / "out")
+    assert {path.name for path in written} == {"calibration.html", "calibration.json", "finger.json", "finger.fmu"}
+    assert tf.read_finger(tmp_path / "out" / "finger.json") == found.finger
+    assert "mN·m left" in repr(found) and "srcdoc" in found._repr_html_()

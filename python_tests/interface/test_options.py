@@ -25,8 +25,9 @@ FUNCTIONS: list[tuple[Callable[..., Any], type[options.Options]]] = [
     (tf.tune, options.TuneOptions),
     (tf.score, options.ScoreOptions),
     (tf.diagnose, options.DiagnoseOptions),
+    (tf.calibrate, options.CalibrateOptions),
 ]
-OTHERS = {"compare", "progress", "reference", "test"}  # recordings, and a function
+OTHERS = {"compare", "folder", "progress", "pushes", "reference", "test"}  # recordings, a folder and a function
 
 
 @pytest.mark.parametrize(("function", "of_command"), FUNCTIONS)
@@ -39,6 +40,8 @@ def test_a_function_has_the_options_of_its_command(
         for name, parameter in inspect.signature(function).parameters.items()
         if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name not in OTHERS
     }
+    if function is tf.calibrate:  # a parameter of the command, not an option of the class
+        assert signature.pop("previous") is None
     assert signature == of_command.defaults()
 
 

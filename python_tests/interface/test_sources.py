@@ -286,3 +286,59 @@ def test_messages_name_the_list() -> None:
         tf.fit(FINGER, good, compare=[good, bad])
     with pytest.raises(tf.InputError, match=r"^test\[1\]: int; expected"):
         tf.diagnose(FINGER, good, test=[3])  # type: ignore[list-item]
+
+
+# --- columns, stretches and names -------------------------------------------------------------------------------------
+
+
+def test_a_recording_gives_columns_groups_and_stretches(recording: tf.Recording) -> None:
+    assert recording["tendon_force[2]"] is not None
+    np.testing.assert_array_equal(recording["tendon_force[2]"], recording.groups["tendon_force"][:, 1])
+    np.testing.assert_array_equal(recording["tendon_force"], recording.groups["tendon_force"])
+    part = recording[1.0:2.0]
+    assert isinstance(part, tf.Recording) and part.time[0] >= 1.0 and part.time[-1] < 2.0
+    rows = (recording.time >= 1.0) & (recording.time < 2.0)
+    np.testing.assert_array_equal(part["tendon_position"], recording["tendon_position"][rows])
+    np.testing.assert_array_equal(recording[:][1.0:].time, recording.time[recording.time >= 1.0])
+    for key, words in (("tendon_forc[1]", "no column"), (slice(1e6, None), "no sample"), (3, "expected the name")):
+        with pytest.raises(tf.InputError, match=words):
+            recording[key]  # type: ignore[index]
+
+
+def test_tendons_and_joints_may_be_named(finger: tf.Finger, recording: tf.Recording) -> None:
+    tendon, joint = finger.tendon_names[2], finger.joint_names[1]
+    by_name = finger.replace({f"tendons[{tendon}].stiffness": 5000.0, f"contact.threshold[{joint}]": 0.5})
+    assert by_name == finger.replace({"tendons[3].stiffness": 5000.0, "contact.threshold[2]": 0.5})
+    with pytest.raises(tf.InputError, match="nobody"):
+        finger.replace({"tendons[nobody].stiffness": 5000.0})
+    fitted = tf.fit(finger, recording[:5.0], only=f"joints[{joint}].friction.coulomb")
+    assert list(fitted.parameters.index) == ["joints[2].friction.coulomb"]
+
+
+def test_a_check_speaks_of_the_recording_in_memory(finger: tf.Finger, recording: tf.Recording) -> None:
+    assert tf.check(finger, recording).belongs and not tf.check(finger).findings
+    frame = recording.frame
+    frame["tendon_position[2]"] *= -1.0
+    wrong = tf.check(finger, frame)
+    assert not wrong.belongs and "tendon_position[2]" in wrong._repr_html_()
+    assert "correct it in memory: tendon_position[2]: times -1" in repr(wrong) and "map" not in repr(wrong)
+
+
+def test_a_log_is_converted_by_a_map(recording: tf.Recording, tmp_path: Path) -> None:
+    frame = recording.frame.rename(columns={"tendon_force[1]": "F 1"})
+    frame["F 1"] *= 1e3
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    units = {"time": "s", "tendon_force": "N", "tendon_position": "m"}
+    columns = {
+        name: {"column": name, "unit": units[name.split("[")[0]]}
+        for name in recording.frame.columns
+        if name != "tendon_force[1]"
+    }
+    columns["tendon_force[1]"] = {"column": "F 1", "unit": "mN"}
+    given = {"format": "tendonfmu-map-1", "columns": columns}
+    converted = tf.convert(tmp_path / "log.csv", given)
+    np.testing.assert_allclose(converted["tendon_force[1]"], recording["tendon_force[1]"], rtol=1e-12)
+    with pytest.raises(tf.InputError, match="F 2"):
+        tf.convert(
+            tmp_path / "log.csv", {**given, "columns": {**columns, "tendon_force[1]": {"column": "F 2", "unit": "N"}}}
+        )

@@ -13,7 +13,7 @@ import pytest
 
 from command import Call
 from repository_paths import ROOT
-from tendonfmu.calibrate.calibration import Options, _read
+from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.model import Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
 

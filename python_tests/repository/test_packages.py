@@ -30,7 +30,7 @@ PACKAGES = (
     "detect",
     "diagnosis",
     "report",
-    "calibrate",
+    "calibration",
     "interface",
     "demo",
     "cli",

@@ -49,8 +49,8 @@ def calibrate(
     --from the structure of the earlier model stays and its numbers are the
     prior.
     """
-    from tendonfmu.calibrate import REPORT, check_folder, text, write_calibration
-    from tendonfmu.calibrate import calibrate as run
+    from tendonfmu.calibration import REPORT, check_folder, text, write_calibration
+    from tendonfmu.calibration import calibrate as run
 
     tests, labelled = test or [], pushes or []
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])

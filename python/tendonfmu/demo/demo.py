@@ -30,7 +30,7 @@ from tendonfmu.report import drawn, write_figures
 from tendonfmu.tasks import PhaseState
 
 if TYPE_CHECKING:
-    from tendonfmu.calibrate import Calibration
+    from tendonfmu.calibration import Calibration
     from tendonfmu.diagnosis import Diagnosis
     from tendonfmu.estimate import FitProgress, FrictionFit
 
@@ -87,7 +87,7 @@ class Story:
         self._files = {page: "the whole demo, for a browser", **self._files}
 
     def _calibrate(self, phase: Phase) -> None:
-        from tendonfmu.calibrate import calibrate, write_calibration
+        from tendonfmu.calibration import calibrate, write_calibration
         from tendonfmu.tasks import forget_steps
 
         def show(state: PhaseState) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from tendonfmu.calibrate import DIAGNOSIS
-from tendonfmu.calibrate import PAGE as CALIBRATION_PAGE
-from tendonfmu.calibrate import text as calibration_text
+from tendonfmu.calibration import DIAGNOSIS
+from tendonfmu.calibration import PAGE as CALIBRATION_PAGE
+from tendonfmu.calibration import text as calibration_text
 from tendonfmu.demo.demo import CALIBRATION, FIT, TRAINING, TWO_JOINTS, UNSEEN, Story
 from tendonfmu.demo.figures import calibration_sheet, fit_sheets, push_sheet, run_sheet
 from tendonfmu.demo.run import FLEXION, FREE, FREE_X4, MINUTES, PUSHES, RecordingResult

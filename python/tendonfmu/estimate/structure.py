@@ -51,7 +51,11 @@ class Choice:
 
 
 def build_structure(finger: Finger, choice: Choice) -> Structure:
-    """Choose the numbers of a finger that a fit estimates."""
+    """Choose the numbers of a finger that a fit estimates; patterns may name tendons and joints."""
+    only, fix, share, scale = (
+        [finger.numbered(text) for text in texts] for texts in (choice.only, choice.fix, choice.share, choice.scale)
+    )
+    choice = Choice(choice.sides, only, fix, share, scale)
     data = _model_alone(with_sides(finger.data, choice.sides))
     numbers = estimable_numbers(data)
     if not numbers:
@@ -138,6 +142,10 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
         for path in (number.path, number.with_path):
             if path is not None:
                 set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    for number in structure.numbers:  # rounding must not take Fc above an Fs that is not rounded
+        law, _, last = number.path.rpartition(".")
+        if last == "coulomb" and get_number(data, f"{law}.static") < get_number(data, number.path):
+            set_number(data, number.path, get_number(data, f"{law}.static"))
     if structure.sensor_fault is not None:
         data["sensor_fault"] = dict(structure.sensor_fault)
     with own_fault("the fitted description"):  # a fit keeps within every bound

@@ -9,6 +9,8 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .building import build
+    from .calibrating import CalibrateResult, CalibrationWarning, calibrate
+    from .checking import CheckResult, check, convert
     from .detecting import ScoreResult, ScoreWarning, TuneResult, score, tune
     from .diagnosing import Diagnosis, DiagnosisWarning, diagnose
     from .fitting import FitInterrupted, FitResult, fit

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -92,6 +93,16 @@ class Finger:
         copied: dict[str, Any] = json.loads(self.text)
         return copied
 
+    def numbered(self, path: str) -> str:
+        """Return a path with numbers in place of the names of tendons and joints: `tendons[FDP].stiffness`."""
+
+        def number(found: re.Match[str]) -> str:
+            before, name = found.string[: found.start()], found[1]
+            names = self.tendon_names if before.endswith("tendons") else self.joint_names
+            return f"[{names.index(name) + 1}]" if name in names else found[0]
+
+        return re.sub(r"\[([^\[\]]*)\]", number, path)
+
     def replace(self, values: Mapping[str, Any]) -> Finger:
         """Return a finger with other values.
 
@@ -99,8 +110,8 @@ class Finger:
         ----------
         values
             Values by path, such as `{"tendons[1].stiffness": 5000.0}`. Paths are those of the FMU's parameters and of
-            the description; indices count from 1. A value may be a number, a text, or any part of a description; None
-            means absent.
+            the description; indices count from 1, and tendons and joints may be named (`tendons[FDP].stiffness`). A
+            value may be a number, a text, or any part of a description; None means absent.
 
         Returns
         -------
@@ -113,7 +124,8 @@ class Finger:
             A path does not exist, or a value is refused.
         """
         try:
-            data = with_values_at(self.to_dict(), _plain(dict(values)), native.Instance(self.image))
+            named = {self.numbered(path) if isinstance(path, str) else path: value for path, value in values.items()}
+            data = with_values_at(self.to_dict(), _plain(named), native.Instance(self.image))
         except InputError as refused:
             raise InputError(f"{self.path}: {refused}") from None
         return finger_from_data(data, self.path)

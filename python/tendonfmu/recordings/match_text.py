@@ -84,6 +84,9 @@ def _of_correction(path: Path, correction: Correction, seen: str, probably: str)
     else:
         entries = {column: {correction.kind: correction.factor} for column in correction.columns}
         write = _what_to_set(correction.columns, {correction.kind: correction.factor})
+    if not path.suffix:  # a DataFrame, or arrays: there is no map
+        words = _in_words(correction).replace("scale ", "times ").replace("sign -1", "times -1")
+        write = f"correct it in memory: {words}"
     return Finding("error", correction.kind, path, correction.columns, seen, probably, write, entries)
 
 

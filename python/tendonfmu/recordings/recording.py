@@ -70,6 +70,39 @@ class Recording:
         duration = self.time[-1] - self.time[0] if len(self) else 0.0
         return ", ".join([f"{counted(len(self), 'sample')} in {duration:.6g} s", *sizes, *labelled])
 
+    def __getitem__(self, key: str | slice) -> Any:
+        """Return a column such as "tendon_force[1]" [N], a group of columns [N, m], or a stretch by its times.
+
+        Parameters
+        ----------
+        key
+            Name of a column or group; or a slice of times (s), such as `recording[10.0:20.0]`, the end not included.
+
+        Raises
+        ------
+        InputError
+            There is no such column, or a slice has a step.
+        """
+        if isinstance(key, str):
+            columns = self._columns() | dict(self.groups)
+            if key not in columns:
+                raise InputError(f"{self.path}: no column {key}; expected one of {', '.join(columns)}")
+            return columns[key]
+        if not isinstance(key, slice) or key.step is not None:
+            raise InputError(f"{self.path}: {key!r}; expected the name of a column, or times as in [10.0:20.0]")
+        ends = (0 if key.start is None else key.start, np.inf if key.stop is None else key.stop)
+        first, last = np.searchsorted(self.time, [-np.inf if key.start is None else ends[0], ends[1]])
+        rows = slice(int(first), int(last))
+        if first >= last:
+            raise InputError(f"{self.path}: no sample in {ends[0]:g} to {ends[1]:g} s; expected times of the recording")
+        return replace(
+            self,
+            time=self.time[rows],
+            groups={name: values[rows] for name, values in self.groups.items()},
+            contact=None if self.contact is None else self.contact[rows],
+            others={name: values[rows] for name, values in self.others.items()},
+        )
+
     @classmethod
     def from_frame(
         cls, frame: pd.DataFrame, *, name: str = "DataFrame", label: str = LABEL, others: Collection[str] = ()

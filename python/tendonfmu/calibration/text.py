@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.calibrate.calibration import DIAGNOSIS, Calibration
+from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text

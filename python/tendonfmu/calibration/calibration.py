@@ -5,7 +5,7 @@ stay in the folder, so that a repeated call continues where the previous one end
 
 Examples
 --------
->>> from tendonfmu.calibrate import calibrate
+>>> from tendonfmu.calibration import calibrate
 >>> free = ["free_10N.parquet", "free_30N.parquet"]
 >>> found = calibrate("finger.json", free, "calibrated", pushes=["pushes.parquet"])
 >>> found.report["error"], found.report["detection"], found.data
@@ -21,8 +21,8 @@ from time import perf_counter
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.calibrate.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
-from tendonfmu.calibrate.report import (
+from tendonfmu.calibration.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
+from tendonfmu.calibration.report import (
     OF_PUSH,
     OF_SCORE,
     errors_of,
