@@ -96,10 +96,11 @@ def test_the_rest_of_the_file_stays(folder: Path, data: dict[str, Any]) -> None:
 
 
 def test_numbers_of_a_default_class_are_overridden_at_the_joint_alone(folder: Path, data: dict[str, Any]) -> None:
-    data["joints"][1]["friction"] = {"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 0.1}
+    law = {"static": 0.001, "coulomb": 0.001, "stribeck_velocity": 0.1, "viscous": 0.0005}
+    data["joints"][1]["friction"] = law
     exported(folder, data)
     model = mujoco.MjModel.from_xml_path(str(folder / "out.xml"))
-    assert model.dof_damping[model.joint("pip").dofadr[0]] == 0.0
+    assert model.dof_damping[model.joint("pip").dofadr[0]] == 0.0005
     assert model.dof_damping[model.joint("mcp").dofadr[0]] == 0.002
     assert 'class="rubbing"><joint damping="0.002" frictionloss="0.006"/>' in (folder / "out.xml").read_text()
 
@@ -225,3 +226,25 @@ def test_the_command_lists_changes(folder: Path, data: dict[str, Any], call: Cal
     assert answer.status == 0 and answer.out == ""
     assert "joint mcp: damping 0.002 → 0.003 N·m·s/rad" in answer.err and "6 numbers changed" in answer.err
     assert "MJCF cannot express: " in answer.err
+
+
+def test_a_number_that_is_none_or_not_known_stays_the_models(folder: Path, data: dict[str, Any]) -> None:
+    """Below 0, at the bound 0 of a fit, and what the fit's report does not identify."""
+    changed = fitted(data)
+    for row in changed["extensions"]:
+        if row["effect"] == "preload_friction":
+            row["coulomb"] = -0.008
+    changed["joints"][0]["friction"]["viscous"] = 0.0
+    found = exported(folder, changed)
+    written = {(change.kind, change.attribute) for change in found.changes}
+    assert ("tendon", "frictionloss") not in written and ("joint", "frictionloss") in written
+    assert sum("-0.008 N: below 0; the model's number stays" in text for text in found.left_out) == 1
+    assert sum("damping" in text and "at its bound 0" in text for text in found.left_out) == 1
+    row = {"path": "joints[1].friction.coulomb", "at_bound": False, "identified": False}
+    report = folder / "report.json"
+    report.write_text(json.dumps({"format": "tendonfmu-fit-1", "parameters": [row]}), encoding="utf-8")
+    found = export_numbers(folder / "fitted.json", folder / "model.xml", folder / "out.xml", report)
+    assert ("joint", "frictionloss") not in {(change.kind, change.attribute) for change in found.changes}
+    assert any("not identified by the fit" in text for text in found.left_out)
+    with pytest.raises(InputError, match="expected a report of tendonfmu fit"):
+        export_numbers(folder / "fitted.json", folder / "model.xml", folder / "out.xml", folder / "fitted.json")

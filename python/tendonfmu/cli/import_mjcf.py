@@ -93,6 +93,9 @@ def export_model(
     finger: Annotated[Path, typer.Argument(metavar="FITTED.json", help="fitted finger description")],
     model: ModelFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.xml", help="model to write")],
+    report: Annotated[
+        Path | None, typer.Option(metavar="R.json", help="report of the fit: numbers it does not identify stay")
+    ] = None,
 ) -> None:
     """Write friction, damping, springs and armature of a description into a MuJoCo model.
 
@@ -104,8 +107,8 @@ def export_model(
     from tendonfmu.mjcf import export_numbers
 
     _check_kind("export", kind)
-    check_output(output, finger, model)
-    written = export_numbers(finger, model, output)
+    check_output(output, finger, model, *([] if report is None else [report]))
+    written = export_numbers(finger, model, output, report)
     _say_rows(output, "", [change.line() for change in written.changes])
     _say_rows(output, "MJCF cannot express: ", written.left_out)
     say(f"{output}: {counted(len(written.changes), 'number')} changed")

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError, InternalError, own_fault
-from tendonfmu.files import counted, whole_file
+from tendonfmu.estimate import FIT_REPORT
+from tendonfmu.files import counted, read_json, whole_file
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.finger_parts import motors_of
@@ -38,6 +39,7 @@ class Change:
     attribute: str  # attribute of MJCF
     before: float  # in SI units
     after: float
+    path: str  # of the number in the description; of a law by direction that of its first side
 
     def line(self) -> str:
         """Describe it in a line."""
@@ -64,8 +66,8 @@ class Export:
         }
 
 
-def export_numbers(finger: Path, path: Path, output: Path) -> Export:
-    """Write the numbers of a description into a model."""
+def export_numbers(finger: Path, path: Path, output: Path, report: Path | None = None) -> Export:
+    """Write the numbers of a description into a model; those that a fit's report does not identify stay the model's."""
     data = read_finger(finger).data
     model = CompiledModel(path)
     joints = [model.joint_named(name) for name in _names(finger, data, "joints")]
@@ -73,6 +75,8 @@ def export_numbers(finger: Path, path: Path, output: Path) -> Export:
         model.tendon_named(name)
     left_out: list[str] = []
     wanted = [*_of_joints(data, model, joints, left_out), *_of_tendons(data, model, left_out)]
+    unsure = {} if report is None else _unsure(report)
+    wanted = [change for change in wanted if _is_sound(change, unsure, left_out)]
     changes = [change for change in wanted if not math.isclose(change.before, change.after, rel_tol=SAME)]
     source = XmlSource(path)
     for change in changes:
@@ -88,6 +92,28 @@ def export_numbers(finger: Path, path: Path, output: Path) -> Export:
         temporary.write_bytes(text)
         _check_written(temporary, changes)
     return Export(changes, [*left_out, *_inexpressible(data)])
+
+
+def _unsure(report: Path) -> dict[str, str]:
+    """Return the paths of a fit's report whose numbers are not to be trusted, and why."""
+    content = read_json(report, "the report of a fit")
+    rows = content.get("parameters") if isinstance(content, dict) and content.get("format") == FIT_REPORT else None
+    if not isinstance(rows, list):
+        raise InputError(f"{report}: expected a report of tendonfmu fit --report")
+    why = {True: "at a bound of the fit", False: "not identified by the fit"}
+    return {row["path"]: why[row["at_bound"]] for row in rows if row["at_bound"] or not row["identified"]}
+
+
+def _is_sound(change: Change, unsure: Mapping[str, str], left_out: list[str]) -> bool:
+    """Return whether a number may be written; else say why the model's stays."""
+    reason = unsure.get(change.path)
+    if change.attribute != "springref" and change.after < 0.0:
+        reason = "below 0"
+    elif change.attribute in ("frictionloss", "damping", "stiffness") and change.after == 0.0 < change.before:
+        reason = "at its bound 0"
+    if reason is not None:
+        left_out.append(f"{change.line()}: {reason}; the model's number stays")
+    return reason is None
 
 
 def _names(file: Path, data: Mapping[str, Any], key: str) -> list[str]:
@@ -120,10 +146,21 @@ def _value(model: CompiledModel, kind: str, name: str, attribute: str) -> float:
 def _of_joints(
     data: Mapping[str, Any], model: CompiledModel, joints: Sequence[Joint], left_out: list[str]
 ) -> Iterator[Change]:
-    inertia = {row["joint"]: float(row["inertia"]) for row in extension_rows(data) if row["effect"] == "inertia"}
+    rows = list(enumerate(extension_rows(data), start=1))
+    inertia = {row["joint"]: float(row["inertia"]) for _, row in rows if row["effect"] == "inertia"}
+    number = {row["joint"]: f"extensions[{k}].inertia" for k, row in rows if row["effect"] == "inertia"}
     links = links_inertia(model, joints)
     for j, (joint, row) in enumerate(zip(joints, data["joints"], strict=True)):
         wanted: dict[str, float] = {}
+        at = f"joints[{j + 1}]"
+        side = "positive." if "positive" in (row.get("friction") or {}) else ""
+        paths = {
+            "frictionloss": f"{at}.friction.{side}coulomb",
+            "damping": f"{at}.friction.{side}viscous",
+            "stiffness": f"{at}.cover.stiffness",
+            "springref": f"{at}.cover.rest_angle",
+            "armature": number.get(j + 1, ""),
+        }
         law, cover = row.get("friction"), row.get("cover")
         if law is not None:
             wanted |= {"frictionloss": _mean(law, "coulomb"), "damping": _mean(law, "viscous")}
@@ -142,7 +179,8 @@ def _of_joints(
                     "links in the model; armature 0"
                 )
         for attribute, value in wanted.items():
-            yield Change("joint", joint.name, attribute, _value(model, "joint", joint.name, attribute), value)
+            before = _value(model, "joint", joint.name, attribute)
+            yield Change("joint", joint.name, attribute, before, value, paths[attribute])
 
 
 def _of_tendons(data: Mapping[str, Any], model: CompiledModel, left_out: list[str]) -> Iterator[Change]:
@@ -162,7 +200,8 @@ def _of_tendons(data: Mapping[str, Any], model: CompiledModel, left_out: list[st
             left_out.append(f"extensions[{k}], preload_friction of tendon {tendon['name']}: {reason}")
             continue
         before = _value(model, "tendon", tendon["name"], "frictionloss")
-        yield Change("tendon", tendon["name"], "frictionloss", before, float(row["coulomb"]))
+        path = f"extensions[{k}].coulomb"
+        yield Change("tendon", tendon["name"], "frictionloss", before, float(row["coulomb"]), path)
 
 
 def _mean(law: Law, number: str) -> float:
