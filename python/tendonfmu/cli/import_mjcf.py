@@ -58,7 +58,7 @@ def import_model(
     """Make a finger description from joints and tendons of a MuJoCo model.
 
     What the description does not have of the model is listed on standard
-    error. Needs the package mujoco: pip install 'tendonfmu[mujoco]'.
+    error. Needs the package mujoco: pip install mujoco.
     """
     from tendonfmu.files import check_output, write_text
     from tendonfmu.mjcf import ImportSettings, import_finger
@@ -101,7 +101,7 @@ def export_model(
 
     Joints and tendons are found by their names; the rest of the model stays
     as it is. What MJCF cannot express is listed on standard error. Needs the
-    package mujoco: pip install 'tendonfmu[mujoco]'.
+    package mujoco: pip install mujoco.
     """
     from tendonfmu.files import check_output
     from tendonfmu.mjcf import export_numbers

@@ -41,6 +41,7 @@ CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
 _NUMBER = re.compile(r"[ \t\r\n]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?[ \t\r\n]*")
+LOGS = "pip install h5py mcap mcap-protobuf-support pint rosbags"  # the extra `logs`: nothing is published yet
 _FLAGS = {"true": 1.0, "false": 0.0}
 
 
@@ -50,9 +51,7 @@ def require_extra(module: str, what: str) -> Any:
         return importlib.import_module(module)
     except ModuleNotFoundError as missing:
         name = (missing.name or module).split(".")[0]
-        raise InputError(
-            f"{what}: needs the Python package {name}, which is not installed; pip install 'tendonfmu[logs]'"
-        ) from None
+        raise InputError(f"{what}: needs the Python package {name}, which is not installed; {LOGS}") from None
 
 
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:

@@ -66,7 +66,7 @@ def _library() -> Any:
     try:
         import mujoco
     except ImportError:
-        raise InputError("mujoco: not installed; expected the extra: pip install 'tendonfmu[mujoco]'") from None
+        raise InputError("mujoco: not installed; expected the package: pip install mujoco") from None
     return mujoco
 
 

@@ -207,7 +207,7 @@ def _library() -> Any:
     try:
         import distributed
     except ImportError as missing:
-        wanted = "expected dask and distributed: pip install 'tendonfmu[campaign]'"
+        wanted = "expected both: pip install dask distributed"
         raise InputError(f"no module {missing.name}; {wanted}") from None
     return distributed
 
