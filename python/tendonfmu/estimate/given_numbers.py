@@ -13,6 +13,7 @@ from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted
 from tendonfmu.model import Finger
 
+FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
 ONE_LOAD = 1.5  # times the least load: a law whose friction grows with the load is not told from one that does not
 
 
@@ -51,8 +52,23 @@ def movement(
         "kept": kept,
         "moved": len(moved),
         "stayed": [number.number.path for number in stayed],
-        "paragraph": " ".join(_sentences(len(moved), stayed, change, kept, load)),
+        "paragraph": " ".join([*_sentences(len(moved), stayed, change, kept, load), *_far(moved)]),
     }
+
+
+def _far(moved: Sequence[Fitted]) -> list[str]:
+    """Name the numbers that moved by more than a factor, the farthest first."""
+    ratios = [
+        (max(number.value / number.start, number.start / number.value), number)
+        for number in moved
+        if number.start > 0.0 and number.value > 0.0 and abs(number.value - number.start) > 3.0 * number.standard_error
+    ]
+    far = sorted((each for each in ratios if each[0] > FAR), key=lambda each: -each[0])
+    if not far:
+        return []
+    named = [f"{each.number.path} {each.start:.3g} → {each.value:.3g}" for _, each in far[:MOST_NAMED]]
+    more = f" and {len(far) - MOST_NAMED} more" if len(far) > MOST_NAMED else ""
+    return [f"Moved by more than a factor of {FAR:g}: {'; '.join(named)}{more}."]
 
 
 def _sentences(

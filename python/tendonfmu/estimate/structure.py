@@ -144,7 +144,11 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
                 set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
     for number in structure.numbers:  # rounding must not take Fc above an Fs that is not rounded
         law, _, last = number.path.rpartition(".")
-        if last == "coulomb" and get_number(data, f"{law}.static") < get_number(data, number.path):
+        if (
+            last == "coulomb"
+            and not law.startswith("extensions[")
+            and get_number(data, f"{law}.static") < get_number(data, number.path)
+        ):
             set_number(data, number.path, get_number(data, f"{law}.static"))
     if structure.sensor_fault is not None:
         data["sensor_fault"] = dict(structure.sensor_fault)

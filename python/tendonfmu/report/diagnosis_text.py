@@ -114,6 +114,10 @@ def headline(diagnosis: Diagnosis) -> str:
         cause = diagnosis.causes[0]
         size = f", {cause.size}" if cause.changed else ""
         text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(diagnosis))}{size}."
+    left = left_of(diagnosis)
+    if left is not None and not count and diagnosis.kind != "change" and diagnosis.verdict in ("adequate", "explained"):
+        memory = f", correlated over {left.memory}" if left.memory else ""
+        text = f"{text[:-1]}: {left.text(left.whole)} {unit_of(diagnosis)[1]} remain{memory}."
     for cause in reported_causes(diagnosis):
         if cause.where.effect == CONTACT and cause.changed is None:
             text += f" In some stretches {cause.title}: they were left out ({cause.size})."

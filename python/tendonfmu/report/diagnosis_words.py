@@ -43,12 +43,12 @@ MODEL = Words(
     extended_column="extended",
     headlines={
         "adequate": (
-            "The model is adequate: these recordings show nothing that it lacks.",
-            "The model is adequate: one cause was found, but what it explains hardly matters.",
-            "The model is adequate: {many} were found, but what they explain hardly matters.",
+            "Nothing was found that the model lacks.",
+            "One cause was found, but what it explains hardly matters.",
+            "{Many} were found, but what they explain hardly matters.",
         ),
         "explained": (
-            "The model is adequate: these recordings show nothing that it lacks.",
+            "Nothing was found that the model lacks.",
             "One cause explains what the model gets wrong.",
             "{Many} together explain what the model gets wrong.",
         ),
