@@ -373,3 +373,18 @@ def test_a_reader_that_leaves_ends_nothing(case: dict[str, str], tmp_path: Path)
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         assert process.stderr.read() == b"" and process.wait(60) == 0
+
+
+# --- asking for help --------------------------------------------------------------------------------------------------
+
+
+def test_help_and_version_by_other_names(call: Call) -> None:
+    assert call("help").out == call("--help").out and call("help", "fit").out == call("fit", "--help").out
+    assert call("-V").out == call("--version").out
+    module = subprocess.run([sys.executable, "-m", "tendonfmu", "-V"], capture_output=True, text=True, check=True)
+    assert module.stdout == call("--version").out
+
+
+def test_summaries_of_commands_are_whole(call: Call) -> None:
+    commands = call("--help").out.partition("Commands:")[2]
+    assert commands.count("\n") > 14 and "..." not in commands and "…" not in commands

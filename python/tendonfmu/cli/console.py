@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NoReturn
+from typing import Any, IO, Literal, NoReturn, TYPE_CHECKING
 
 from tendonfmu.errors import InputError
 
@@ -132,7 +132,8 @@ def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None
     stream = _of_results()
     if stream is None:
         return
-    console = Console(file=stream, markup=False)  # names such as tendon_force[1] are no markup
+    colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"  # rich itself keeps bold
+    console = Console(file=stream, markup=False, color_system=colours)  # names such as tendon_force[1] are no markup
     if not console.is_terminal:  # a file has no width: keep each row on one line
         console.width = 160
     with reader_may_leave(stream):

@@ -35,24 +35,24 @@ app = typer.Typer(
     help="Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor.",
 )
 
-for name, function in {  # in the order of --help
-    "check": check.check,
-    "build": run.build,
-    "run": run.run,
-    "simulate": run.simulate,
-    "convert": convert.convert,
-    "import": import_mjcf.import_model,
-    "export": import_mjcf.export_model,
-    "describe": convert.describe,
-    "excite": excite.excite,
-    "fit": fit.fit,
-    "calibrate": calibrate.calibrate,
-    "diagnose": diagnose.diagnose,
-    "tune": detect.tune,
-    "score": detect.score,
-    "demo": demo.demo,
+for name, (function, summary) in {  # in the order of --help
+    "check": (check.check, "Check a description, and whether recordings belong to it."),
+    "build": (run.build, "Pack an FMU of a finger, or of a simulated one."),
+    "run": (run.run, "Run a model over a recording and write all outputs."),
+    "simulate": (run.simulate, "Simulate a finger and write the recording."),
+    "convert": (convert.convert, "Convert any log into a recording."),
+    "import": (import_mjcf.import_model, "Make a description from a MuJoCo model."),
+    "export": (import_mjcf.export_model, "Write fitted numbers into a MuJoCo model."),
+    "describe": (convert.describe, "Write a description to begin with."),
+    "excite": (excite.excite, "Plan a training motion."),
+    "fit": (fit.fit, "Estimate the numbers of a finger from free motion."),
+    "calibrate": (calibrate.calibrate, "The main way: from free motion to a tuned FMU."),
+    "diagnose": (diagnose.diagnose, "Show what a model gets wrong, and name the cause."),
+    "tune": (detect.tune, "Tune contact detection for a rate of false alarms."),
+    "score": (detect.score, "Measure contact detection against labels."),
+    "demo": (demo.demo, "Show every step on built-in data."),
 }.items():
-    app.command(name, cls=SeveralValues)(function)
+    app.command(name, cls=SeveralValues, short_help=summary)(function)
 
 
 @functools.cache
@@ -71,7 +71,10 @@ def main() -> None:
     warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
-            status = _commands()(prog_name="tendonfmu", standalone_mode=False)
+            asked = sys.argv[1:]
+            if asked[:1] == ["help"]:
+                asked = [*asked[1:2], "--help"]
+            status = _commands()(asked, prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
             if isinstance(refused, OSError) and ending.asked is not None:  # a bar on a closed terminal
                 _interrupted(ending.status)
@@ -150,7 +153,7 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="print the version and exit")
+        bool, typer.Option("--version", "-V", callback=_show_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
     """Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor."""
