@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, IO, Literal, NoReturn, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, Literal, NoReturn
 
 from tendonfmu.errors import InputError
 
