@@ -1,6 +1,4 @@
 """A loose guard of the fit's speed: a tenth of what docs/evidence/performance.md says, in CPU time.
-
-The figures themselves: evidence/fit/speed.py.
 """
 
 from __future__ import annotations

@@ -261,3 +261,12 @@ def test_bad_usage(call: Call, tmp_path: Path) -> None:
         answer = call("convert", *arguments)
         assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
         assert all(word in answer.err for word in words), answer.err
+
+
+def test_a_clock_is_found_by_its_values(tmp_path: Path) -> None:
+    """Whatever its name is; a counter of samples is none, and a ramp of a motor is not even."""
+    columns = {"n": np.arange(400), "Zeit": 7.0 + T, "tension": FORCE, "spool_position": SPOOL, "joint_angle": ANGLE}
+    line = proposed(tmp_path, columns)["time"]
+    assert (line.source, line.unit) == ("Zeit", "s")
+    columns.pop("Zeit")
+    assert proposed(tmp_path, columns)["time"].source == "?"

@@ -240,10 +240,10 @@ def test_a_missing_library_says_how_to_install_it(
     file = write(tmp_path, form, sound())
     real = importlib.import_module
 
-    def without(module: str) -> Any:
+    def without(module: str, package: str | None = None) -> Any:
         if module.split(".")[0] == library:
             raise ModuleNotFoundError(f"No module named {library!r}", name=library)
-        return real(module)
+        return real(module, package)
 
     monkeypatch.setattr(importlib, "import_module", without)
     with pytest.raises(InputError, match=rf"needs the Python package {library},.*pip install h5py mcap"):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
-from tendonfmu.recordings.converters.log import NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic, open_log
+from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic, open_log
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
@@ -89,6 +89,10 @@ class ClockSummary:
         return step * 1e-9 if self.stamp else None if factor is None else step * factor
 
 
+# of a clock without a clock's name: rows, difference of a step from the median one, and share of steps below it
+FEWEST_TIMES, UNEVEN, EVEN = 50, 0.5, 0.9
+
+
 @dataclass
 class TopicSummary:
     """A topic, its fields and its clock, if one of its fields can be one."""
@@ -134,7 +138,25 @@ def _empty_summary(topic: Topic) -> TopicSummary:
     return TopicSummary(topic, fields, ClockSummary(clock, "datetime" if is_moment else ""))
 
 
+def _clock_by_values(topic: TopicSummary, block: dict[str, Any]) -> ClockSummary | None:
+    """Return the field that rises at every row by nearly the same step; None if not one alone does."""
+    found = []
+    for summary in topic.fields:
+        values = block.get(summary.key)
+        if summary.field.kind != NUMBER or not isinstance(values, np.ndarray) or len(values) < FEWEST_TIMES:
+            continue
+        step = np.diff(values.astype(np.float64))
+        middle = float(np.median(step))
+        even = (np.abs(step - middle) < UNEVEN * abs(middle)).mean() if middle > 0.0 else 0.0
+        is_counter = values[0] in (0, 1) and bool((step == 1.0).all())
+        if (step > 0.0).all() and even > EVEN and not is_counter:
+            found.append(summary.key)
+    return ClockSummary(found[0], "") if len(found) == 1 else None
+
+
 def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
+    if topic.clock is None and not any(summary.count for summary in topic.fields):
+        topic.clock = _clock_by_values(topic, block)
     for summary in topic.fields:
         values = block.get(summary.key)
         if values is None:
