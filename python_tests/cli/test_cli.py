@@ -128,6 +128,11 @@ def test_check_of_something_else(call: Call, tmp_path: Path, text: str) -> None:
     assert "finger.json" in refused(call("check", described(tmp_path, text)), status=1)
 
 
+def test_check_of_files_in_the_wrong_order_says_so(call: Call) -> None:
+    answer = call("check", ROOT / "examples/demo_recording/two_joints_training.parquet", ROOT / "finger.json")
+    assert answer.status == 2 and "a recording; expected the description first: check FINGER.json" in answer.err
+
+
 def test_check_of_a_file_that_is_not_there(call: Call, tmp_path: Path) -> None:
     assert "absent.json" in refused(call("check", "absent.json"))
     assert str(tmp_path) in refused(call("check", tmp_path))

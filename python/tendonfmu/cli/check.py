@@ -33,6 +33,8 @@ def check(
     from tendonfmu.recordings import check_report, refusal_report
     from tendonfmu.simulate import describe_rig, is_rig, require_plant
 
+    if file.suffix in (".csv", ".parquet"):
+        raise InputError(f"{file}: a recording; expected the description first: check FINGER.json {file.name}")
     for recording in recordings or []:
         check_format(recording)
     rig = is_rig(file)

@@ -253,7 +253,8 @@ class _Changes:
         warnings = []
         if now < 4 or folds.folds - now < 4:
             warnings.append(
-                "less than 16 s of motion then or now: a change has to be large to be certain; record a minute of each"
+                "less than 16 s then or now can be compared, without contact and at like loads: a change has to be "
+                "large to be certain; record a minute of the same motion then and now"
             )
         return warnings
 
