@@ -26,6 +26,7 @@ from tendonfmu.calibration.report import (
     OF_PUSH,
     OF_SCORE,
     errors_of,
+    left_out,
     record_next,
     recording_of,
     structure_of,
@@ -345,11 +346,7 @@ class _Run:
             "fitted": min(nominal, key=together),
             "calibrated": case.errors(extended.data),
         }
-        touched = [
-            f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}; left out of the fit"
-            for event in extended.events
-        ]
-        return {"finger": extended.data, "error": error, "warnings": [*extended.warnings, *touched]}
+        return {"finger": extended.data, "error": error, "warnings": [*extended.warnings, *left_out(extended.events)]}
 
     def _refit(self) -> dict[str, Any]:
         """Fit with the previous numbers as the prior; keep those if the new ones are no better on unseen motion."""

@@ -10,12 +10,13 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect import ContactTuning, Scored, contact_at_rest, tune_report
-from tendonfmu.diagnosis import Diagnosis, residual_of
+from tendonfmu.diagnosis import Diagnosis, Event, residual_of
 from tendonfmu.estimate import residuals
 from tendonfmu.recordings import FitRecording, flagged_stretches, rms
 from tendonfmu.report import MotionShown, cards_of, names_of
 
 SHOWN = 20.0  # s
+MOST_SAID = 2  # stretches that are named one by one
 BEFORE, AFTER, POINTS = 0.5, 1.0, 1000  # s around a push that is shown, and samples of it at most
 OF_TUNING = (
     "method",
@@ -124,6 +125,16 @@ def typical_push(scored: Scored) -> dict[str, Any] | None:
         "felt": felt[rows, j].tolist(),
         "sensor": None if track.external is None else track.external[rows, j].tolist(),
     }
+
+
+def left_out(events: Sequence[Event]) -> list[str]:
+    """Say which stretches a fit left out: each, or of many how many and the longest."""
+    said = [f"{event.recording}: {event.start:.2f} to {event.end:.2f} s: {event.description}" for event in events]
+    if len(said) <= MOST_SAID:
+        return [f"{each}; left out of the fit" for each in said]
+    longest = max(range(len(said)), key=lambda k: events[k].end - events[k].start)
+    whole = sum(event.end - event.start for event in events)
+    return [f"{len(said)} stretches, {whole:.2g} s in all, are left out of the fit; the longest: {said[longest]}"]
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:

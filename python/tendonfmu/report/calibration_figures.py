@@ -12,6 +12,8 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import Curve, Panel, Sheet, line_of
 from tendonfmu.report.numbers import rms, rounded, torque_unit
 
+VISIBLE = 0.003  # of the longest recording: shorter alarms are drawn so long
+
 
 @dataclass(frozen=True)
 class MotionShown:
@@ -111,10 +113,15 @@ def pushes_sheet(pushes: Sequence[Mapping[str, Any]], alarms: Sequence[Mapping[s
         "missed": ("push, missed", [each for each in pushes if not each["found"]], "onset_s"),
         "false_alarm": ("alarm without a push", list(alarms), "begin_s"),
     }
+    least = VISIBLE * max(each["end_s"] for each in pushes)
     curves, keys = [], []
     for style, (meaning, stretches, begin) in kinds.items():
         for row, name in enumerate(names):
-            spans = [(each[begin], each["end_s"]) for each in stretches if each["recording"] == name]
+            spans = [
+                (each[begin], max(each["end_s"], each[begin] + least))
+                for each in stretches
+                if each["recording"] == name
+            ]
             curves += [Curve(style, *line_of(spans, row))] if spans else []
         keys += [(style, meaning)] if stretches else []
     panel = Panel(
