@@ -119,16 +119,6 @@ def is_at_place(cause: Cause, truth: Truth) -> bool:
     )
 
 
-def is_exactly_at_place(cause: Cause, truth: Truth) -> bool:
-    """The same of the first statement of the truth alone, where "everywhere" is no place."""
-    statements = [cause] if cause["effect"] in truth.effects else alternatives(cause)
-    return any(
-        place["effect"] in truth.effects and (place["joint"], place["tendon"]) == (truth.joint, truth.tendon)
-        for statement in statements
-        for place in places(statement)
-    )
-
-
 def _agrees(place: Cause, truth: Truth) -> bool:
     pairs = ((place.get("joint"), truth.joint), (place.get("tendon"), truth.tendon))
     return all(None in pair or pair[0] == pair[1] for pair in pairs)

@@ -9,7 +9,7 @@ import pytest
 
 from evidence.diagnosis.foreign_cases import ABSORBED, truth_of
 from evidence.fingers import foreign
-from evidence.judge import SYNONYMS, Truth, is_exactly_at_place, judge
+from evidence.judge import SYNONYMS, Truth, judge
 
 GRAVITY = Truth(("gravity",), joint=1)
 MORE_FRICTION = Truth(("joint_friction", "preload_friction"), joint=1, tendon=1, signs={"joint_friction": 1})
@@ -79,12 +79,6 @@ def test_what_is_allowed_is_neither_right_nor_false() -> None:
     judgement = judge([cause("stribeck"), cause("load_friction")], Truth(allowed=("stribeck",)))
     assert judgement.named == ("stribeck", "load_friction")
     assert judgement.false == judgement.friction == ("load_friction",)
-
-
-def test_the_first_statement_counts_where_the_place_has_to_be_exact() -> None:
-    elsewhere = cause("gravity", 2, confusable_with=alternative("gravity", joint=1))
-    assert not is_exactly_at_place(elsewhere, GRAVITY) and not is_exactly_at_place(cause("gravity"), GRAVITY)
-    assert is_exactly_at_place(cause("inertia", confusable_with=alternative("gravity", joint=1)), GRAVITY)
 
 
 @pytest.mark.parametrize(

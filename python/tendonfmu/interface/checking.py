@@ -35,14 +35,9 @@ class CheckResult:
         """Whether nothing is an error."""
         return all(finding.severity != "error" for finding in self.findings)
 
-    @property
-    def summary(self) -> list[str]:
-        """What the finger is, one line each."""
-        return self.finger.summary()
-
     def __repr__(self) -> str:
         lines = [f"{finding.severity}: {finding.line()}" for finding in self.findings] or ["nothing found"]
-        return "\n".join([*self.summary, *lines])
+        return "\n".join([*self.finger.summary(), *lines])
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"
