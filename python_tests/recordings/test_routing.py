@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from command import Call
+from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.model import Finger, finger_from_data, read_finger
@@ -228,3 +229,27 @@ def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
     assert call(*given).status == 2
     assert call(*given, "--tendon", "A mcp+", "--tendon", "A pip+").err.count("given twice") == 1
     assert call(*given, "--table", tmp_path / "nowhere.txt").status == 2
+
+
+@pytest.mark.long
+def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two MuJoCo fingers, one with spatial tendons: arms within 1 %, stiffness within 5 %, zeros within 3 steps."""
+    require("mujoco")
+    from evidence.detection import mujoco_pushes
+
+    monkeypatch.setitem(mujoco_pushes.SECONDS, "free", 130.0)
+    off, covered = [], []
+    for number in (3, 19):
+        mujoco_pushes.make(tmp_path, number, ("free",))
+        finger = read_finger(mujoco_pushes.description_file(tmp_path, number))
+        for pretension in mujoco_pushes.PRETENSIONS:
+            whole = read_recording(mujoco_pushes.place(tmp_path, number, "free", pretension))
+            for begin in (0.0, 65.0):
+                for each in learn_routing(finger, [whole[begin : begin + 60.0]]):
+                    covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
+                    off += [
+                        *(abs(arm.value / arm.described - 1.0) / 0.01 for arm in each.arms.values()),
+                        abs(each.stiffness.value / each.stiffness.described - 1.0) / 0.05,
+                        abs(each.zero.value) / (3.0 * STEP),
+                    ]
+    assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
