@@ -15,8 +15,9 @@ from command import Call
 from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
-from tendonfmu.model import Finger, finger_from_data, read_finger
+from tendonfmu.model import Finger, finger_from_data, read_finger, tendon_positions
 from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
+from tendonfmu.recordings.faults import tendon_angles
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 FREE = ROOT / "examples" / "demo_recording" / "index_finger_free.parquet"
@@ -253,3 +254,13 @@ def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypat
                         abs(each.zero.value) / (3.0 * STEP),
                     ]
     assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
+
+
+def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
+    finger, recording = made_up(6)
+    angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]
+    bare = [{key: value for key, value in row.items() if key != "zero"} for row in finger.data["tendons"]]
+    ordered, plain = (tendon_positions(data, angle, force) for data in (finger.data, {**finger.data, "tendons": bare}))
+    np.testing.assert_allclose(ordered - plain, np.broadcast_to(ZEROS, ordered.shape), atol=1e-15)
+    read = tendon_angles(replace(recording, groups={**recording.groups, "tendon_position": ordered}), finger)
+    np.testing.assert_allclose(read, angle, atol=1e-9)

@@ -71,9 +71,7 @@ def main() -> None:
     warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
-            asked = sys.argv[1:]
-            if asked[:1] == ["help"]:
-                asked = [*asked[1:2], "--help"]
+            asked = [*sys.argv[2:3], "--help"] if sys.argv[1:2] == ["help"] else sys.argv[1:]
             status = _commands()(asked, prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
             if isinstance(refused, OSError) and ending.asked is not None:  # a bar on a closed terminal

@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-from tendonfmu.model import moment_arms, pretension_vector
+from tendonfmu.model import moment_arms, pretension_vector, tendon_positions
 from tendonfmu.statistics import quintic
 
 START = 2.0  # s; all joints are at rest at the beginning of a block, while the pretension changes
@@ -235,7 +235,6 @@ def _sample(
     time = np.arange(blocks[-1][1] + 1) / plan.rate
     curves = [quintic.evaluate(path, time) for path in knots]
     position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
-    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
     if plan.vary is not None:
         tension = internal_tensions(data, plan.vary, time, plan.seed)
         pretension = tension.mean(axis=1)
@@ -250,7 +249,7 @@ def _sample(
         joint_acceleration=acceleration,
         tension=tension,
         pretension=pretension,
-        tendon_position=position @ moment_arms(data).T + tension / stiffness,
+        tendon_position=tendon_positions(data, position, tension),
         knots=knots,
         strokes=strokes,
         blocks=[(begin / plan.rate, end / plan.rate, level) for begin, end, level in blocks],

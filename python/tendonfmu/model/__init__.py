@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         moment_arms,
         pretension_vector,
         sliding_velocity,
+        tendon_positions,
         velocity_threshold,
         without_detection,
         working_point_weights,

@@ -99,6 +99,13 @@ def moment_arms(data: Mapping[str, Any]) -> Numbers:
     return np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
 
 
+def tendon_positions(data: Mapping[str, Any], angle: Numbers, force: Numbers) -> Numbers:
+    """Return the readings x0 = zero + R q + f0/k at joint angles and tendon forces."""
+    # angle: [N, n] (rad); force: [N, m] (N); returns [N, m] (m)
+    stiffness, zero = np.array([(row["stiffness"], row.get("zero") or 0.0) for row in data["tendons"]], dtype=float).T
+    return np.asarray(angle @ moment_arms(data).T + force / stiffness + zero)
+
+
 def pretension_vector(data: Mapping[str, Any]) -> Numbers:
     """Return the tendon forces per newton of pretension."""
     # returns [m]

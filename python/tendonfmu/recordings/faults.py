@@ -149,7 +149,8 @@ def expected_values(recording: Recording, finger: Finger, group: str, k: int) ->
 
 def tendon_angles(recording: Recording, finger: Finger) -> Numbers:
     """Return the joint angles [N, n] (rad) that follow from tendon positions and forces, R⁺(x0 − f0/k)."""
-    position = recording.groups["tendon_position"] - _stretch(recording, finger)
+    zero = [tendon.get("zero") or 0.0 for tendon in finger.data["tendons"]]
+    position = recording.groups["tendon_position"] - _stretch(recording, finger) - zero
     return np.asarray(position @ np.linalg.pinv(np.asarray(finger.moment_arms, dtype=float)).T)
 
 

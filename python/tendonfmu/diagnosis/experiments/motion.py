@@ -14,7 +14,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.experiments.menu import Entry, Section, own_tension
 from tendonfmu.excite import Excitation, Plan, plan_excitation
-from tendonfmu.model import balanced_forces, moment_arms
+from tendonfmu.model import balanced_forces, moment_arms, tendon_positions
 from tendonfmu.recordings import FitRecording, Recording, model_alone
 from tendonfmu.statistics import quintic
 
@@ -49,7 +49,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
     force = balanced_forces(data, motion, performed.tension + performed.load @ spread)
     groups = {
         "tendon_force": force,
-        "tendon_position": performed.joint_position @ moment_arms(data).T + force / _stiffness(data),
+        "tendon_position": tendon_positions(data, performed.joint_position, force),
         "joint_position": performed.joint_position,
         "joint_velocity": performed.joint_velocity,
         "external_torque": performed.load,
@@ -116,7 +116,7 @@ def _passage(data: Data, before: Excitation, after: Excitation, speed: float, ra
         tension=tension,
         pretension=pretension,
         load=load,
-        tendon_position=position @ moment_arms(data).T + tension / _stiffness(data),
+        tendon_position=tendon_positions(data, position, tension),
     )
 
 
@@ -125,7 +125,3 @@ def _stroke(start: Numbers, end: Numbers, seconds: float, time: Numbers) -> tupl
     share, slope, bend = quintic.evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
     share, slope, bend = (values if np.ndim(start) == 0 else values[:, None] for values in (share, slope, bend))
     return start + share * (end - start), slope * (end - start), bend * (end - start)
-
-
-def _stiffness(data: Data) -> Numbers:
-    return np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
