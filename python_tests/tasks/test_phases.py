@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from tendonfmu.cli.console import PhaseDisplay, time_left
+from tendonfmu.cli.console import PRINTED, PhaseDisplay, time_left
 from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}
@@ -21,7 +21,8 @@ class Clock:
 
 
 @pytest.fixture
-def clock() -> Clock:
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    monkeypatch.setattr(PRINTED, "quiet", False)  # a command that ran before may have left it set
     return Clock()
 
 
