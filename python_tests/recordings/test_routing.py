@@ -256,6 +256,13 @@ def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypat
     assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
 
 
+def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:
+    """Its stretch is rounding, as of a motor whose angle is the joint's."""
+    finger, recording = made_up(7, encoder=1e-9, stiff=1e6)
+    learned = learn_routing(finger, [recording])
+    assert [each.stiffness.is_known for each in learned] == [False] * 3 and routed(finger, learned)[1] == []
+
+
 def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
     finger, recording = made_up(6)
     angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]

@@ -33,6 +33,7 @@ SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joint
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
+RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
 
@@ -99,8 +100,7 @@ def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Tendo
     samples = [found for recording in measured if (found := _samples(recording)) is not None]
     if not samples:
         return []
-    learned = (_of_tendon(finger, i, samples) for i in range(len(finger.tendon_names)))
-    return [each for each in learned if each is not None]
+    return [each for i in range(finger.tendons) if (each := _of_tendon(finger, i, samples)) is not None]
 
 
 def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
@@ -246,12 +246,12 @@ def _of_tendon(finger: Finger, i: int, samples: Sequence[_Samples]) -> TendonRou
         int(j): _arm(f"tendons[{i + 1}].moment_arms[{j + 1}]", value[k], half[k], float(arms[j]))
         for k, j in enumerate(joints)
     }
-    at = len(joints)
+    at, least = len(joints), RIGID * float(position.std()) / max(float(columns[:, len(joints)].std()), 1e-12)
     arm = float(np.abs(arms).max())
     return TendonRouting(
         i,
         learned,
-        _stiffness(f"tendons[{i + 1}].stiffness", value[at], half[at], float(tendon["stiffness"])),
+        _stiffness(f"tendons[{i + 1}].stiffness", value[at], half[at], float(tendon["stiffness"]), least),
         Learned(
             f"tendons[{i + 1}].zero",
             value[-1],
@@ -268,8 +268,8 @@ def _arm(path: str, value: float, half: float, described: float) -> Learned:
     return Learned(path, value, half, described, half < KNOWN * abs(value), OTHER[0] * abs(described))
 
 
-def _stiffness(path: str, compliance: float, half: float, described: float) -> Learned:
-    is_known = half < KNOWN * compliance
+def _stiffness(path: str, compliance: float, half: float, described: float, least: float) -> Learned:
+    is_known = compliance > least and half < KNOWN * compliance
     value = 1.0 / compliance if compliance > 0.0 else described
     return Learned(path, value, half * value**2, described, is_known, OTHER[1] * described)
 
