@@ -156,7 +156,7 @@ def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -
     """Describe numbers of a tendon that the joint positions contradict."""
     i = learned.tendon
     seen = f"tendon {finger.tendon_names[i]}: " + "; ".join(routing_sentences(finger, learned))
-    write = "learn them with tendonfmu fit --routing or tendonfmu calibrate"
+    write = "tendonfmu calibrate learns them"
     return Finding(
         severity,
         "routing",
