@@ -21,7 +21,7 @@ def test_the_unloaded_library_leaves_nothing(plant_fmu: UnpackedFmu) -> None:
     """libstdc++, which is linked in, would keep 72,704 bytes for exceptions without memory."""
     count = 20
     used, opened = least_growth(plant_fmu, "unloaded", count)
-    assert used < 100 * count and opened == 0
+    assert used < 200 * count and opened == 0  # the allocator itself keeps up to some 2 kB on a busy machine
 
 
 # --- random calls -----------------------------------------------------------------------------------------------------
