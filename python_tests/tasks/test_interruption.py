@@ -70,6 +70,13 @@ def compute(*_, **__):
         try: time.sleep(0.01)
         except Exception: pass
 """,
+    "an import fails by it": """
+def compute(*_, **__):
+    ready()
+    try:
+        while True: time.sleep(0.01)
+    except KeyboardInterrupt: raise ImportError("numpy.core.multiarray failed to import") from None
+""",
     "the files are made": """
 def compute(*_, **__): return brief()
 whole = diagnosis_files.build_fmu

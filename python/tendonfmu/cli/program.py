@@ -74,7 +74,7 @@ def main() -> None:
             asked = [*sys.argv[2:3], "--help"] if sys.argv[1:2] == ["help"] else sys.argv[1:]
             status = _commands()(asked, prog_name="tendonfmu", standalone_mode=False)
         except (InputError, OSError) as refused:
-            if isinstance(refused, OSError) and ending.asked is not None:  # a bar on a closed terminal
+            if ending.asked is not None:  # a bar on a closed terminal, or an import that the signal cut short
                 _interrupted(ending.status)
             if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
                 sys.stderr.close()
@@ -89,6 +89,8 @@ def main() -> None:
                 leave(ending.status)
             raise
         except Exception as refused:
+            if ending.asked is not None:  # compiled modules turn it into an ImportError while they are loaded
+                _interrupted(ending.status)
             if is_without_memory(refused):
                 _refuse("not enough memory")
             # Bad usage is recognised by this method: its class has moved between versions of typer.
