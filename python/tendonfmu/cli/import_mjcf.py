@@ -96,21 +96,26 @@ def export_model(
     report: Annotated[
         Path | None, typer.Option(metavar="R.json", help="report of the fit: numbers it does not identify stay")
     ] = None,
+    replay: Annotated[
+        list[Path] | None, typer.Option(metavar="FREE...", help="free motion to judge the numbers by, in MuJoCo")
+    ] = None,
 ) -> None:
     """Write friction, damping, springs and armature of a description into a MuJoCo model.
 
     Joints and tendons are found by their names; the rest of the model stays
-    as it is. What MJCF cannot express is listed on standard error. Needs the
+    as it is. What MJCF cannot express is listed on standard error. With
+    --replay, numbers that make the model worse are not written. Needs the
     package mujoco: pip install mujoco.
     """
     from tendonfmu.files import check_output
     from tendonfmu.mjcf import export_numbers
 
     _check_kind("export", kind)
-    check_output(output, finger, model, *([] if report is None else [report]))
-    written = export_numbers(finger, model, output, report)
+    check_output(output, finger, model, *([] if report is None else [report]), *(replay or []))
+    written = export_numbers(finger, model, output, report, replay or [])
     _say_rows(output, "", [change.line() for change in written.changes])
-    _say_rows(output, "MJCF cannot express: ", written.left_out)
+    _say_rows(output, "", [row.line() for row in written.replay])
+    _say_rows(output, "left out: ", written.left_out)
     say(f"{output}: {counted(len(written.changes), 'number')} changed")
     print_json(lambda: written.report(finger, model, output))
 

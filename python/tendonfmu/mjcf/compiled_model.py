@@ -221,6 +221,24 @@ class CompiledModel:
             rows[j] = product[places]
         return rows - np.diag([joint.armature for joint in joints])
 
+    def leave_alone(self, tendons: Sequence[Tendon]) -> None:
+        """Let nothing but weight, inertia, springs and friction act: no spring of these tendons, stop or contact."""
+        m, flags = self._model, self._mujoco.mjtDisableBit
+        m.tendon_stiffness[[tendon.index for tendon in tendons]] = 0.0
+        m.opt.disableflags |= int(flags.mjDSBL_CONTACT) | int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_EQUALITY)
+
+    def needed_torque(
+        self, joints: Sequence[Joint], tendons: Sequence[Tendon], angle: Numbers, speed: Numbers, acceleration: Numbers
+    ) -> tuple[Numbers, Numbers]:
+        """Return the torque [n] that moves some joints so, all others at rest, and the tendons' arms [m, n] there."""
+        m, d = self._model, self._data
+        d.qpos[:], d.qvel[:], d.qacc[:] = m.qpos0, 0.0, 0.0
+        places = [joint.velocity for joint in joints]
+        d.qpos[[joint.position for joint in joints]] = angle
+        d.qvel[places], d.qacc[places] = speed, acceleration
+        self._mujoco.mj_inverse(m, d)
+        return d.qfrc_inverse[places], -self.tendon_jacobian()[np.ix_([each.index for each in tendons], places)]
+
     def axis_and_anchor(self, joint: Joint) -> tuple[Numbers, Numbers]:
         """Return direction and place of a joint's axis [3], [3] (m) in the world frame, at the angles placed."""
         return np.array(self._data.xaxis[joint.index]), np.array(self._data.xanchor[joint.index])

@@ -9,14 +9,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InternalError, own_fault
 from tendonfmu.estimate import FIT_REPORT
 from tendonfmu.files import counted, read_json, whole_file
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.finger_parts import motors_of
+from tendonfmu.mjcf.replay import replay_errors
 from tendonfmu.mjcf.xml_source import XmlSource
-from tendonfmu.model import Law, effects, extension_rows, read_finger, sides
+from tendonfmu.model import Finger, Law, effects, extension_rows, read_finger, sides
+from tendonfmu.recordings import admit, read_recordings
 
 SAME = 1e-9  # relative; a number that differs by less is not written again
 WRITTEN = ("inertia", "preload_friction")  # extensions that MJCF may express
@@ -48,11 +53,25 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Replayed:
+    """What a replay leaves at a joint, in N·m: with the model's numbers, and with those that were written."""
+
+    joint: str
+    before: float
+    after: float
+
+    def line(self) -> str:
+        """Describe it in a line."""
+        return f"replay, joint {self.joint}: {1e3 * self.before:.4g} → {1e3 * self.after:.4g} mN·m are left"
+
+
+@dataclass(frozen=True)
 class Export:
     """What was written."""
 
     changes: list[Change]  # numbers that differ from the model's
     left_out: list[str]  # what MJCF cannot express of the description, and numbers that the description does not have
+    replay: list[Replayed]  # a row a joint; empty without recordings
 
     def report(self, finger: Path, model: Path, output: Path) -> dict[str, Any]:
         """Return what was done, for `--json`. finger, model, output: files of the description, and of both models."""
@@ -63,12 +82,21 @@ class Export:
             "output": str(output),
             "changes": [asdict(change) for change in self.changes],
             "left_out": self.left_out,
+            "replay": [asdict(row) for row in self.replay],
         }
 
 
-def export_numbers(finger: Path, path: Path, output: Path, report: Path | None = None) -> Export:
-    """Write the numbers of a description into a model; those that a fit's report does not identify stay the model's."""
-    data = read_finger(finger).data
+def export_numbers(
+    finger: Path, path: Path, output: Path, report: Path | None = None, replay: Sequence[Path] = ()
+) -> Export:
+    """Write the numbers of a description into a model.
+
+    Those that a fit's report does not identify stay the model's, and those of a joint that the replay of recordings
+    finds worse with them.
+    """
+    read = read_finger(finger)
+    data, recordings = read.data, read_recordings(replay)
+    admit(read, recordings)
     model = CompiledModel(path)
     joints = [model.joint_named(name) for name in _names(finger, data, "joints")]
     for name in _names(finger, data, "tendons"):
@@ -78,20 +106,43 @@ def export_numbers(finger: Path, path: Path, output: Path, report: Path | None =
     unsure = {} if report is None else _unsure(report)
     wanted = [change for change in wanted if _is_sound(change, unsure, left_out)]
     changes = [change for change in wanted if not math.isclose(change.before, change.after, rel_tol=SAME)]
-    source = XmlSource(path)
-    for change in changes:
-        unit = source.angle_unit() if change.attribute == "springref" else 1.0
-        source.set_number(change.kind, change.name, change.attribute, change.after / unit)
-    text = source.text()
-    file = source.first_file()
-    if file is not None and output.resolve().parent != path.resolve().parent:
+    if output.resolve().parent != path.resolve().parent and (file := XmlSource(path).first_file()) is not None:
         raise InputError(
             f"{output}: the model refers to {file} beside it; expected an output in the folder of {path.name}"
         )
     with whole_file(output) as temporary:
-        temporary.write_bytes(text)
-        _check_written(temporary, changes)
-    return Export(changes, [*left_out, *_inexpressible(data)])
+        _write(path, changes, temporary)
+        rows: list[Replayed] = []
+        if recordings:
+            before = replay_errors(path, read, recordings)
+            worse = _worse(read, before, replay_errors(temporary, read, recordings))
+            for change in [each for each in changes if each.name in worse]:
+                left_out.append(f"{change.line()}: the replay {worse[change.name]}; the model's number stays")
+                changes.remove(change)
+            if worse:
+                _write(path, changes, temporary)
+            after = replay_errors(temporary, read, recordings)
+            rows = [Replayed(*row) for row in zip(read.joint_names, before.tolist(), after.tolist(), strict=True)]
+    return Export(changes, [*left_out, *_inexpressible(data)], rows)
+
+
+def _write(path: Path, changes: Sequence[Change], file: Path) -> None:
+    source = XmlSource(path)
+    for change in changes:
+        unit = source.angle_unit() if change.attribute == "springref" else 1.0
+        source.set_number(change.kind, change.name, change.attribute, change.after / unit)
+    file.write_bytes(source.text())
+    _check_written(file, changes)
+
+
+def _worse(finger: Finger, before: Numbers, after: Numbers) -> dict[str, str]:
+    """Return the joints that a replay finds worse than they were, the tendons that move them, and by how much."""
+    found: dict[str, str] = {}
+    for j in np.flatnonzero(after > before * (1.0 + SAME)):
+        names = [name for name, arms in zip(finger.tendon_names, finger.moment_arms, strict=True) if arms[j] != 0.0]
+        leaves = f"leaves {1e3 * after[j]:.4g} for {1e3 * before[j]:.4g} mN·m at {finger.joint_names[j]}"
+        found |= dict.fromkeys([finger.joint_names[j], *names], leaves)
+    return found
 
 
 def _unsure(report: Path) -> dict[str, str]:
