@@ -15,6 +15,7 @@ from command import Call
 from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
+from tendonfmu.files import write_table
 from tendonfmu.model import Finger, finger_from_data, read_finger, tendon_positions
 from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
 from tendonfmu.recordings.faults import tendon_angles
@@ -151,7 +152,7 @@ def test_what_the_motion_cannot_tell_stays() -> None:
     slack = {**recording.groups, "tendon_force": recording.groups["tendon_force"] * [1.0, 0.0, 1.0]}
     assert [each.tendon for each in learn_routing(finger, [replace(recording, groups=slack)])] == [0, 2]
     alone = {name: values for name, values in recording.groups.items() if name != "joint_position"}
-    assert learn_routing(finger, [replace(recording, groups=alone)]) == []
+    assert all(each.seen_from for each in learn_routing(finger, [replace(recording, groups=alone)]))
 
 
 def test_an_arm_that_varies_is_seen_and_no_other() -> None:
@@ -161,6 +162,8 @@ def test_an_arm_that_varies_is_seen_and_no_other() -> None:
     assert learned[0].varying[0] == pytest.approx(
         2e-3 * np.ptp(recording.groups["joint_position"][:, 0]) / 0.009, rel=0.1
     )
+    findings = belongs(finger, [recording])
+    assert findings[0].severity == "warning" and "tendon 1: moment arm at joint near changes" in findings[0].line()
 
 
 def test_reversed_columns_are_not_taken_for_the_routing(index: tuple[Finger, Recording]) -> None:
@@ -194,11 +197,53 @@ def test_fit_learns_the_routing_and_reports_it(tmp_path: Path, call: Call, index
 
 
 def test_fit_without_joint_positions_says_so(tmp_path: Path, call: Call) -> None:
-    two = ROOT / "examples" / "demo_recording"
-    said = call(
-        "fit", two / "two_joints.json", two / "two_joints_training.parquet", "-o", tmp_path / "f.json", "--routing"
-    )
-    assert said.status == 2 and "no routing can be learned; expected joint_position" in said.err
+    finger, recording = made_up(8)
+    data = {**finger.data, "joints": [{"name": "near"}], "contact": {"threshold": [0.1]}}
+    data["tendons"] = [{"stiffness": 3000.0, "moment_arms": [0.009]}]
+    columns = {f"{name}[1]": recording.groups[name][:, 0] for name in ("tendon_force", "tendon_position")}
+    write_table(tmp_path / "alone.csv", {"time": recording.time, **columns})
+    (tmp_path / "given.json").write_text(json.dumps(data), encoding="utf-8")
+    said = call("fit", tmp_path / "given.json", tmp_path / "alone.csv", "-o", tmp_path / "f.json", "--routing")
+    assert said.status == 2 and "no routing can be learned; expected joint_position, or more tendons" in said.err
+
+
+# --- without encoders -------------------------------------------------------------------------------------------------
+
+
+def test_redundant_tendons_show_their_stiffness() -> None:
+    """Intervals cover; at several joints no arm and no zero is known by itself."""
+    covered = []
+    for seed in range(10):
+        finger, recording = made_up(seed)
+        recording.groups.pop("joint_position")
+        given = changed(finger, stiffness=0.5)
+        learned = learn_routing(given, [recording])
+        assert all(
+            each.unknown == [number.path for number in each.numbers if number != each.stiffness] for each in learned
+        )
+        truth = [tendon["stiffness"] for tendon in finger.data["tendons"]]
+        covered += [abs(each.stiffness.value - truth[each.tendon]) <= each.stiffness.half for each in learned]
+        assert [number.path for number in routed(given, learned)[1]] == [each.stiffness.path for each in learned]
+    assert len(covered) == 30 and np.mean(covered) >= 0.85
+
+
+def test_at_one_joint_arms_are_known_against_each_other() -> None:
+    finger, recording = made_up(2)
+    recording.groups.update({name: values[:, :2] for name, values in recording.groups.items() if "tendon" in name})
+    recording.groups["tendon_position"] -= recording.groups.pop("joint_position")[:, 1:] @ ARMS[:2, 1:].T
+    data = json.loads(json.dumps(dict(finger.data)))
+    data["joints"], data["contact"] = data["joints"][:1], {"threshold": [0.1]}
+    data["tendons"] = [
+        {**tendon, "moment_arms": [factor * tendon["moment_arms"][0]]}
+        for tendon, factor in zip(data["tendons"][:2], (1.1, 1.0), strict=True)
+    ]
+    given = finger_from_data(data)
+    first, second = learn_routing(given, [recording])
+    assert (first.seen_from, second.seen_from) == ([1], [0])
+    assert not first.arms[0].is_known and second.arms[0].differs
+    assert second.arms[0].value == pytest.approx(1.1 * ARMS[1, 0], abs=3.0 * second.arms[0].half)
+    lines = [finding.line() for finding in belongs(given, [recording])]
+    assert "10 % larger than described (seen from tendon 1)" in lines[-1], lines
 
 
 def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:

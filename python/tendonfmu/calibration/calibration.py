@@ -175,7 +175,7 @@ class _Case:
     tests: list[FitRecording]
     pushes: list[Path]
     sentences: list[str]
-    routing: dict[str, Any] | None  # what was learned of it and changed; None if it was as described
+    routing: dict[str, Any] | None  # what was learned of it; None if it is as described
 
     @property
     def judged(self) -> list[FitRecording]:
@@ -226,7 +226,7 @@ def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], o
         require_no_contact(recording)
     given, learned = finger, learn_routing(finger, [*read, *others])
     finger, moved = routed(given, learned)
-    routing = routing_entry(given, learned) if moved else None
+    routing = routing_entry(given, learned) if moved or any(each.varying for each in learned) else None
     sentences = admit(finger, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
     held = Held() if tests else HELD
     seen = [prepare(finger, recording, options.kinematics, held) for recording in read]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         propose,
     )
     from .converters.table import Conversion, convert_table
-    from .faults import gaps
+    from .faults import gaps, tendon_angles
     from .match import UNFIT_FOR_SEARCH, admit, belongs
     from .match_text import check_report, recording_report, refusal_report, routing_entry
     from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences

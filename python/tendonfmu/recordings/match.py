@@ -170,9 +170,11 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
     if moves and tells(finger, recording.groups):
         done, left = repairs(balance)
         learned = [] if done else _routing(finger, recording)
-        if routed(finger, learned)[1]:
+        moved = routed(finger, learned)[1]
+        off = [each for each in learned if each.varying or (moved and each.differs)]
+        if moved or (off and left > UNFIT):
             severity = "error" if left > unfit else "warning"
-            return [text.routing(recording.path, finger, each, severity) for each in learned if each.differs], recording
+            return [text.routing(recording.path, finger, each, severity) for each in off], recording
         if (unit := _unit_of_forces(learned)) is not None:
             return [text.force_unit(recording.path, balance.group("tendon_force"), *unit)], recording
         if left > UNFIT:  # a correction that removes only a part of the misfit is a guess
@@ -181,6 +183,7 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         if len(done) == 1:
             done = [_likeliest(finger, recording, done[0])]
         findings = [text.repair(recording.path, fitting) for fitting in done]
+        findings += [text.routing(recording.path, finger, each, "warning") for each in off]
         for fitting in done:
             recording = _mended(recording, fitting.correction)
         if left > POOR:

@@ -154,18 +154,26 @@ def unfit(path: Path, left: float, severity: str, balance: Balance) -> Finding:
 
 def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -> Finding:
     """Describe numbers of a tendon that the joint positions contradict."""
-    i = learned.tendon
-    seen = f"tendon {finger.tendon_names[i]}: " + "; ".join(routing_sentences(finger, learned))
+    seen = _of_tendon(finger, learned)
     write = "tendonfmu calibrate learns them"
+    if not learned.differs:
+        write = "nothing; the angle that the FMU computes and the friction at that joint are off by part of this"
     return Finding(
         severity,
         "routing",
         path,
-        (f"tendon_position[{i + 1}]",),
+        (f"tendon_position[{learned.tendon + 1}]",),
         seen,
-        "numbers of the description that nobody measured",
+        "numbers of the description that nobody measured" if learned.differs else "a pulley that is not round",
         write,
     )
+
+
+def _of_tendon(finger: Finger, learned: TendonRouting) -> str:
+    said = "; ".join(routing_sentences(finger, learned))
+    others = ", ".join(finger.tendon_names[j] for j in learned.seen_from)
+    name = finger.tendon_names[learned.tendon].removeprefix("tendon ")
+    return f"tendon {name}: {said}" + f" (seen from {others})" * bool(others)
 
 
 def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
@@ -187,13 +195,11 @@ def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
 def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str, Any]:
     """Report what was learned of the routing: every number, and sentences on what is off and what is not known."""
     changed = {number.path for number in routed(finger, learned)[1]}
-    sentences = [
-        f"routing: tendon {finger.tendon_names[each.tendon]}: {'; '.join(said)}"
-        for each in learned
-        if (said := list(routing_sentences(finger, each)))
-    ]
-    unknown = [path for each in learned for path in each.unknown]
-    if unknown:
+    sentences = [f"routing: {_of_tendon(finger, each)}" for each in learned if each.differs or each.varying]
+    if any(each.seen_from for each in learned):
+        shown = "the stiffness of every tendon" + ", and arms and zeros of one against the other" * (finger.joints == 1)
+        sentences.append(f"routing: without joint positions, redundant tendons show {shown}; the others stay")
+    elif unknown := [path for each in learned for path in each.unknown]:
         sentences.append(f"routing: the motion does not tell {', '.join(unknown)}; the described values stay")
     numbers = [
         {

@@ -10,8 +10,8 @@ for correlated residuals, too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +33,8 @@ SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joint
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
+OF_NOISE = 0.05  # of the variance in any direction of the columns: with more, they do not tell
+NOISE_KNOWN = 0.2  # of its variance, to which the noise is known
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
@@ -64,6 +66,7 @@ class TendonRouting:
     stiffness: Learned
     zero: Learned
     varying: Mapping[int, float]  # joints at which the arm changes with the angle, by so much of it over the motion
+    seen_from: Sequence[int] = ()  # without encoders: the tendons whose positions give the angles
 
     @property
     def numbers(self) -> list[Learned]:
@@ -89,18 +92,60 @@ def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Tendo
     finger
         Says which tendon passes which joint (a moment arm that is not 0), and the numbers to compare with.
     recordings
-        Those without `joint_position` do not count.
+        Those without `joint_position` do not count, but where there are no others: then redundant tendons show
+        every stiffness, and at a single joint the arms and zeros of one against the other.
 
     Returns
     -------
     list of TendonRouting
         In the order of the tendons, without those that are slack or whose recordings are too short.
     """
-    measured = [each for each in recordings if "joint_position" in each.groups and len(each) >= FEWEST]
-    samples = [found for recording in measured if (found := _samples(recording)) is not None]
-    if not samples:
+    measured = [each for each in recordings if "joint_position" in each.groups]
+    if not measured:
+        return _of_redundancy(finger, recordings)
+    if (samples := _joined(measured)) is None:
         return []
     return [each for i in range(finger.tendons) if (each := _of_tendon(finger, i, samples)) is not None]
+
+
+def _of_redundancy(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
+    """Learn each tendon from angles that as many others as there are joints show.
+
+    That determines every stiffness, and at a single joint the arms and zeros of the spare tendons against those of the
+    first, which stay as described. At several joints arms that are off mix the angles: no arm is known by itself.
+    """
+    arms = np.asarray(finger.moment_arms)
+    kept = _independent(arms, range(finger.tendons))
+    found = []
+    for i in range(finger.tendons):
+        base = _independent(arms, [j for j in (kept if i not in kept else range(finger.tendons)) if j != i])
+        if len(base) < finger.joints:
+            continue
+        arm = arms[base, 0] if finger.joints == 1 else 1.0  # of several joints, positions tell as much as angles
+        zeros = np.array([float(finger.data["tendons"][j].get("zero") or 0.0) for j in base])
+        seen = [
+            replace(
+                each, groups={**each.groups, "joint_position": (each.groups["tendon_position"][:, base] - zeros) / arm}
+            )
+            for each in recordings
+        ]
+        samples = _joined(seen)
+        learned = None if samples is None else _of_tendon(finger, i, samples, base)
+        if learned is not None:
+            is_alone = i in kept or finger.joints > 1
+            arms_of = {j: replace(arm, is_known=arm.is_known and not is_alone) for j, arm in learned.arms.items()}
+            zero = replace(learned.zero, is_known=learned.zero.is_known and not is_alone)
+            found.append(replace(learned, arms=arms_of, zero=zero, varying={}, seen_from=base))
+    return found
+
+
+def _independent(arms: Numbers, tendons: Iterable[int]) -> list[int]:
+    """Choose, of these tendons, as many whose arms are independent as there are joints, or fewer."""
+    chosen: list[int] = []
+    for i in sorted(tendons, key=lambda i: -float(np.abs(arms[i]).max())):
+        if np.linalg.matrix_rank(arms[[*chosen, i]]) > len(chosen):
+            chosen.append(i)
+    return sorted(chosen)
 
 
 def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
@@ -108,8 +153,8 @@ def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Ten
     learned = learn_routing(finger, recordings)
     if not learned:
         raise InputError(
-            f"{recordings[0].path}: no routing can be learned; expected joint_position, and "
-            f"{FEWEST_BLOCKS * BLOCK:g} s of motion with taut tendons"
+            f"{recordings[0].path}: no routing can be learned; expected joint_position, or more tendons "
+            f"than joints, and {FEWEST_BLOCKS * BLOCK:g} s of motion with taut tendons"
             if recordings
             else "no recording; expected at least one"
         )
@@ -159,7 +204,7 @@ def _rounded(number: Learned) -> float:
 
 @dataclass(frozen=True)
 class _Samples:
-    """What the regression reads of a recording: signals [N, m] and [N, n], their noise, and blocks [N]."""
+    """What the regressions read: signals [N, m] and [N, n], variances of their noise, and numbers of blocks [N]."""
 
     position: Numbers
     force: Numbers
@@ -175,7 +220,7 @@ class _Samples:
 def _samples(recording: Recording) -> _Samples | None:
     groups, time = recording.groups, recording.time
     try:
-        noise = {name: white_noise(time, groups[name]) for name in ("tendon_force", "joint_position")}
+        noise = {name: white_noise(time, groups[name]) ** 2 for name in ("tendon_force", "joint_position")}
     except InputError:  # gaps everywhere
         return None
     return _Samples(
@@ -191,6 +236,23 @@ def _samples(recording: Recording) -> _Samples | None:
         & _changing(time, groups["tendon_position"])
         & np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None],
     )
+
+
+def _joined(recordings: Sequence[Recording]) -> _Samples | None:
+    """Put the samples of recordings with joint positions together; None if there are none."""
+    parts = [found for each in recordings if len(each) >= FEWEST and (found := _samples(each)) is not None]
+    if not parts:
+        return None
+    first = np.cumsum([0, *(int(each.block[-1]) + 1 for each in parts)])
+    size = [len(each.block) for each in parts]
+    whole = {
+        field.name: np.average([getattr(each, field.name) for each in parts], axis=0, weights=size)
+        if field.name.endswith("noise")
+        else np.concatenate([getattr(each, field.name) for each in parts])
+        for field in fields(_Samples)
+    }
+    whole["block"] += np.repeat(first[:-1], size)
+    return _Samples(**whole)
 
 
 def _changing(time: Numbers, values: Numbers) -> Flags:
@@ -216,28 +278,29 @@ def _speeds(time: Numbers, values: Numbers) -> Numbers:
 # --- one tendon -------------------------------------------------------------------------------------------------------
 
 
-def _of_tendon(finger: Finger, i: int, samples: Sequence[_Samples]) -> TendonRouting | None:
+def _of_tendon(finger: Finger, i: int, samples: _Samples, seen_from: Sequence[int] = ()) -> TendonRouting | None:
+    """Learn the numbers of a tendon. The angles are those of encoders, or seen from other tendons."""
     tendon = finger.data["tendons"][i]
     arms = np.asarray(tendon["moment_arms"], dtype=float)
-    joints = np.flatnonzero(arms)
-    force = np.concatenate([each.force[:, i] for each in samples])
-    sound = np.concatenate([each.sound[:, i] for each in samples])
-    taut = np.asarray((np.abs(force) > SLACK * np.abs(force).max()) & sound)
-    first = np.cumsum([0, *(int(each.block[-1]) + 1 for each in samples)])
-    block = np.concatenate([each.block + at for each, at in zip(samples, first[:-1], strict=True)])[taut]
-    if not taut.any() or len(np.unique(block)) < FEWEST_BLOCKS or not force.any():
+    joints = np.arange(finger.joints) if seen_from else np.flatnonzero(arms)
+    force = np.abs(samples.force)
+    taut = ((force > SLACK * force.max(axis=0)) & samples.sound)[:, [i, *seen_from]].all(axis=1)
+    block = samples.block[taut]
+    if len(np.unique(block)) < FEWEST_BLOCKS:
         return None
-    angle = np.concatenate([each.angle[:, joints] for each in samples])[taut]
-    speeds = [
-        np.concatenate([each.position_speed[:, i] for each in samples])[taut],
-        np.concatenate([each.force_speed[:, i] for each in samples])[taut],
-    ]
-    position = np.concatenate([each.position[:, i] for each in samples])[taut]
-    size = [float(len(each.block)) for each in samples]
-    noise = [np.average([each.angle_noise[j] ** 2 for each in samples], weights=size) for j in joints]
-    noise.append(np.average([each.force_noise[i] ** 2 for each in samples], weights=size))
-    columns = np.column_stack([angle, force[taut], *speeds])
-    found = _regression(columns, np.array([*noise, 0.0, 0.0]), position, block)
+    columns = np.column_stack(
+        [
+            samples.angle[:, joints],
+            samples.force[:, i],
+            samples.position_speed[:, i],
+            samples.force_speed[:, i],
+            samples.force[:, list(seen_from)],
+        ]
+    )[taut]
+    others = samples.force_noise[list(seen_from)]
+    noise = np.array([*samples.angle_noise[joints], samples.force_noise[i], 0.0, 0.0, *others])
+    position = samples.position[taut, i]
+    found = _regression(columns, noise, position, block)
     if found is None:
         return None
     value, half = found
@@ -245,6 +308,7 @@ def _of_tendon(finger: Finger, i: int, samples: Sequence[_Samples]) -> TendonRou
     learned = {
         int(j): _arm(f"tendons[{i + 1}].moment_arms[{j + 1}]", value[k], half[k], float(arms[j]))
         for k, j in enumerate(joints)
+        if arms[j] != 0.0
     }
     at, least = len(joints), RIGID * float(position.std()) / max(float(columns[:, len(joints)].std()), 1e-12)
     arm = float(np.abs(arms).max())
@@ -260,7 +324,7 @@ def _of_tendon(finger: Finger, i: int, samples: Sequence[_Samples]) -> TendonRou
             is_whole and half[-1] < KNOWN * arm,
             OTHER[2] * arm,
         ),
-        dict(_varying(columns, np.array([*noise, 0.0, 0.0]), position, block, joints)),
+        dict(_varying(columns, noise, position, block, joints)),
     )
 
 
@@ -306,6 +370,9 @@ def _regression(
     blocks, free = int(number.max()) + 1, int(number.max()) + 1 - design.shape[1]
     if free < 1 or np.linalg.eigvalsh(moments)[0] < 1e-9 * len(design):
         return None
+    share = float(np.linalg.eigvals(np.linalg.solve(design.T @ design, len(design) * of_noise)).real.max())
+    if share > OF_NOISE:
+        return None
     inverse = np.linalg.inv(moments)
     beta = inverse @ (design.T @ target)
     scores = np.zeros((blocks, len(beta)))
@@ -318,4 +385,5 @@ def _regression(
     at = np.append(used, True)
     value[at] = turn @ beta
     half[at] = stdtrit(free, LEVEL) * np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
+    half[:-1] += NOISE_KNOWN * share * np.abs(value[:-1])
     return value.tolist(), half.tolist()
