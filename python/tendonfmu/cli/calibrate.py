@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeAtPretensions, Progress, command
-from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, say, say_files, warn
+from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, say, say_files
 from tendonfmu.options import CalibrateOptions
 
 
@@ -68,10 +68,8 @@ def calibrate(
         display.note("writing the files")
         written = write_calibration(calibration, output)
     report = calibration.report
-    for sentence in report["warnings"]:
-        warn(sentence)
     if report["steps"]["repeated"]:
         say(f"unchanged since the last call, not repeated: {', '.join(report['steps']['repeated'])}")
-    print_tables(text.tables(report), text.lines(report), left="model")
+    print_results(text.tables(report), text.lines(report), left="model", warnings=report["warnings"])
     say_files(written)
     print_json((output / REPORT).read_text)

@@ -124,8 +124,14 @@ def leave(status: int) -> NoReturn:
     sys.exit(status)
 
 
-def print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
-    """Print tables of (title, headings, rows), then lines."""
+def print_results(tables: Iterable[Any], lines: Iterable[str], left: str, warnings: Iterable[str] = ()) -> None:
+    """Print tables of (title, headings, rows), lines, and then the warnings, each once."""
+    _print_tables(tables, lines, left)
+    for sentence in dict.fromkeys(warnings):
+        warn(sentence)
+
+
+def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -16,7 +16,7 @@ from tendonfmu.cli.console import (
     check_table,
     name_of,
     print_json,
-    print_tables,
+    print_results,
     say,
     warn,
     write_blocks,
@@ -146,10 +146,10 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in inspection.topics:
         line = clock_line(topic, proposal.time_factor)
-        print_tables([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
+        print_results([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")
-    print_tables([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
+    print_results([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
 
 
 def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import Progress, command
-from tendonfmu.cli.console import phase_bar, print_json, print_tables, say, warn
+from tendonfmu.cli.console import phase_bar, print_json, print_results, say, warn
 
 
 @command()
@@ -31,7 +31,7 @@ def demo(
         say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
         with phase_bar(progress) as show:
             chapter.run(show)
-        print_tables(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
+        print_results(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
     write_story(story)
-    print_tables((), file_lines(story), left="")
+    print_results((), file_lines(story), left="")
     print_json(lambda: story_report(story))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import Figures, FreeAtPretensions, Model, Progress, Report, command
-from tendonfmu.cli.console import NO, fail, print_json, print_tables, progress_bar, say, say_files, warn
+from tendonfmu.cli.console import NO, fail, print_json, print_results, progress_bar, say, say_files
 from tendonfmu.files import counted
 from tendonfmu.options import ScoreOptions, TuneOptions
 
@@ -48,14 +48,14 @@ def tune(
         fail(str(refused))
         raise typer.Exit(NO) from None
     tuning = result.tuning
-    for sentence in result.warnings:
-        warn(sentence)
     result.write(output)
     text = report_text(result.report)
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)
-    print_tables(detect_text.tune_tables(tuning), detect_text.tune_lines(tuning), left="joint")
+    print_results(
+        detect_text.tune_tables(tuning), detect_text.tune_lines(tuning), left="joint", warnings=result.warnings
+    )
     say(f"{output}: {options.method}, tuned on {60 * tuning.hours_:.1f} min of free motion")
     if figures is not None:
         say_files(write_tune_figures(tuning, figures))
@@ -87,12 +87,15 @@ def score(
     with progress_bar("runs", progress) as show, warnings.catch_warnings():
         warnings.simplefilter("ignore", ScoreWarning)  # printed below, one line each
         result = score_finger(model, recordings, progress=show, **vars(options))
-    for sentence in result.warnings:
-        warn(sentence)
     result.write(output)
     text = report_text(result.report)
     print_json(lambda: text)
-    print_tables(detect_text.score_tables(result.scored), detect_text.score_lines(result.scored), left="")
+    print_results(
+        detect_text.score_tables(result.scored),
+        detect_text.score_lines(result.scored),
+        left="",
+        warnings=result.warnings,
+    )
     say(f"{output}: {counted(result.events, 'event')}, {counted(result.false_alarms, 'false alarm')}")
     if figures is not None:
         from tendonfmu.report import write_score_figures

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeRecordings, Progress, command
-from tendonfmu.cli.console import PhaseDisplay, print_json, print_tables, progress_bar, say_files, warn
+from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, progress_bar, say_files, warn
 from tendonfmu.errors import InputError
 from tendonfmu.options import DiagnoseOptions
 
@@ -83,9 +83,12 @@ def diagnose(
             )
         display.note("writing the files")
         written = diagnosed.write(output)
-    for sentence in diagnosed.warnings:
-        warn(sentence)
-    print_tables(diagnosis_text.tables(diagnosed.found), diagnosis_text.lines(diagnosed.found), left="may also be")
+    print_results(
+        diagnosis_text.tables(diagnosed.found),
+        diagnosis_text.lines(diagnosed.found),
+        left="may also be",
+        warnings=diagnosed.warnings,
+    )
     say_files(written)
     print_json((output / REPORT).read_text)
 
@@ -132,7 +135,7 @@ def _history(
     written = write_history(history, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
     rows = list(rows_of_lines(history, names))
-    print_tables([(history.finger, headings, rows)] if rows else (), [headline(history)], left="trend")
+    print_results([(history.finger, headings, rows)] if rows else (), [headline(history)], left="trend")
     for name, why in history.failed:
         warn(f"{name}: left out: {why}")
     say_files(written)

@@ -14,7 +14,7 @@ from tendonfmu.cli.console import (
     check_table,
     name_of,
     print_json,
-    print_tables,
+    print_results,
     progress_bar,
     say,
     warn,
@@ -67,7 +67,7 @@ def excite(
     if report is not None:
         write_text(report, text)
     print_json(lambda: text)
-    print_tables(excite_text.tables(result), excite_text.lines(result), left="cannot be identified")
+    print_results(excite_text.tables(result), excite_text.lines(result), left="cannot be identified")
     say(f"{name_of(output)}: {counted(len(result.motion.time), 'row')}, {result.motion.time[-1]:g} s")
 
 
@@ -90,6 +90,6 @@ def _discriminate(
     motion = discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
     columns = motion.columns()
     write_table(output, columns)
-    print_tables((), motion.lines(), left="")
+    print_results((), motion.lines(), left="")
     print_json(lambda: motion.report(output))
     say(f"{name_of(output)}: {counted(len(columns['time']), 'row')}, {columns['time'][-1]:g} s")

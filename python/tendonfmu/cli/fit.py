@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import FingerFile, FreeRecordings, Progress, Report, command
-from tendonfmu.cli.console import INTERRUPTED, fail, fit_bar, print_json, print_tables, say, say_files, warn
+from tendonfmu.cli.console import INTERRUPTED, fail, fit_bar, print_json, print_results, say, say_files
 from tendonfmu.files import counted
 from tendonfmu.options import FitOptions
 
@@ -62,8 +62,6 @@ def fit(
         fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")
         sys.exit(INTERRUPTED)
     fitting = result.estimator
-    for sentence in result.warnings:
-        warn(sentence)
     result.write(output)
     text = report_text(result.report)
     if report is not None:
@@ -71,7 +69,7 @@ def fit(
     if ssv is not None:
         result.write(ssv)
     print_json(lambda: text)
-    print_tables(fit_text.tables(fitting), fit_text.lines(fitting), left="joint")
+    print_results(fit_text.tables(fitting), fit_text.lines(fitting), left="joint", warnings=result.warnings)
     say(f"{output}: {counted(len(fitting.parameters_), 'number')} estimated")
     if report is not None:
         say(f"{report}: all results, as JSON")

@@ -408,13 +408,14 @@ class ContactTuning(Configured):
     def _sentences(self) -> list[str]:
         sentences = []
         least = least_hours(self.rate_, self.confidence)
-        for pretension in self.pretensions_:
-            if pretension.hours < least and len(self.pretensions_) > 1:
-                sentences.append(
-                    f"{60 * pretension.hours:.1f} min at {pretension.force:.3g} N: alone they support no rate below "
-                    f"{rate_limit(0, pretension.hours, self.confidence):.3g} per hour; "
-                    f"{60 * (least - pretension.hours):.1f} min more are needed"
-                )
+        short = [
+            f"{60 * each.hours:.1f} min at {each.force:.3g} N no rate below "
+            f"{rate_limit(0, each.hours, self.confidence):.3g} per hour ({60 * (least - each.hours):.1f} min more)"
+            for each in self.pretensions_
+            if each.hours < least and len(self.pretensions_) > 1
+        ]
+        if short:
+            sentences.append(f"each pretension alone supports less: {', '.join(short)}")
         if len(self.pretensions_) == 1:
             low, high = self.forces_
             sentences.append(
