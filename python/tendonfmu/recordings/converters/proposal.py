@@ -18,6 +18,7 @@ from tendonfmu.recordings.converters.guesses import (
     GUESS,
     KNOWN,
     LIKELY,
+    OTHERS,
     SI,
     SURE,
     Guess,
@@ -33,7 +34,7 @@ from tendonfmu.recordings.converters.guesses import (
 )
 from tendonfmu.recordings.converters.guesses import UNDECIDED as NOT_SURE
 from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummary, Inspection, TopicSummary
-from tendonfmu.recordings.converters.log import TIME
+from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
 LONGEST_NAME = 40  # characters in a table
@@ -86,6 +87,8 @@ def propose(inspection: Inspection) -> Proposal:
         lines, orders = _joint(inspection, groups), []
     else:
         lines = [_doubtful(line, orders) for line in _finger(inspection, slots, by_name)]
+        if not groups.get("joint_position"):
+            lines += _perhaps_angles(inspection, {line.source for line in lines}, len(slots.get("tendon_force", [])))
         lines += _contact(groups.get("contact", []))
     used = {line.source for line in lines}
     names = [summary.field.name for topic in inspection.topics for summary in topic.fields]
@@ -173,6 +176,24 @@ def _finger(inspection: Inspection, slots: Slots, by_name: Container[str]) -> li
             line = _line(inspection, f"{name}[{k}]", name, member[1], of_tendons and count > seen)
             lines.append(_by_name(line) if of_tendons and _name(member) in by_name else line)
     return lines
+
+
+def _perhaps_angles(inspection: Inspection, used: Container[str | int], most: int) -> Iterator[Line]:
+    """Yield lines for unused fields that come as a group with names of their own, as encoders of joints do."""
+    families: dict[str, list[FieldSummary]] = {}
+    for topic in inspection.topics:
+        for summary in topic.fields:
+            words = words_of(summary.field.name)
+            moves = summary.field.kind == NUMBER and summary.low < 0.0 < summary.high
+            if words and moves and _source(summary) not in used and not OTHERS & set(words):
+                families.setdefault(words[0], []).append(summary)
+    for stem, members in families.items():
+        if 1 < len(members) <= most:
+            fields = counted(len(members), "unused field")
+            why = f"{fields} named {stem}: angles of joints? State the unit, or remove this"
+            for k, summary in enumerate(members, start=1):
+                yield Line(f"joint_position[{k}]", _source(summary), UNDECIDED, NOT_SURE, why)
+            return
 
 
 def _contact(members: Sequence[Member]) -> list[Line]:
