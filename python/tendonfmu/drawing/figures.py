@@ -53,7 +53,7 @@ TEMPLATE = go.layout.Template(  # what all figures share
         "hovermode": "x unified",
         "hoverlabel": {"bgcolor": "#fff", "font": {"family": _FONT, "size": 12}},
         "xaxis": {**_AXIS, "showgrid": False, "ticklabelposition": "outside"},
-        "yaxis": {**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6"},
+        "yaxis": {**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6", "automargin": "left"},
     },
     _validate=False,
 )
