@@ -1,4 +1,4 @@
-"""How well contact is detected on the simulated hand, beside simpler models and the best that the residual allows.
+"""How well contact is detected on the simulated hand, beside simpler models.
 
     python -m evidence.detection.contact -o FOLDER [--finger NAME=FILE ...]
 
@@ -29,7 +29,6 @@ from evidence.detection.hand import (
     takes,
     training_file,
 )
-from evidence.detection.matched import matched_findings
 from evidence.detection.rivals import Detector, best_thresholds, from_json, make_rivals, to_json
 from evidence.runner import INDEX_FINGER, named_finger, parser, publish, run_cases, say, write
 from evidence.tables import Row
@@ -108,10 +107,8 @@ def campaign(folder: Path, fingers: Sequence[Detector], parts: int, alone: bool,
         size = max(abs(np.array(push["torque"])) / rms[push["pretension"]])
         push["class"] = [name for name, least in SIZES.items() if size >= least][-1]
     detectors = [Detector.of_file("description", INDEX_FINGER), fitted, *fingers]
-    findings: dict[str, list[float]] = {}
     if not alone:
         detectors += tuned_rivals(folder, fitted.description, free)
-        findings = matched_findings(folder, fitted, pushes, parts)
     cases = {
         f"{take.name}-{detector.digest}": (folder, take, detector)
         for detector in detectors
@@ -119,8 +116,6 @@ def campaign(folder: Path, fingers: Sequence[Detector], parts: int, alone: bool,
     }
     scores = run(scored, cases, folder / "scores")
     rows = [row for score in scores for row in _answers(pushes, score)]
-    for name, values in findings.items():
-        rows += [{**push, "detector": name, "found": value} for push, value in zip(pushes, values, strict=True)]
     return report(rows, scores, [finger.name for finger in fingers])
 
 

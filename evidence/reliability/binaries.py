@@ -1,10 +1,9 @@
-"""R5 to R12: the compiled step, alone and behind FMI: bits, hours, threads, real time, the host."""
+"""R5 to R11: the compiled step, alone and behind FMI: bits, hours, threads, real time."""
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -167,30 +166,6 @@ def same_bits(run: Run) -> Outcome:
     return Outcome(number, f"{apart} results differ by a bit", apart == 0)
 
 
-def comma_locale(run: Run) -> tuple[str | None, dict[str, str]]:
-    """A locale with a decimal comma, and the environment to find it in."""
-    if shutil.which("localedef") is None or not Path("/usr/share/i18n/locales/de_DE").exists():
-        return None, {}
-    folder = run.work / "locales"
-    folder.mkdir(exist_ok=True)
-    subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", folder / "de_DE.UTF-8"], capture_output=True)
-    return "de_DE.UTF-8", {"LOCPATH": str(folder), "RELIABILITY_LOCALE": "de_DE.UTF-8"}
-
-
-def host(run: Run) -> Outcome:
-    locale, environment = comma_locale(run)
-    samples = run.count(20_000, 500)
-    answer = answers(run, "host", calibrated(run), samples, env={**os.environ, **environment})
-    modes, calls, changed = map(int, answer[:3])
-    number = f"{spoken(calls)} calls in {modes} floating-point modes (rounding × flush to zero), locale {locale or 'C'}"
-    result = (
-        f"{changed} calls changed rounding, masks, x87 word, locale, current folder, umask or SIGFPE; "
-        f"outputs in other modes differ by at most {float(answer[3]):.1g}, the largest being {float(answer[4]):.2g} "
-        "(N·m, rad or rad/s)"
-    )
-    return Outcome(number, result, changed == 0)
-
-
 ROWS: dict[str, Measure] = {
     "R5": restored,
     "R6": damaged,
@@ -198,5 +173,4 @@ ROWS: dict[str, Measure] = {
     "R9": threads,
     "R10": real_time,
     "R11": same_bits,
-    "R12": host,
 }

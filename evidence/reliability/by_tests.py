@@ -47,24 +47,24 @@ ROWS: dict[str, Measure] = {
         "pass: in the round that left least less than a byte each, and no handle",
         *(*REFUSALS, "instances_and_loads"),
     ),
-    "R13": by_pytest(
+    "R12": by_pytest(
         "tests of both libraries", "pass: fmi2* alone, libc and libm alone, no executable stack", *EXPORTS
     ),
-    "R15": by_pytest(
+    "R14": by_pytest(
         "formats of logs, cut off at each byte, or at 6,000 places of the longer ones",
         "formats: each prefix is refused in one line or gives the beginning of the log",
         *("python_tests/recordings/test_log_faults.py", "-k", "cut_off"),
         environment={"TENDONFMU_CUTS": "6000"},
     ),
-    "R16": by_pytest(
+    "R15": by_pytest(
         "tests of archives",
         "pass: refused in one line, or run without the odd member; nothing left, nothing outside",
         f"{FMU}/test_fmu_archives.py",
     ),
-    "R19": by_pytest(
+    "R18": by_pytest(
         "test: 1e6 steps of 8 fingers × 10 recordings, 70 unknowns each",
         "passes: least eigenvalue of the correlations never 0 or below, NEES within 4 standard deviations",
         "python_tests/estimate/test_learner_consistency.py",
     ),
-    "R20": emulated,
+    "R19": emulated,
 }

@@ -1,4 +1,4 @@
-"""R17 and R18: commands that are killed, and machines that have no room left."""
+"""R16 and R17: commands that are killed, and machines that have no room left."""
 
 from __future__ import annotations
 
@@ -234,4 +234,4 @@ def no_room(run: Run) -> Outcome:
     return Outcome(number, with_wrong(result, wrong), not wrong and leaked == 0)
 
 
-ROWS: dict[str, Measure] = {"R17": kills, "R18": no_room}
+ROWS: dict[str, Measure] = {"R16": kills, "R17": no_room}

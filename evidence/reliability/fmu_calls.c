@@ -4,7 +4,6 @@
  *                                                               made anew and restored at each of PIECES
  *   fmu_calls threads LIBRARY GUID LOCATION TABLE SAMPLES COUNT as many instances, one on each thread
  *   fmu_calls quiet LIBRARY GUID LOCATION TABLE SAMPLES         allocations and system calls of set, step and get
- *   fmu_calls host LIBRARY GUID LOCATION TABLE SAMPLES          the host's modes before and after each call
  *   fmu_calls save LIBRARY GUID LOCATION TABLE SAMPLES FILE     a saved state
  *   fmu_calls states LIBRARY GUID LOCATION TABLE SAMPLES FLIPS FILE...  states that are no state of this FMU
  *   fmu_calls hungry LIBRARY GUID LOCATION TABLE SAMPLES        each allocation fails once
@@ -14,8 +13,6 @@
 #define _GNU_SOURCE
 
 #include <dlfcn.h>
-#include <fenv.h>
-#include <locale.h>
 #include <malloc.h>
 #include <math.h>
 #include <pthread.h>
@@ -340,7 +337,6 @@ static void quiet(long samples) {
   printf("%ld %d %d %d\n", counted, wrong, status, noticed);
 }
 
-#include "fmu_host_modes.h"
 #include "fmu_saved_states.h"
 #endif
 
@@ -361,8 +357,6 @@ int main(int count, char** words) {
 #if !defined(__SANITIZE_THREAD__)
   } else if (!strcmp(what, "quiet")) {
     quiet(samples);
-  } else if (!strcmp(what, "host")) {
-    host(samples);
   } else if (!strcmp(what, "hungry")) {
     hungry();
   } else if (!strcmp(what, "states")) {

@@ -282,4 +282,7 @@ def test_unused_fields_that_come_as_a_group_may_be_joints(call: Call, tmp_path: 
         line = lines[f"joint_position[{k}]"]
         assert (line.source, line.unit, line.sure) == (f"halla_{name}", "?", "undecided")
     assert not {"heat_flex", "odd"} & {line.source for line in lines.values()}
-    assert '"?" is left to you: joint_position[1], joint_position[2]' in call("convert", "inspect", "log.csv", "-o", "new.json").err
+    assert (
+        '"?" is left to you: joint_position[1], joint_position[2]'
+        in call("convert", "inspect", "log.csv", "-o", "new.json").err
+    )
