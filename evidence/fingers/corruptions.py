@@ -130,6 +130,43 @@ def with_velocity(factor: float, frame: pd.DataFrame, columns: list[str]) -> pd.
     return frame
 
 
+def unsigned(frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+    """Readings of 16 bits around the middle of the range, their sign lost."""
+    for column in columns:
+        step = np.ptp(frame[column]) / 4000
+        frame[column] = step * (np.round((frame[column] - frame[column].median()) / step) % 65536)
+    return frame
+
+
+def filled(seconds: float, frame: pd.DataFrame, _: list[str]) -> pd.DataFrame:
+    """Straight lines in all columns over a time in the middle."""
+    frame, middle = frame.astype(float), frame.time.iloc[len(frame) // 2]
+    lost = (frame.time > middle) & (frame.time < middle + seconds)
+    for column in frame.columns.drop("time"):
+        frame.loc[lost, column] = np.interp(frame.time[lost], frame.time[~lost], frame.loc[~lost, column])
+    return frame
+
+
+def slowed(every: int, frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+    """Columns that are only read at every so-many-th sample."""
+    frame[columns] = frame[columns].iloc[(np.arange(len(frame)) // every) * every].to_numpy()
+    return frame
+
+
+def switched(factor: float, frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+    """Another unit in the second half."""
+    frame.loc[frame.index[len(frame) // 2 :], columns] *= factor
+    return frame
+
+
+def drifting(ppm: float, frame: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+    """A clock of their own that runs faster."""
+    time = frame.time * (1.0 + 1e-6 * ppm)
+    for column in columns:
+        frame[column] = np.interp(time, frame.time, frame[column])
+    return frame
+
+
 # --- all of them ------------------------------------------------------------------------------------------------------
 
 
@@ -139,6 +176,23 @@ def corruptions() -> Iterator[Corruption]:
     yield from _units()
     yield from _sensors()
     yield from _clocks()
+    yield from _traps()
+
+
+def _traps() -> Iterator[Corruption]:
+    for group, factor, unit in (
+        ("tendon_force", 1e3, "mN"),
+        ("tendon_position", 1e3, "mm"),
+        ("joint_position", 180 / np.pi, "degrees"),
+    ):
+        name = f"{group}, 1"
+        yield Corruption("unsigned", name, group, 1, unsigned, ("wrapped",))
+        yield Corruption("half in another unit", f"{name}, {unit}", group, 1, partial(switched, factor), ("switched",))
+        yield Corruption("slower sensor", f"{group}, every 4th sample", group, 0, partial(slowed, 4), ("slow",))
+    yield Corruption("filled", "a gap of 0.5 s, by straight lines", "time", 0, partial(filled, 0.5), ("filled",))
+    for ppm in (10.0, 100.0):
+        name = f"joint_position, {ppm:g} ppm"
+        yield Corruption("drift", name, "joint_position", 0, partial(drifting, ppm), ("drift",))
 
 
 def _signs() -> Iterator[Corruption]:

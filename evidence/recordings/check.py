@@ -85,7 +85,8 @@ def is_explained(findings: list[Finding], corruption: Corruption, chosen: list[s
         return _is_reordered(right, corruption, columns, elements)
     if corruption.factor is None or corruption.group == "time":
         named = {column for finding in right for column in finding.columns}
-        return bool(right) and (corruption.group == "time" or set(columns) <= named)
+        is_whole = corruption.group in ("time", *named) or "time" in named
+        return bool(right) and (is_whole or set(columns) <= named)
     return _is_mended(right, columns, corruption.factor)
 
 

@@ -74,3 +74,16 @@ def test_terminals_are_filled_for_inputs() -> None:
         image = pixels(stream)
         middles[is_input] = tuple(int(part) for part in image[image.shape[0] // 2, image.shape[1] // 3])
     assert middles == {True: BLUE, False: (255, 255, 255)}
+
+
+def test_a_finger_without_friction_is_drawn() -> None:
+    """The legend has one entry: the end of a tendon."""
+    bare = {
+        "format": "tendonfmu-finger-1",
+        "name": "bare",
+        "joints": [{"name": "j"}],
+        "tendons": [{"name": "a", "stiffness": 1e5, "moment_arms": [0.004]}],
+        "contact": {"threshold": [0.03]},
+    }
+    picture, _ = drawn(bare)
+    assert (picture[int(0.85 * len(picture)) :] < 100).any()

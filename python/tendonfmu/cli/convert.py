@@ -131,7 +131,7 @@ def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
     inspection = inspect_log(file)
     proposal = propose(inspection)
     _print_inspection(inspection, proposal)
-    for note in inspection.notes:
+    for note in (*inspection.notes, *proposal.notes):
         warn(note)
     if output is not None:
         write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")

@@ -180,7 +180,7 @@ def _write_names(picture: Raster, drawing: FingerDrawing) -> None:
 def _draw_legend(picture: Raster, drawing: FingerDrawing, middle: float, bottom: float) -> None:
     """Explain the marks in rows above `bottom`, the longest row around x = `middle`."""
     entries = _legend(drawing.tendons)
-    columns = 2 if len(drawing.joints) == 1 else len(entries)
+    columns = min(len(entries), 2 if len(drawing.joints) == 1 else len(entries))
     rows = [entries[i : i + columns] for i in range(0, len(entries), columns)]
     widths = [
         max(1.9 * SIZE + picture.length(row[k][1], 0.85 * SIZE) for row in rows if k < len(row)) for k in range(columns)

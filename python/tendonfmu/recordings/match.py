@@ -39,8 +39,9 @@ from tendonfmu.recordings.kinematics import (
     velocity_corrections,
 )
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
-from tendonfmu.recordings.routing import TendonRouting, learn_routing, routed
+from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
+from tendonfmu.recordings.traps import find_traps
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
 UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found
@@ -110,6 +111,10 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
     unit = clock.entries.get("time", {}).get("scale") if clock else None
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
+    traps = [text.trap(recording.path, found) for found in find_traps(finger, recording)]
+    if _has_error(traps):  # equations and other channels tell nothing then
+        return [*findings, *traps]
+    findings += traps
     kinematic, mended = _of_kinematics(finger, recording, unfit)
     channels = held_channels(mended, finger)
     held = []
@@ -184,6 +189,8 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
             done = [_likeliest(finger, recording, done[0])]
         findings = [text.repair(recording.path, fitting) for fitting in done]
         findings += [text.routing(recording.path, finger, each, "warning") for each in off]
+        if (drift := clock_drift(learned)) is not None and drift.differs:
+            findings.append(text.drift(recording.path, drift, float(np.ptp(recording.time))))
         for fitting in done:
             recording = _mended(recording, fitting.correction)
         if left > POOR:

@@ -36,6 +36,7 @@ LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it:
 OF_NOISE = 0.05  # of the variance in any direction of the columns: with more, they do not tell
 NOISE_KNOWN = 0.2  # of its variance, to which the noise is known
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
+LEAST_DRIFT = 5e-6  # s/s of a clock against another
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
 
@@ -66,6 +67,7 @@ class TendonRouting:
     stiffness: Learned
     zero: Learned
     varying: Mapping[int, float]  # joints at which the arm changes with the angle, by so much of it over the motion
+    drift: Learned  # s/s, by which the clock of the angles runs faster than that of the tendon
     seen_from: Sequence[int] = ()  # without encoders: the tendons whose positions give the angles
 
     @property
@@ -199,6 +201,17 @@ def _rounded(number: Learned) -> float:
     return float(f"{number.value:.{digits}g}")
 
 
+def clock_drift(learned: Sequence[TendonRouting]) -> Learned | None:
+    """Return how much faster (s/s) the clock of the joint positions runs than that of the tendons; None: not known."""
+    known = [each.drift for each in learned if each.drift.is_known]
+    if not known:
+        return None
+    weights = np.array([each.half for each in known]) ** -2.0
+    value = float(np.average([each.value for each in known], weights=weights))
+    half = max(min(each.half for each in known), float(np.median([abs(each.value - value) for each in known])))
+    return replace(known[0], value=value, half=half)
+
+
 # --- samples ----------------------------------------------------------------------------------------------------------
 
 
@@ -294,11 +307,13 @@ def _of_tendon(finger: Finger, i: int, samples: _Samples, seen_from: Sequence[in
             samples.force[:, i],
             samples.position_speed[:, i],
             samples.force_speed[:, i],
+            # an angle that is read later and later leaves a part that grows with speed and time
+            samples.position_speed[:, i] * BLOCK * (samples.block - samples.block.mean()),
             samples.force[:, list(seen_from)],
         ]
     )[taut]
     others = samples.force_noise[list(seen_from)]
-    noise = np.array([*samples.angle_noise[joints], samples.force_noise[i], 0.0, 0.0, *others])
+    noise = np.array([*samples.angle_noise[joints], samples.force_noise[i], 0.0, 0.0, 0.0, *others])
     position = samples.position[taut, i]
     found = _regression(columns, noise, position, block)
     if found is None:
@@ -325,6 +340,7 @@ def _of_tendon(finger: Finger, i: int, samples: _Samples, seen_from: Sequence[in
             OTHER[2] * arm,
         ),
         dict(_varying(columns, noise, position, block, joints)),
+        Learned("time", -value[at + 3], half[at + 3], 0.0, bool(np.isfinite(half[at + 3])), LEAST_DRIFT),
     )
 
 

@@ -78,7 +78,9 @@ def _strongest(series: BlockSeries, flat: Numbers, used: NDArray[np.bool_]) -> t
         power += np.abs(np.fft.rfft(signal)) ** 2 / max(float(np.sum(flat[rows] ** 2)), 1e-300)
         waves += 1
     frequency = np.fft.rfftfreq(length, series.step)
-    allowed = (frequency >= LOWEST) & (frequency <= 0.45 / series.step)
+    # Blocks are further apart than they are long where the samples are.
+    apart = max(series.step, float(np.median(np.concatenate([np.diff(series.time[rows]) for rows in places]))))
+    allowed = (frequency >= LOWEST) & (frequency <= 0.45 / apart)
     if not waves or allowed.sum() < 4 * BACKGROUND:
         return None
     ratio = power / _background(power) * gammainccinv(waves, 0.5)

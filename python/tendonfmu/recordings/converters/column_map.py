@@ -1,6 +1,7 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset). Where `convert inspect` could not
+Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first brings readings of a
+counter that starts again into its middle. Where `convert inspect` could not
 decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
 `schema/map.schema.json` defines them for editors.
 """
@@ -61,10 +62,14 @@ class MappedColumn:
     stamp: str = ""  # one of `units.STAMPS` if the readings are points in time, or ""
     zone: str = "UTC"  # time zone of texts without one
     pattern: str = ""  # pattern of texts (`datetime.strptime`), or "": ISO 8601
+    rate: float = 0.0  # rows a second of a log without a column of time, or 0
+    wrap: float = 0.0  # readings after which a counter starts again, or 0; those above half of it count as negative
 
     def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
         """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
         # no unnecessary arithmetic: numbers in SI must not change by rounding
+        if self.wrap:
+            readings = (readings + self.wrap / 2.0) % self.wrap - self.wrap / 2.0
         shifted = readings - self.offset if self.offset else readings
         return (shifted * self.factor if self.factor != 1.0 else shifted).astype(np.float64)
 
@@ -230,8 +235,6 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
         if node.member(word).absent:
             node.member(word).refuse(f"the log's column of it, in one of {', '.join(parts[word])}")
     name, cutoff = node.member("name"), node.member("velocity_cutoff")
-    if not cutoff.absent and not node.member("velocity").absent:
-        cutoff.refuse("no cut-off together with a column of velocity, which is not filtered")
     joint = Joint(
         kind,
         "joint" if name.absent else name.text("a name"),
@@ -244,8 +247,12 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
 
 
 def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
+    rate = node.member("rate") if known is units.TIME and isinstance(node.value, dict) else Node(None)
+    if not rate.absent:
+        node.keys(("rate", "comment"))
+        return MappedColumn(node.path, "", rate=rate.number(0.0, 1e6, "rows a second", above=True))
     extra = ("zone", "pattern") if known is units.TIME else ()
-    node.keys(("column", "unit", "sign", "scale", "offset", "comment", *extra))
+    node.keys(("column", "unit", "sign", "scale", "offset", "wrap", "comment", *extra))
     source, unit = node.member("column"), node.member("unit")
     unit_names = [*known, *units.STAMPS] if known is units.TIME else list(known)
     for undecided, choices in ((source, "the name of a column of the log"), (unit, f"one of {', '.join(unit_names)}")):
@@ -267,12 +274,13 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     offset = node.member("offset")
     first = offset.value == "first"
     start = None if first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
-    return MappedColumn(node.path, column, sign * scale * _factor(unit, known, unit_names), start)
+    wrap = node.member("wrap").number(0.0, LARGEST, "the log's unit", 0.0)
+    return MappedColumn(node.path, column, sign * scale * _factor(unit, known, unit_names), start, wrap=wrap)
 
 
 def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
     """Read a column of points in time. The recording's time counts from the first of them."""
-    for key in ("sign", "scale", "offset"):
+    for key in ("sign", "scale", "offset", "wrap"):
         if not node.member(key).absent:
             node.member(key).refuse(f'no such key with "unit": "{stamp}"; time counts from the first row')
     zone, pattern = node.member("zone"), node.member("pattern")

@@ -188,7 +188,7 @@ TORQUES = {"torque", "torques", "tau", "effort", "moment", "trq"}
 SPEEDS = {"velocity", "velocities", "vel", "speed", "qd", "dq", "omega", "rate"}
 JOINT = {"joint", "joints"}
 OF_JOINTS_ONLY = {*JOINT, "angle", "angles", "q", "theta", "phi", "ang"}
-ANGLES = {*OF_JOINTS_ONLY, "position", "pos", "encoder"}
+ANGLES = {*OF_JOINTS_ONLY, "position", "positions", "pos", "encoder"}
 REFERENCE = {"external", "ext", "reference", "ref", "ft", "sensor"}
 CONTACT = {"contact", "touch", "label", "touching"}
 # words that say that a signal is not measured, or no signal of a finger

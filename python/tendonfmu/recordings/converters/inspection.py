@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,11 @@ from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, T
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
+from tendonfmu.recordings.traps import wrapped
 
 GAP = 10.0  # median steps
+CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
+DRIFT = 3e-6, 1e-3  # of two clocks; less is rounding, and more is no second clock
 
 
 @dataclass
@@ -31,6 +35,10 @@ class FieldSummary:
     high: float = -np.inf
     example: str = ""  # first text
     only_flags: bool = True  # whether all numbers are 0 or 1
+    wrap: float | None = None  # steps after which it starts again (`traps.wrapped`), of the first block
+    rising: bool = True  # whether each number is above the one before, and the first and last of them
+    first: float = np.nan
+    last: float = -np.inf
 
     def add(self, values: Any) -> None:
         """Take a block of the field."""
@@ -42,6 +50,10 @@ class FieldSummary:
         finite = values[np.isfinite(values)]
         self.missing += len(values) - len(finite)
         if len(finite):
+            if self.count == len(values):
+                self.wrap, self.first = wrapped(finite.astype(np.float64)), float(finite[0])
+            self.rising = self.rising and bool((np.diff(finite) > 0).all()) and float(finite[0]) > self.last
+            self.last = float(finite[-1])
             self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))
             self.only_flags = self.only_flags and bool(np.isin(finite, (0, 1)).all())
 
@@ -122,7 +134,28 @@ def inspect_log(file: Path) -> Inspection:
     texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]
     for name, block in log.blocks(wanted, texts):
         _add(log, topics[name], block)
-    return Inspection(file, list(topics.values()), _settings(log), list(log.notes), log.open_ended)
+    notes = [*log.notes, *(note for topic in topics.values() for note in _traps(topic))]
+    return Inspection(file, list(topics.values()), _settings(log), notes, log.open_ended)
+
+
+def _traps(topic: TopicSummary) -> Iterator[str]:
+    """Yield what is wrong with fields by themselves: words that start again, and clocks that run apart."""
+    clock = topic.clock
+    for summary in topic.fields:
+        name = summary.field.name
+        if summary.wrap:
+            yield (
+                f"{name}: jumps by {summary.wrap:.0f} steps, and no value is between: signed numbers stored as "
+                f'unsigned, or a counter that overflows; "wrap": {summary.wrap:.0f} in the map if its unit is a step'
+            )
+        is_second = clock is not None and name != clock.name and summary.rising and summary.count == clock.rows
+        if clock is None or not is_second or clock.last <= clock.first:
+            continue
+        ratio = (summary.last - summary.first) / (clock.last - clock.first)
+        drift = ratio / CLOCKS[np.argmin(np.abs(np.log(CLOCKS / ratio)))] - 1.0
+        if DRIFT[0] < abs(drift) < DRIFT[1]:
+            share = f"{1e6 * drift:+.3g} ppm"
+            yield f"{name}: runs {share} against {clock.name}: two clocks; take one of them for all signals"
 
 
 def _empty_summary(topic: Topic) -> TopicSummary:

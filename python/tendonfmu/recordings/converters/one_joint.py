@@ -9,9 +9,9 @@ Torque is tendon force:
 | joint_velocity[1], rad/s | velocity, rad/s | velocity, m/s |
 | external_torque[1], N.m | known load, N.m | known load, N |
 
-So a metre of a sliding axis is a radian, a newton is a newton metre, and a kilogram is a kg·m². If there is no column
-of velocity, it is computed from the angle: central differences, then a Butterworth filter of 2nd order forwards and
-backwards, which adds no delay.
+So a metre of a sliding axis is a radian, a newton is a newton metre, and a kilogram is a kg·m². Where there is a column
+of velocity, `velocity_cutoff` filters it. Else it is computed from the angle: central differences, then the filter. It
+is a Butterworth filter of 2nd order forwards and backwards, which adds no delay.
 
 The description starts from a straight line that explains the torque: torque − known load = coulomb·sgn(v) + viscous·v +
 inertia·a + offset, by least squares over the samples in motion. With a known load there is no row `inertia`: a known
@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
 from tendonfmu.arrays import Numbers
@@ -34,6 +35,7 @@ from tendonfmu.model import DEFAULTS
 from tendonfmu.recordings.converters.column_map import ConvertedLog, Joint
 from tendonfmu.recordings.faults import value_step
 from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.traps import is_magnitude
 
 CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it
@@ -60,11 +62,16 @@ def joint_columns(file: Path, parts: dict[str, Numbers], joint: Joint) -> tuple[
     notes = []
     if "velocity" in parts:
         velocity, cutoff = parts["velocity"], 0.0
+        if joint.velocity_cutoff:
+            velocity = _smooth(time, velocity, _cutoff(file, time, joint.velocity_cutoff))
     else:
         cutoff = _cutoff(file, time, joint.velocity_cutoff)
         velocity = central_velocity(time, angle, cutoff)
         filtered = f"then a zero-phase Butterworth filter of {cutoff:g} Hz" if cutoff else "not filtered"
         notes.append(f"{file}: joint_velocity[1] is made of central differences, {filtered}")
+    if is_magnitude(torque, angle):
+        drives = "torque" if joint.kind == "turning" else "force"
+        notes.append(f"{file}: the {drives} is never negative while {joint.name} moves both ways: a magnitude")
     columns = {
         "time": time,
         "tendon_force[1]": torque,
@@ -84,18 +91,26 @@ def joint_columns(file: Path, parts: dict[str, Numbers], joint: Joint) -> tuple[
 
 def central_velocity(time: Numbers, angle: Numbers, cutoff: float) -> Numbers:
     """Return the velocity [N] of angles [N] at times [N]. Gaps of the log divide it."""
+    velocity = np.zeros_like(angle)
+    for piece in _pieces(time):
+        if len(piece) > 1:
+            velocity[piece] = np.gradient(angle[piece], time[piece])
+    return _smooth(time, velocity, cutoff) if cutoff else velocity
+
+
+def _smooth(time: Numbers, values: Numbers, cutoff: float) -> Numbers:
+    """Filter values [N] without delay between the gaps of the log; pieces too short for it stay."""
+    sections = signal.butter(2, cutoff, fs=1.0 / float(np.median(np.diff(time))), output="sos")
+    smooth: Numbers = values.copy()
+    for piece in _pieces(time):
+        if len(piece) >= LEAST:
+            smooth[piece] = signal.sosfiltfilt(sections, values[piece])
+    return np.asarray(smooth)
+
+
+def _pieces(time: Numbers) -> list[NDArray[np.intp]]:
     steps = np.diff(time)
-    usual = float(np.median(steps))
-    velocity = np.empty_like(angle)
-    for piece in np.split(np.arange(len(time)), np.flatnonzero(steps > GAP * usual) + 1):
-        if len(piece) < LEAST:
-            velocity[piece] = np.gradient(angle[piece], time[piece]) if len(piece) > 1 else 0.0
-            continue
-        raw = np.gradient(angle[piece], time[piece])
-        if cutoff:
-            raw = signal.sosfiltfilt(signal.butter(2, cutoff, fs=1.0 / usual, output="sos"), raw)
-        velocity[piece] = raw
-    return velocity
+    return np.split(np.arange(len(time)), np.flatnonzero(steps > GAP * float(np.median(steps))) + 1)
 
 
 def first_motion(file: Path, velocity: Numbers) -> int:

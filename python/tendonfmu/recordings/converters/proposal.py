@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -37,6 +37,7 @@ from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummar
 from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
+NO_SIGN = 0.02  # of the largest torque: the smallest of a magnitude
 LONGEST_NAME = 40  # characters in a table
 QUANTITY = {
     "tendon_force": "force",
@@ -68,6 +69,7 @@ class Proposal:
     unused: list[str] = field(default_factory=list)  # names of fields that it does not use
     orders: list[Order] = field(default_factory=list)  # how tendons and joints are numbered, where there are several
     undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
+    notes: list[str] = field(default_factory=list)  # what is wrong with fields beside each other
 
     @property
     def time_factor(self) -> float | None:
@@ -96,7 +98,26 @@ def propose(inspection: Inspection) -> Proposal:
     undecided = [f"log.{key}" for key, value in log.items() if value == UNDECIDED]
     undecided += [line.column for line in lines if UNDECIDED in (line.source, line.unit)]
     document = _document(inspection, log, lines, orders, is_one_joint)
-    return Proposal(document, lines, [name for name in names if name not in used], orders, undecided)
+    unused = [name for name in names if name not in used]
+    return Proposal(document, lines, unused, orders, undecided, list(_magnitudes(groups)))
+
+
+def _magnitudes(groups: Mapping[str, Sequence[Member]]) -> Iterator[str]:
+    """Yield the torques that are never negative while their joint moves both ways."""
+    speeds = [summary for _, summary in groups.get("joint_velocity", [])]
+    for name in ("torque", "external_torque"):
+        members = groups.get(name, [])
+        both = zip([summary for _, summary in members], speeds, strict=True) if len(members) == len(speeds) else ()
+        unsigned = [
+            torque.field.name
+            for torque, speed in both
+            if 0.0 <= torque.low < NO_SIGN * torque.high and speed.low < 0.0 < speed.high
+        ]
+        if unsigned:
+            yield (
+                f"{', '.join(unsigned)}: never negative while the joint moves both ways: a magnitude; friction cannot "
+                "be learned from a current or load without its sign"
+            )
 
 
 # --- order ------------------------------------------------------------------------------------------------------------
@@ -311,7 +332,7 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
         "undecided": proposal.undecided,
         "unused": proposal.unused,
         "map": proposal.document,
-        "notes": inspection.notes,
+        "notes": [*inspection.notes, *proposal.notes],
     }
 
 

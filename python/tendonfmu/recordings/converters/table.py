@@ -61,11 +61,16 @@ class Conversion:
         self.velocity_cutoff = 0.0
         self._topics: dict[str, Topic] = {}
         self._names: dict[str, dict[str, str]] = {}  # by topic and key of the map, the field
+        self._is_counted = self.map.columns["time"].rate > 0.0
         for key, column in self.map.columns.items():
+            if column.rate:
+                continue
             topic, name = find_field(self.log, column.source, f"{self.map.path}: {column.path}")
             self._topics[topic.name] = topic
             self._names.setdefault(topic.name, {})[key] = name
-        self._main = next(name for name, keys in self._names.items() if "time" in keys)
+        self._main = next(name for name, keys in self._names.items() if "time" in keys or self._is_counted)
+        if self._is_counted and len(self._topics) > 1:
+            raise InputError(f"{self.map.path}: columns.time.rate: {file} has several topics; expected their clocks")
         self._clocks = {name: self._clock_of(topic) for name, topic in self._topics.items()}
         is_simple = len(self._names) == 1 and self.map.joint is None
         self.in_blocks = is_simple and self.map.resample is None and not self.map.log.sort
@@ -120,7 +125,8 @@ class Conversion:
     def _readers(self) -> dict[str, TopicRows]:
         readers = {}
         for topic, names in self._names.items():
-            columns = {key: self._clocks[topic] if key == "time" else self.map.columns[key] for key in names}
+            keys = ["time", *names] if self._is_counted else names
+            columns = {key: self._clocks[topic] if key == "time" else self.map.columns[key] for key in keys}
             readers[topic] = TopicRows(self.log.file, columns, names, self.map.log.leave_out_missing)
         return readers
 
@@ -215,6 +221,8 @@ class TopicRows:
         row = self.count
         readings = {key: self._numeric(key, block[name], row) for key, name in self._names.items()}
         count = len(next(iter(readings.values())))
+        if rate := self._columns["time"].rate:
+            readings["time"] = (row + np.arange(count)) / rate
         self.count += count
         rows = Rows(readings, np.arange(row + 1, row + count + 1))
         is_sound = np.ones(count, dtype=bool)

@@ -27,7 +27,7 @@ from pyarrow import csv as arrow_csv
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters.column_map import SEPARATORS, LogFormat
-from tendonfmu.recordings.converters.log import NUMBER, TEXT, Block, Field, Topic
+from tendonfmu.recordings.converters.log import LONGEST, NUMBER, TEXT, Block, Field, Topic
 from tendonfmu.recordings.converters.units import quantity
 
 CHUNK = 4 << 20  # bytes of text at once
@@ -202,6 +202,22 @@ def _is_units(fields: list[str], width: int, decimal: str, log: LogFormat) -> bo
     return sum(map(bool, known)) * 2 > len(filled)
 
 
+def _length_of_lists(cells: Sequence[str]) -> int:
+    """Return how many numbers each cell holds as a list, [1.0, 2.0]; 0 if they are no such lists."""
+    if not cells or not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
+        return 0
+    numbers = _numbers_of_lists(cells)
+    return 0 if numbers is None or numbers.shape[1] > LONGEST else int(numbers.shape[1])
+
+
+def _numbers_of_lists(cells: Sequence[str | None]) -> Any:
+    """Return the numbers [N, k] of N lists, or None if they are not equally long."""
+    try:
+        return np.array([cell.strip(" []").split(",") for cell in cells if cell is not None], dtype=np.float64)
+    except ValueError:
+        return None
+
+
 # --- the log ----------------------------------------------------------------------------------------------------------
 
 
@@ -224,17 +240,24 @@ class TextLog:
         head = [line for text in self._texts(begin_only=True) for line in text.split("\n")[:-1]]
         self.layout = _find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
         lines = [line for line in head[self.layout.start :] if line.strip()]
+        self._places: list[tuple[int, int | None]] = []  # of each field: its column, and which number of a list there
         self.topics = [Topic("", tuple(self._fields(lines[:SAMPLE])))]
 
     def _fields(self, lines: list[str]) -> Iterator[Field]:
-        """Yield the columns, with their kinds by the first lines of numbers."""
+        """Yield the columns, with their kinds by the first lines; one with lists of numbers has a field for each."""
         layout = self.layout
         rows = [row for row in (_fields_of(line, layout.separator) for line in lines) if len(row) == len(layout.names)]
         for k, name in enumerate(layout.names):
             cells = [row[k] for row in rows if row[k].strip().lower() not in MISSING]
             is_text = cells and not any(_is_float(cell, layout.decimal) for cell in cells)
-            kind = TEXT if is_text else NUMBER
-            yield Field(name, kind, kind, layout.units[k] if layout.units else "")
+            unit = layout.units[k] if layout.units else ""
+            for number in range(_length_of_lists(cells)):
+                self._places.append((k, number))
+                yield Field(f"{name}[{number + 1}]", NUMBER, "number of a list", unit)
+            if self._places[-1:] == [] or self._places[-1][0] != k:
+                kind = TEXT if is_text else NUMBER
+                self._places.append((k, None))
+                yield Field(name, kind, kind, unit)
 
     # --- bytes and lines ----------------------------------------------------------------------------------------------
 
@@ -312,7 +335,7 @@ class TextLog:
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read columns; see `log.Log`."""
-        places = {name: self.topics[0].place(name) for name in wanted.get("", ())}
+        places = {name: self._places[self.topics[0].place(name)] for name in wanted.get("", ())}
         row, skip = 0, self.layout.start
         for text in self._texts():
             if skip:
@@ -330,7 +353,9 @@ class TextLog:
             yield "", block
         self.notes = [*self._hints, *(f"{note}; {counted(row, 'row')} {are(row)} kept" for note in self._tail_notes)]
 
-    def _parse_fast(self, text: str, places: Mapping[str, int], texts: Sequence[str]) -> Block | None:
+    def _parse_fast(
+        self, text: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]
+    ) -> Block | None:
         """Return the columns, or None if a field needs a closer look."""
         separator = self.layout.separator
         if separator == " ":
@@ -338,7 +363,10 @@ class TextLog:
             text = "\n".join("\t".join(line.split()) for line in text.split("\n"))
         data = text.encode()
         keys = [str(k) for k in range(len(self.layout.names))]
-        types = {keys[place]: pa.string() if name in texts else pa.float64() for name, place in places.items()}
+        types = {
+            keys[place]: pa.float64() if number is None and name not in texts else pa.string()
+            for name, (place, number) in places.items()
+        }
         try:
             table = arrow_csv.read_csv(
                 pa.BufferReader(data),
@@ -353,10 +381,23 @@ class TextLog:
             )
         except (pa.ArrowInvalid, pa.ArrowKeyError):
             return None
-        columns = {name: table.column(keys[place]) for name, place in places.items()}
-        return {name: column if name in texts else np.asarray(column.to_numpy()) for name, column in columns.items()}
+        block: Block = {}
+        lists: dict[int, Any] = {}
+        for name, (place, number) in places.items():
+            column = table.column(keys[place])
+            if number is None:
+                block[name] = column if name in texts else np.asarray(column.to_numpy())
+                continue
+            if place not in lists:
+                lists[place] = _numbers_of_lists(column.to_pylist())
+            if lists[place] is None or number >= lists[place].shape[1]:
+                return None
+            block[name] = lists[place][:, number]
+        return block
 
-    def _parse_by_field(self, lines: list[str], places: Mapping[str, int], texts: Sequence[str], row: int) -> Block:
+    def _parse_by_field(
+        self, lines: list[str], places: Mapping[str, tuple[int, int | None]], texts: Sequence[str], row: int
+    ) -> Block:
         """Return the same, and refuse the first invalid field by name."""
         layout = self.layout
         columns: dict[str, list[Any]] = {name: [] for name in places}
@@ -367,8 +408,16 @@ class TextLog:
                     f"{self.file}: row {k}: {counted(len(fields), 'field')} between {layout.separator!r}; expected "
                     f"{len(layout.names)}, as in the first line"
                 )
-            for name, place in places.items():
+            for name, (place, number) in places.items():
                 cell = fields[place]
+                if number is not None:
+                    numbers = cell.strip("[]").split(",")
+                    if number >= len(numbers):
+                        raise InputError(
+                            f"{self.file}: column {layout.names[place]}, row {k}: {counted(len(numbers), 'number')}; "
+                            f"expected as many as in the first row"
+                        )
+                    cell = numbers[number]
                 columns[name].append(cell if name in texts else self._number(layout.names[place], k, cell))
         return {
             name: pa.array(cells, pa.string()) if name in texts else np.array(cells, dtype=np.float64)

@@ -1,0 +1,177 @@
+"""Traps of real logs that show in the channels alone: magnitudes, unsigned numbers, filled gaps, slow sensors, units.
+
+Nothing here uses a friction model. A trap is reported once for each column, or for all that have it at the same time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.model import Finger
+from tendonfmu.recordings.faults import tendon_angles, value_step
+from tendonfmu.recordings.kinematics import UNITS
+from tendonfmu.recordings.recording import Recording
+
+NEAR_ZERO, TOUCHES = 0.02, 0.005  # of the largest value, and of the samples that are so small
+BOTH_WAYS = 0.25  # of a joint's range, that it travels in each direction
+LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
+EMPTY = 0.1  # of the range: the widest part that no sample reaches
+MADE_UP = 0.5  # of the samples; more straight lines are signals that are made up
+SAME = 0.02  # relative, between the jumps and the word
+STRAIGHT, LONGEST_STRAIGHT = 1e-6, 0.1  # of the range, second differences of a line; s
+FEWEST = 8  # samples of a line
+REGULAR, FEWEST_CHANGES, LONG = 0.9, 50, 1000  # of the changes; changes that are needed; samples of a rest
+WINDOWS = 24  # over which units are compared
+OFF = 0.1  # of the logarithm of a unit, by which the change of scale differs from it
+STEADY = 0.25  # of the change, by which a part may vary
+RESTING, TINY = 1e-6, 1e-30  # of the fastest part: less is rest
+FAR = 3.0  # usual steps of the faster part, beyond which a value jumps
+LEAST_CHANGE = 1.5  # of a logarithm
+
+
+@dataclass(frozen=True)
+class Trap:
+    """What is wrong with columns."""
+
+    kind: str  # "magnitude", "wrapped", "filled", "slow" or "switched"
+    columns: tuple[str, ...]
+    size: float  # steps of a word, s of a line, samples between changes, factor of the unit
+    at: float = 0.0  # s, where it begins
+    what: str = ""  # the joint, or the unit
+
+
+def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
+    """Find the traps of a recording. They are of `recording`, before any correction."""
+    yield from _magnitudes(finger, recording)
+    groups = {name: recording.groups[name] for name in UNITS if name in recording.groups}
+    for name, values in groups.items():
+        for k, column in enumerate(values.T):
+            if (word := wrapped(column)) is not None:
+                yield Trap("wrapped", (f"{name}[{k + 1}]",), word)
+    yield from _filled(recording.time, groups)
+    yield from _slow(recording.time, groups)
+    yield from _switched(recording.time, groups)
+
+
+def is_magnitude(force: Numbers, angle: Numbers) -> bool:
+    """Return whether a force [N] turns back at 0 although the joint [N] moves both ways."""
+    step, extent = np.diff(angle), float(np.ptp(angle))
+    ways = step[step > 0.0].sum(), -step[step < 0.0].sum()
+    small = force <= NEAR_ZERO * force.max()
+    return bool(force.min() >= 0.0 and small.mean() > TOUCHES and extent > 0.0 and min(ways) > BOTH_WAYS * extent)
+
+
+def wrapped(column: Numbers) -> float | None:
+    """Return the number of steps by which a column jumps if it is that of a word of a computer, else None."""
+    levels, step = np.unique(column), np.diff(column)
+    if len(levels) < 3:
+        return None
+    widest = int(np.argmax(np.diff(levels)))
+    above = column > (levels[widest] + levels[widest + 1]) / 2.0
+    jumps = np.abs(step[np.diff(above)])
+    if levels[widest + 1] - levels[widest] < EMPTY * float(np.ptp(column)) or not len(jumps):
+        return None
+    count = float(np.median(jumps)) / (value_step(column) or _finest(step))
+    word = float(2.0 ** np.round(np.log2(count)))
+    return word if word >= LEAST_WORD and abs(count / word - 1.0) < SAME else None
+
+
+def _finest(step: Numbers) -> float:
+    """Return the smallest difference of a column with very many values."""
+    sizes = np.abs(step[step != 0.0])
+    return float(sizes.min()) if len(sizes) else 1.0
+
+
+def _magnitudes(finger: Finger, recording: Recording) -> Iterator[Trap]:
+    angle = recording.groups.get("joint_position")
+    angle = tendon_angles(recording, finger) if angle is None else angle
+    for i, tendon in enumerate(finger.data["tendons"]):
+        joint = int(np.argmax(np.abs(tendon["moment_arms"])))
+        force = recording.groups["tendon_force"][:, i]
+        if tendon.get("bidirectional") and is_magnitude(force, angle[:, joint]):
+            yield Trap("magnitude", (f"tendon_force[{i + 1}]",), 0.0, what=finger.joint_names[joint])
+
+
+def _filled(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+    """Yield the longest time in which all channels that change are straight lines."""
+    columns = np.column_stack(list(groups.values()))
+    columns = columns[:, np.ptp(columns, axis=0) > 0.0]
+    if len(columns) < 4 * FEWEST or not columns.shape[1]:
+        return
+    bend = np.abs(np.diff(columns, 2, axis=0)) / np.ptp(columns, axis=0)
+    moving = np.abs(np.diff(columns, axis=0))[1:].any(axis=1)
+    line = np.asarray((bend < STRAIGHT).all(axis=1) & moving)
+    if line.mean() > MADE_UP:
+        return
+    begin, end = _longest(line)
+    if end - begin >= FEWEST and time[end] - time[begin] > LONGEST_STRAIGHT:
+        yield Trap("filled", tuple(groups), float(time[end + 1] - time[begin]), float(time[begin]))
+
+
+def _longest(flags: Flags) -> tuple[int, int]:
+    """Return begin and end of the longest run of true flags; (0, 0) if there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    runs = [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
+    return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+
+
+def _slow(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+    """Yield the groups whose columns change at every so-many-th sample only, as of a slower sensor."""
+    for name, values in groups.items():
+        between = [found for column in values.T if (found := _between_changes(column)) is not None]
+        if len(between) == values.shape[1]:
+            yield Trap("slow", (name,), float(np.median(between)), what=f"{1.0 / np.median(np.diff(time)):.4g}")
+
+
+def _between_changes(column: Numbers) -> float | None:
+    """Return the samples between two changes if they are the same throughout, or next to each other, else None."""
+    apart = np.diff(np.flatnonzero(np.diff(column)))
+    if len(apart) < FEWEST_CHANGES:
+        return None
+    counts = np.bincount(apart[apart < LONG])
+    usual = int(np.argmax(counts))
+    pair = max((counts[usual : usual + 2].sum(), usual), (counts[usual - 1 : usual + 1].sum(), usual - 1))
+    is_even = usual > 1 and bool((apart % usual == 0).mean() > REGULAR)
+    if is_even:
+        return float(usual)
+    return float(apart[apart <= pair[1] + 1].mean()) if pair[1] > 1 and pair[0] > REGULAR * len(apart) else None
+
+
+def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+    """Yield columns that move, from some time on, by the factor of a unit more or less, and no other group does."""
+    parts = np.array_split(np.arange(len(time) - 1), WINDOWS)
+    if len(time) < WINDOWS * 3 * FEWEST:
+        return
+    sizes = {}
+    for name, values in groups.items():
+        step = np.diff(values.astype(np.float64), axis=0)
+        size = np.array([np.sqrt((step[part] ** 2).mean(axis=0)) for part in parts])
+        sizes[name] = np.log(np.maximum(size, RESTING * size.max(axis=0) + TINY))
+    for name, size in sizes.items():
+        for k in range(size.shape[1]):
+            others = np.column_stack([each for other, each in sizes.items() if other != name] or [size * 0.0])
+            relative = size[:, k] - np.median(others - others.mean(axis=0), axis=1)
+            split = min(
+                range(2, WINDOWS - 1), key=lambda at: relative[:at].var() * at + relative[at:].var() * (WINDOWS - at)
+            )
+            change = float(np.median(relative[split:]) - np.median(relative[:split]))
+            spread = max(relative[: split - 1].std(), relative[split + 1 :].std())
+            unit = next((u for u in UNITS[name] if abs(abs(change) / abs(np.log(u[0])) - 1.0) < OFF), None)
+            if unit is None or abs(change) < LEAST_CHANGE or spread > STEADY * abs(change):
+                continue
+            factor = unit[0] if (change > 0.0) == (unit[0] > 1.0) else 1.0 / unit[0]
+            near = slice(max(parts[split][0] - len(parts[0]), 0), parts[split][-1] + len(parts[0]))
+            begin = float(time[parts[split][0]])
+            if _jumps_by(groups[name][near, k], factor, float(np.exp(size[:, k].max()))):
+                yield Trap("switched", (f"{name}[{k + 1}]",), float(np.exp(change)), begin, unit[1])
+
+
+def _jumps_by(column: Numbers, factor: float, step: float) -> bool:
+    """Return whether a value is followed by so many times itself, further away than usual steps reach."""
+    before, after = column[:-1], column[1:]
+    is_multiple = np.abs(after - factor * before) < np.maximum(0.1 * np.abs(after), 0.01 * np.abs(before))
+    return bool((is_multiple & (np.abs(after - before) > FAR * step)).any())
