@@ -1,4 +1,4 @@
-"""Changes of measured machines: known ones put on recordings of EMPS and the da Vinci jaw, and real ones of the jaw.
+"""Changes of measured machines: known ones put on recordings of EMPS, the da Vinci jaw and PSM, and real ones of two.
 
 What `then`, `now` and the strength of a change are: README.md. Needs ../shared/data or $TENDONFMU_DATA.
 """
@@ -41,6 +41,7 @@ from evidence.diagnosis.measured import (
 from evidence.fingers.matched_strength import averaged
 from evidence.judge import Truth
 from evidence.runner import DATA, EXAMPLES
+from tendonfmu import convert
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.recordings.converters.emps import CUTOFF
@@ -53,12 +54,13 @@ BY_SPEED = ("viscous_friction", "stribeck", "time_delay", "inertia")
 # A change of load that no sensor shows is a constant torque: these answers say so. Names of friction are wrong there.
 LOAD_NAMES = ("contact", "force_offset", "gravity")
 
-THINNED = 2  # samples of 1 kHz to one: the remainder of the EMPS model grows by 1 %
+THINNED = {"emps": 2, "davinci": 2, "psm": 1}  # samples to one: the remainder of the EMPS model grows by 1 %
+PITCH = 2  # the joint of PSM: its weight and presliding are what `diagnose` names (docs/evidence/psm.md)
 PRETENSION = 13.0  # N, da Vinci: the closing cable never goes slack
 JAMMED = {"07": 16.5}  # s; the instrument jams after that
 PULSE = 5.0695  # V, measured (README of the data); the drive's gain makes newtons of it
 MODELS = ("diagnosed", "plain")
-KINEMATICS = {"emps": 3, "davinci": 1}
+KINEMATICS = {"emps": 3, "davinci": 1, "psm": 3}
 PLAIN = {"emps": EXAMPLES / "emps" / "emps.json", "davinci": EXAMPLES / "davinci" / "jaw_nominal.json"}
 
 STRENGTHS = (0.1, 0.3, 1.0)
@@ -84,7 +86,12 @@ class Stretch:
 
 @cache
 def recording(machine: str, run: str) -> Columns:
-    """All of a run, at 1 kHz."""
+    """All of a run, at 1 kHz; at 200 Hz of PSM."""
+    if machine == "psm":
+        columns = json.loads((EXAMPLES / "psm" / f"joint_{PITCH}.json").read_text(encoding="utf-8"))
+        converted = convert(DATA / "psm" / f"{run}.parquet", columns)
+        found = {f"{name}[1]": values[:, 0] for name, values in converted.groups.items()}
+        return part_of({"time": converted.time} | found, 0.0, 1e6)
     if machine == "davinci":
         file = DATA / "davinci_tool" / "Tool_4_Maryland_L_4" / f"{run}.TXT"
         return part_of(convert_file("davinci", file, {"pretension": PRETENSION}), 0.0, JAMMED.get(run, 1e6))
@@ -110,7 +117,7 @@ def part_of(columns: Columns, begin: float, end: float) -> Columns:
     return part | {"time": part["time"] - part["time"][0]}
 
 
-def thinned(columns: Columns, to_one: int = THINNED) -> Columns:
+def thinned(columns: Columns, to_one: int) -> Columns:
     """Means of so many samples each."""
     return {name: averaged(values, to_one) for name, values in columns.items()}
 
@@ -127,8 +134,13 @@ def cut(machine: str, stretches: Sequence[Stretch], known_load: bool = True) -> 
 @cache
 def plain_model(machine: str, stretches: tuple[Stretch, ...], known_load: bool) -> Mapping[str, Any]:
     """Coulomb and viscous friction as in examples, fitted to the stretches: what most users have."""
-    start = json.loads(PLAIN[machine].read_text(encoding="utf-8"))
-    return fitted(start, [thinned(part) for part in cut(machine, stretches, known_load).values()], KINEMATICS[machine])
+    if machine == "psm":
+        start = diagnosed_model(machine)
+        start["extensions"] = [row for row in start["extensions"] if row["effect"] == "inertia"]
+    else:
+        start = json.loads(PLAIN[machine].read_text(encoding="utf-8"))
+    parts = cut(machine, stretches, known_load).values()
+    return fitted(start, [thinned(part, THINNED[machine]) for part in parts], KINEMATICS[machine])
 
 
 def fitted(start: Mapping[str, Any], recordings: Sequence[Columns], kinematics: int = 1) -> Mapping[str, Any]:
@@ -149,7 +161,7 @@ def model_of(machine: str, model: str, stretches: tuple[Stretch, ...], known_loa
 
 @dataclass(frozen=True)
 class Pair:
-    """conditions: of `now` against `then`: part (of the same run), load, speed, excitation."""
+    """conditions: of `now` against `then`: part (of the same run), load, speed, excitation, identification."""
 
     machine: str
     conditions: str
@@ -198,7 +210,15 @@ FORWARD = {
         whole("davinci", "speed", ["00", "02", "04"], ["40", "42", "44"]),
     ],
 }
+FOURIER = [f"stribeck_3dof_svd__fourier_test{k}" for k in ("", "2", "3", "4")]
+LATEST = [f"latest_3dof_inaxis_svd__fourier_test{k}" for k in ("1", "2")]  # of another identification of the arm
+FORWARD["psm"] = [
+    *(whole("psm", "excitation", [FOURIER[0], FOURIER[k]], [run for run in FOURIER[1:] if run != FOURIER[k]])
+      for k in (1, 2, 3)),
+    *(whole("psm", "identification", FOURIER[k : k + 2], LATEST) for k in (0, 2)),
+]  # fmt: skip
 PAIRS = {machine: [*pairs, *(pair.reversed for pair in pairs)] for machine, pairs in FORWARD.items()}
+OLDER, ARM = ("emps", "davinci"), ("psm",)  # machines of the beds `hidden` and `arm`
 
 
 @dataclass(frozen=True)
@@ -222,41 +242,42 @@ def numbered(plans: Sequence[Plan], after: int = 0) -> list[Plan]:
     return result
 
 
-def unchanged_plans() -> list[Plan]:
+def unchanged_plans(machines: Sequence[str]) -> list[Plan]:
     """Every pair of stretches, by both models, which lie in different halves."""
     return numbered(
         [
             Plan((k + m) % 2, UNCHANGED, 0.0, model, (pair,))
-            for machine in PAIRS
+            for machine in machines
             for k, pair in enumerate(PAIRS[machine])
             for m, model in enumerate(MODELS)
         ]
     )
 
 
-def changed_plans(after: int) -> list[Plan]:
+def changed_plans(machines: Sequence[str], after: int) -> list[Plan]:
     """Every change at every strength once in each half, by the one model in one and by the other in the other; the
     order of the pairs is drawn."""
     plans = []
-    for m, machine in enumerate(PAIRS):
-        for k, name in enumerate(name for name, effect in EFFECTS.items() if machine in effect.machines):
+    for m, machine in enumerate(machines):
+        pairs_of = [pair for pair in PAIRS[machine] if pair.conditions != "identification"]
+        for k, name in enumerate(name for name, effect in EFFECTS.items() if machine in (*effect.machines, *ARM)):
             for s, strength in enumerate(STRENGTHS):
                 for half in (1, 0):
-                    order = np.random.default_rng([14, m, k, s, half]).permutation(len(PAIRS[machine]))
-                    pairs = tuple(PAIRS[machine][place] for place in order)
+                    order = np.random.default_rng([14, m, k, s, half]).permutation(len(pairs_of))
+                    pairs = tuple(pairs_of[place] for place in order)
                     plans.append(Plan(half, name, strength, MODELS[(k + s + half) % 2], pairs))
     return numbered(plans, after)
 
 
-def plans() -> list[Plan]:
+def plans(machines: Sequence[str]) -> list[Plan]:
     """All cases of the bed: those without a change first."""
-    unchanged = unchanged_plans()
+    unchanged = unchanged_plans(machines)
     last = max(plan.number for plan in unchanged)
-    return [*unchanged, *changed_plans(last + last % 2)]
+    return [*unchanged, *changed_plans(machines, last + last % 2)]
 
 
-def hidden_makers() -> Makers:
-    return {plan.number: partial(make, plan) for plan in plans()}
+def hidden_makers(machines: Sequence[str] = OLDER) -> Makers:
+    return {plan.number: partial(make, plan) for plan in plans(machines)}
 
 
 def make(plan: Plan) -> Case:
@@ -298,7 +319,9 @@ def changed_case(
 ) -> Case:
     """The machine as it was (`then`) and with a change, or without one (`now`): no sample is in both."""
     known = {"machine": machine, "model": model, "hidden": hidden, "conditions": conditions, "strength": strength}
-    reference, recordings = ([pd.DataFrame(thinned(columns)) for columns in part] for part in (then, now))
+    reference, recordings = (
+        [pd.DataFrame(thinned(columns, THINNED[machine])) for columns in part] for part in (then, now)
+    )
     return Case(machine, finger, recordings, KINEMATICS[machine], truths=(truth,), reference=reference, facts=known)
 
 

@@ -17,22 +17,22 @@ from typing import Any
 import numpy as np
 
 from evidence.diagnosis.case import Case, Run, run_command
-from evidence.diagnosis.change_measured import LOAD_NAMES, UNCHANGED, Makers, hidden_makers, real_makers
+from evidence.diagnosis.change_measured import ARM, LOAD_NAMES, UNCHANGED, Makers, hidden_makers, real_makers
 from evidence.fingers.families import HALVES
 from evidence.judge import Cause, alternatives, judge
 from evidence.runner import parser, publish, run_cases
 from evidence.tables import Row, by, count, table
 
-BEDS = ("hidden", "real", "simulated")
+BEDS = ("hidden", "arm", "real", "simulated")
 WITH, WITHOUT = "reference", "no reference"
-ASKED = {"hidden": (WITH, WITHOUT), "real": (WITH,), "simulated": (WITH,)}
+ASKED = {"hidden": (WITH, WITHOUT), "arm": (WITH, WITHOUT), "real": (WITH,), "simulated": (WITH,)}
 
 
 def makers(bed: str) -> Makers:
     if bed == "simulated":
         made: Makers = simulated_changes().makers()
         return made
-    return hidden_makers() if bed == "hidden" else real_makers()
+    return hidden_makers() if bed == "hidden" else hidden_makers(ARM) if bed == "arm" else real_makers()
 
 
 def simulated_changes() -> ModuleType:

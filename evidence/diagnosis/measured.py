@@ -1,4 +1,4 @@
-"""Measured machines (EMPS, the da Vinci jaw), and known effects that can be put on their recordings.
+"""Measured machines (EMPS, the da Vinci jaw, a joint of PSM), and known effects that can be put on their recordings.
 
 All formulas are physics written here; nothing is taken from the candidates or the core's terms. A change needs no room:
 friction that is there already grows or falls. The model of a machine is its diagnosed one (measured_*.json: diagnosed
@@ -49,7 +49,7 @@ class Machine:
 
 
 def diagnosed_model(name: str) -> Description:
-    """The model of emps or davinci."""
+    """The model of emps, davinci or psm."""
     file = Path(__file__).resolve().parent / f"measured_{name}.json"
     model: Description = json.loads(file.read_text(encoding="utf-8"))
     return model
@@ -287,7 +287,7 @@ def residual(machine: Machine, columns: Columns) -> Array:
     """[B] N·m: measured torque less known load less the model's, in blocks."""
     arrays = {key.removesuffix("[1]"): value if key == "time" else value[:, None] for key, value in columns.items()}
     outputs = run_recording(machine.model, arrays, machine.kinematics)
-    left = (outputs["compensated_torque"][:, 0] - columns[LOAD]).astype(float)
+    left = (outputs["compensated_torque"][:, 0] - columns.get(LOAD, 0.0)).astype(float)
     return averaged(left, max(1, round(BLOCK / float(np.median(np.diff(columns["time"]))))))
 
 

@@ -15,7 +15,9 @@ import pytest
 from evidence.diagnosis import change_measured, changes
 from evidence.diagnosis.case import Case, Run
 from evidence.diagnosis.change_measured import (
+    ARM,
     LOAD_NAMES,
+    OLDER,
     UNCHANGED,
     Stretch,
     changed_case,
@@ -190,10 +192,11 @@ def test_then_and_now_share_no_sample(pair: change_measured.Pair) -> None:
     assert not any(share_samples(one, other) for one, other in product(pair.then, pair.now))
 
 
-def test_both_halves_are_alike() -> None:
-    plans = change_measured.plans()
-    assert len({plan.number for plan in plans}) == len(plans) == 258
-    assert sum(plan.hidden == UNCHANGED for plan in plans) == 84
+@pytest.mark.parametrize(("machines", "cases", "unchanged"), [(OLDER, 258, 84), (ARM, 116, 20)])
+def test_both_halves_are_alike(machines: tuple[str, ...], cases: int, unchanged: int) -> None:
+    plans = change_measured.plans(machines)
+    assert len({plan.number for plan in plans}) == len(plans) == cases
+    assert sum(plan.hidden == UNCHANGED for plan in plans) == unchanged
     counted = [
         Counter((plan.pairs[0].machine, plan.hidden, plan.strength) for plan in plans if plan.number % 2 == half)
         for half in (0, 1)
