@@ -1,1 +1,1 @@
-"""Hidden effects, changes and rivals: how often `diagnose` is right."""
+"""Hidden effects and changes: how often `diagnose` is right."""
