@@ -30,6 +30,8 @@ FEWEST_BLOCKS = 8
 LEVEL = 0.975  # of Student's t: intervals of 95 %
 SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
+CERTAIN = 1.5  # halves of an interval; many numbers are compared
+SEEN_APART = 0.05  # of a stiffness that only other tendons show: its interval, and what differs
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
@@ -55,7 +57,7 @@ class Learned:
     def differs(self) -> bool:
         """Whether the described number is another one."""
         off = abs(self.value - self.described)
-        return self.is_known and off > max(self.half, self.material)
+        return self.is_known and off > max(CERTAIN * self.half, self.material)
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,10 @@ def _of_redundancy(finger: Finger, recordings: Sequence[Recording]) -> list[Tend
             is_alone = i in kept or finger.joints > 1
             arms_of = {j: replace(arm, is_known=arm.is_known and not is_alone) for j, arm in learned.arms.items()}
             zero = replace(learned.zero, is_known=learned.zero.is_known and not is_alone)
-            found.append(replace(learned, arms=arms_of, zero=zero, varying={}, seen_from=base))
+            stiffness = learned.stiffness
+            is_known = stiffness.is_known and stiffness.half < SEEN_APART * stiffness.value
+            stiffness = replace(stiffness, is_known=is_known, material=SEEN_APART * stiffness.described)
+            found.append(replace(learned, arms=arms_of, stiffness=stiffness, zero=zero, varying={}, seen_from=base))
     return found
 
 

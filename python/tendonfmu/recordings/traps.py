@@ -18,6 +18,7 @@ from tendonfmu.recordings.recording import Recording
 
 NEAR_ZERO, TOUCHES = 0.02, 0.005  # of the largest value, and of the samples that are so small
 BOTH_WAYS = 0.25  # of a joint's range, that it travels in each direction
+GRID = 0.01  # of the smallest difference: others are as near to a multiple of it
 LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
 EMPTY = 0.1  # of the range: the widest part that no sample reaches
 MADE_UP = 0.5  # of the samples; more straight lines are signals that are made up
@@ -26,7 +27,7 @@ STRAIGHT, LONGEST_STRAIGHT = 1e-6, 0.1  # of the range, second differences of a 
 FEWEST = 8  # samples of a line
 REGULAR, FEWEST_CHANGES, LONG = 0.9, 50, 1000  # of the changes; changes that are needed; samples of a rest
 WINDOWS = 24  # over which units are compared
-OFF = 0.1  # of the logarithm of a unit, by which the change of scale differs from it
+OFF = 0.25  # of the logarithm of a unit, by which the change of scale differs from it
 STEADY = 0.25  # of the change, by which a part may vary
 RESTING, TINY = 1e-6, 1e-30  # of the fastest part: less is rest
 FAR = 3.0  # usual steps of the faster part, beyond which a value jumps
@@ -75,15 +76,19 @@ def wrapped(column: Numbers) -> float | None:
     jumps = np.abs(step[np.diff(above)])
     if levels[widest + 1] - levels[widest] < EMPTY * float(np.ptp(column)) or not len(jumps):
         return None
-    count = float(np.median(jumps)) / (value_step(column) or _finest(step))
+    finest = value_step(column) or _finest(step)
+    if not finest:
+        return None
+    count = float(np.median(jumps)) / finest
     word = float(2.0 ** np.round(np.log2(count)))
     return word if word >= LEAST_WORD and abs(count / word - 1.0) < SAME else None
 
 
 def _finest(step: Numbers) -> float:
-    """Return the smallest difference of a column with very many values."""
+    """Return the smallest difference of a column with very many values if all are multiples of it, else 0."""
     sizes = np.abs(step[step != 0.0])
-    return float(sizes.min()) if len(sizes) else 1.0
+    multiples = sizes / sizes.min()
+    return float(sizes.min()) if np.abs(multiples - np.round(multiples)).max() < GRID else 0.0
 
 
 def _magnitudes(finger: Finger, recording: Recording) -> Iterator[Trap]:
@@ -160,14 +165,14 @@ def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
             )
             change = float(np.median(relative[split:]) - np.median(relative[:split]))
             spread = max(relative[: split - 1].std(), relative[split + 1 :].std())
-            unit = next((u for u in UNITS[name] if abs(abs(change) / abs(np.log(u[0])) - 1.0) < OFF), None)
-            if unit is None or abs(change) < LEAST_CHANGE or spread > STEADY * abs(change):
-                continue
-            factor = unit[0] if (change > 0.0) == (unit[0] > 1.0) else 1.0 / unit[0]
             near = slice(max(parts[split][0] - len(parts[0]), 0), parts[split][-1] + len(parts[0]))
-            begin = float(time[parts[split][0]])
-            if _jumps_by(groups[name][near, k], factor, float(np.exp(size[:, k].max()))):
-                yield Trap("switched", (f"{name}[{k + 1}]",), float(np.exp(change)), begin, unit[1])
+            begin, usual = float(time[parts[split][0]]), float(np.exp(size[:, k].max()))
+            for factor, unit in UNITS[name] if spread < STEADY * abs(change) else ():
+                turned = factor if (change > 0.0) == (factor > 1.0) else 1.0 / factor
+                is_near = abs(change / np.log(turned) - 1.0) < OFF and abs(change) > LEAST_CHANGE
+                if is_near and _jumps_by(groups[name][near, k], turned, usual):
+                    yield Trap("switched", (f"{name}[{k + 1}]",), float(np.exp(change)), begin, unit)
+                    break
 
 
 def _jumps_by(column: Numbers, factor: float, step: float) -> bool:
