@@ -204,6 +204,10 @@ def test_the_command_writes_a_finger_that_check_accepts(tmp_path: Path, call: Ca
     assert json.loads(output.read_text())["name"] == "pair"
 
 
+def test_the_only_chain_needs_no_names(tmp_path: Path) -> None:
+    assert imported(tmp_path, BOWSTRING, joints=()).data["joints"][0]["name"] == "hinge"
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -213,7 +217,7 @@ def test_the_command_writes_a_finger_that_check_accepts(tmp_path: Path, call: Ca
         (["--joints", "mcp,mcp"], ["joint mcp", "twice"]),
         (["--joints", "thrown"], ["joint thrown", "free", "hinge"]),
         (["--joints", "shoulder"], ["joint shoulder", "ball", "hinge"]),
-        (["--joints", ","], ["no joint"]),
+        ([], ["2 chains of joints: mcp,pip; thumb", "--joints"]),
         (["--joints", "mcp,pip", "--tendons", "deep,elsewhere"], ["tendon elsewhere", "none of the joints mcp, pip"]),
         (["--joints", "mcp,pip", "--tendons", "deep,nerve"], ["tendon nerve", "it has deep"]),
         (["--joints", "mcp,pip", "--tendons", "short,back"], ["joint pip", "none of the tendons"]),

@@ -25,8 +25,11 @@ NAMES = "NAMES"  # separated by commas; the option may also be repeated
 def import_model(
     kind: Format,
     model: ModelFile,
-    joints: Annotated[list[str], typer.Option(metavar=NAMES, help="joints of the finger, base first: mcp,pip")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.json", help="description to write")],
+    joints: Annotated[
+        list[str] | None,
+        typer.Option(metavar=NAMES, help="joints, base first: mcp,pip [default: the one chain that tendons move]"),
+    ] = None,
     tendons: Annotated[
         list[str] | None,
         typer.Option(metavar=NAMES, help="tendons of the finger [default: all driven ones that move it]"),
@@ -66,7 +69,7 @@ def import_model(
     _check_kind("import", kind)
     check_output(output, model)
     settings = ImportSettings(
-        joints=_names(joints),
+        joints=_names(joints or []),
         tendons=None if tendons is None else _names(tendons),
         ranges=dict(_range(text) for text in range_ or []),
         bidirectional=_names(bidirectional or []),

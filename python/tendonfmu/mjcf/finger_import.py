@@ -13,6 +13,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted
 from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, Tendon
 from tendonfmu.mjcf.finger_parts import (
     WEIGHTLESS,
@@ -44,7 +45,7 @@ OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyfram
 class ImportSettings:
     """What is taken from a model."""
 
-    joints: Sequence[str]  # names of joints, base first
+    joints: Sequence[str] = ()  # names of joints, base first; without any the one chain that driven tendons move
     tendons: Sequence[str] | None = None  # names of tendons; None takes all that are driven and move a joint
     # ranges of joints by name (rad), in place of the model's limits
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -125,9 +126,7 @@ def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
 
 def _chain(model: CompiledModel, names: Sequence[str]) -> list[Joint]:
     """Return the joints of these names. They must be hinges or slides on one chain, base first."""
-    joints = [model.joint_named(name) for name in names]
-    if not joints:
-        raise InputError(f"{model.path}: no joint given; expected --joints with names, base first")
+    joints = [model.joint_named(name) for name in names or _only_chain(model)]
     for joint in joints:
         if joint.kind not in ("hinge", "slide"):
             raise InputError(f"{model.path}: joint {joint.name}: a {joint.kind} joint; expected a hinge or a slide")
@@ -145,6 +144,25 @@ def _chain(model: CompiledModel, names: Sequence[str]) -> list[Joint]:
             f"{model.path}: joint {after.name}: not carried by joint {before.name}; expected one chain of joints"
         )
     return joints
+
+
+def _only_chain(model: CompiledModel) -> list[str]:
+    """Return the names of the joints that driven tendons move, base first, if they are one chain."""
+    joints = [joint for joint in model.joints if joint.kind in ("hinge", "slide") and joint.name]
+    driven = [tendon for tendon in model.tendons if is_driven(model, tendon)]
+    motors = {joint.index for tendon in driven for joint in motors_of(model, tendon)}
+    joints = [joint for joint in joints if joint.index not in motors]
+    angles = np.random.default_rng(0).uniform(-0.3, 0.3, (8, len(joints)))
+    moved = moved_velocities(model, joints, angles)[[tendon.index for tendon in driven]].any(axis=0)
+    joints = [joint for joint in joints if moved[joint.velocity]]
+    ends = [joint for joint in joints if not any(_carries(model, joint, other) for other in joints)]
+    chains = [[joint.name for joint in joints if joint == end or _carries(model, joint, end)] for end in ends]
+    if len(chains) != 1:
+        listed = "; ".join(",".join(chain) for chain in chains) or "none that a driven tendon moves"
+        raise InputError(
+            f"{model.path}: {counted(len(chains), 'chain')} of joints: {listed}; expected --joints with one"
+        )
+    return chains[0]
 
 
 def _carries(model: CompiledModel, base: Joint, other: Joint) -> bool:
