@@ -14,7 +14,6 @@ comes from NAME_ref.opt.
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import posixpath
 import re
@@ -235,20 +234,9 @@ class _Carried:
                 continue  # elsewhere, and not for this check
             path = self.path(MANIFEST, source)
             if path in self.files:
-                self._check_sum(path, each)
                 yield path, role
             elif path not in self.names:
                 raise BadFile(f"{self.where(path)}: not in the FMU; expected it, as {MANIFEST} lists it")
-
-    def _check_sum(self, path: str, related: ElementTree.Element) -> None:
-        expected, kind = related.get("checksum"), related.get("checksumType", "SHA3-256")
-        if expected is None:
-            return
-        name = re.sub(r"^sha-", "sha", kind.lower()).replace("-", "_")
-        if name not in hashlib.algorithms_available:
-            raise BadFile(f"{self.where(MANIFEST)}: checksumType {kind!r}; expected one of SHA3 or SHA-2")
-        if hashlib.new(name, self.files[path]).hexdigest() != expected.lower():
-            raise BadFile(f"{self.where(path)}: changed since the manifest was written; expected {kind} {expected}")
 
     def experiments(self, path: str, root: ElementTree.Element) -> Iterator[Trace]:
         for each in _children(root, "Experiment"):

@@ -12,7 +12,6 @@ and the options of the FMI cross-check, which alone has a place for the toleranc
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -29,7 +28,7 @@ from tendonfmu.recordings import Recording
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NOTE = "documentation/fmi-ls-ref.txt"
-VERSION = "1.0.0-alpha.1"  # of fmi-ls-ref
+VERSION = "1.0.0-beta.1"  # of fmi-ls-ref
 
 # The agreement that the semantics ask of two implementations (docs/reference/semantics.md).
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
@@ -201,8 +200,6 @@ def _manifest(related: Sequence[Related]) -> bytes:
             source=file.name,
             role=file.role,
             description=file.description,
-            checksum=hashlib.sha3_256(file.content).hexdigest(),
-            checksumType="SHA3-256",
         )
     return _xml(root)
 
