@@ -15,6 +15,10 @@ class OutputError(InputError):
     """A file cannot be written or unpacked: for the disk or a right, whatever the input. The message is one line."""
 
 
+class NothingLeftError(InputError):
+    """Recordings are sound, but of a part of them nothing is left to learn from. The message is one line."""
+
+
 class InputWarning(UserWarning):
     """Input from the user is accepted, but not all of it is used. The message is one line that starts with the file."""
 
@@ -28,7 +32,7 @@ def own_fault(what: str) -> Iterator[None]:
     """Turn an InputError inside the block into an InternalError, since all input has been checked before."""
     try:
         yield
-    except OutputError:
+    except (OutputError, NothingLeftError):
         raise
     except InputError as refused:
         raise InternalError(f"{what}: {refused}") from refused

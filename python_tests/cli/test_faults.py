@@ -9,6 +9,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,13 @@ import pytest
 import tendonfmu
 from command import Call
 from fmu_binary import FINGER
+from repository_paths import ROOT
 from tendonfmu.cli.console import reader_may_leave
 from tendonfmu.cli.program import write_fault_report
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
+from tendonfmu.recordings import read_recording
 
 NAME = re.compile(r"tendonfmu-error-\d{8}-\d{6}(-\d+)?\.txt")
 
@@ -120,6 +123,15 @@ def test_what_has_been_checked_is_no_input_any_more() -> None:
         raise KeyError
     with pytest.raises(OutputError, match=r"^out: cannot be written"), own_fault("the extended model"):
         raise OutputError("out: cannot be written (No space left on device)")
+
+
+def test_recordings_of_which_nothing_is_left_are_no_fault() -> None:
+    """All of the new recording is marked as contact; it was called an internal error."""
+    demo = ROOT / "examples" / "demo_recording"
+    free, now = read_recording(demo / "two_joints_unseen.parquet"), read_recording(demo / "two_joints_training.parquet")
+    touched = replace(now, contact=np.ones(len(now), dtype=bool))
+    with pytest.raises(InputError, match="expected motion without contact"):
+        tendonfmu.diagnose(demo / "two_joints.json", touched, reference=free)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.structure import Structure, with_values
@@ -153,7 +153,7 @@ def _add_recordings(estimator: Estimator, recordings: Sequence[FitRecording]) ->
                 added.append((place, part))
     if not added:
         paths = ", ".join(str(recording.path) for recording in recordings)
-        raise InputError(f"{paths}: no two samples to learn from without a gap; expected motion without contact")
+        raise NothingLeftError(f"{paths}: no two samples to learn from without a gap; expected motion without contact")
     return added
 
 
