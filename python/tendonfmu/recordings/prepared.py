@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.files import are, counted, percent
 from tendonfmu.model import INPUTS_OF_SOURCE, Finger, inputs_used, moment_arms, number_of, watches_motors
 from tendonfmu.recordings.faults import (
@@ -162,7 +162,7 @@ def _parts(time: Numbers) -> tuple[list[slice], Flags]:
 
 def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, contact: Flags) -> None:
     if not parts:
-        raise InputError(
+        raise NothingLeftError(
             f"{recording.path}: {counted(len(recording), 'sample')} without a gap at most; expected at least {FEWEST}, "
             "and some minutes of motion for a sound fit"
         )
@@ -171,7 +171,7 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
     why = f"{int(contact.sum())} of {len(recording)} are labelled contact and there is no column external_torque"
     if not contact.any():
         why = "the others are left out for a stuck sensor"
-    raise InputError(
+    raise NothingLeftError(
         f"{recording.path}: {counted(int(usable.sum()), 'sample')} to fit to: {why}; expected at least "
         f"{FEWEST} without contact"
     )
