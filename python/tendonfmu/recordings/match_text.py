@@ -189,7 +189,8 @@ def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
             share = percent(learned.varying[j])
             yield f"moment arm at joint {finger.joint_names[j]} changes by {share} with its angle"
     if learned.stiffness.differs:
-        yield f"stiffness is {_off(learned.stiffness)} than described ({learned.stiffness.value:.4g} N/m)"
+        found = f"{learned.stiffness.value:.4g} N/m"
+        yield f"stiffness is {_off(learned.stiffness)} than described ({found}), or the gain of its force sensor is off"
     if (zero := learned.zero).differs:
         off = zero.value - zero.described
         force = -off * learned.stiffness.value
