@@ -106,12 +106,8 @@ def export_numbers(
     unsure = {} if report is None else _unsure(report)
     wanted = [change for change in wanted if _is_sound(change, unsure, left_out)]
     changes = [change for change in wanted if not math.isclose(change.before, change.after, rel_tol=SAME)]
-    if output.resolve().parent != path.resolve().parent and (file := XmlSource(path).first_file()) is not None:
-        raise InputError(
-            f"{output}: the model refers to {file} beside it; expected an output in the folder of {path.name}"
-        )
     with whole_file(output) as temporary:
-        _write(path, changes, temporary)
+        _write(path, changes, temporary, output)
         rows: list[Replayed] = []
         if recordings:
             before = replay_errors(path, read, recordings)
@@ -120,18 +116,24 @@ def export_numbers(
                 left_out.append(f"{change.line()}: the replay {worse[change.name]}; the model's number stays")
                 changes.remove(change)
             if worse:
-                _write(path, changes, temporary)
+                _write(path, changes, temporary, output)
             after = replay_errors(temporary, read, recordings)
             rows = [Replayed(*row) for row in zip(read.joint_names, before.tolist(), after.tolist(), strict=True)]
     return Export(changes, [*left_out, *_inexpressible(data)], rows)
 
 
-def _write(path: Path, changes: Sequence[Change], file: Path) -> None:
+def _write(path: Path, changes: Sequence[Change], file: Path, output: Path) -> None:
     source = XmlSource(path)
     for change in changes:
         unit = source.angle_unit() if change.attribute == "springref" else 1.0
         source.set_number(change.kind, change.name, change.attribute, change.after / unit)
-    file.write_bytes(source.text())
+    text = source.text()
+    beside = source.first_file()
+    if beside is not None and output.resolve().parent != path.resolve().parent:
+        raise InputError(
+            f"{output}: the model refers to {beside} beside it; expected an output in the folder of {path.name}"
+        )
+    file.write_bytes(text)
     _check_written(file, changes)
 
 
