@@ -17,6 +17,8 @@ from tendonfmu.recordings.kinematics import UNITS
 from tendonfmu.recordings.recording import Recording
 
 NEAR_ZERO, TOUCHES = 0.02, 0.005  # of the largest value, and of the samples that are so small
+AT_ZERO = 0.005  # of the largest value: the smallest
+RESTS = 0.1  # of the samples at exactly 0
 BOTH_WAYS = 0.25  # of a joint's range, that it travels in each direction
 GRID = 0.01  # of the smallest difference: others are as near to a multiple of it
 LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
@@ -59,11 +61,15 @@ def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
 
 
 def is_magnitude(force: Numbers, angle: Numbers) -> bool:
-    """Return whether a force [N] turns back at 0 although the joint [N] moves both ways."""
+    """Return whether a force [N] comes to 0 fast, and turns back there, although the joint [N] moves both ways."""
     step, extent = np.diff(angle), float(np.ptp(angle))
     ways = step[step > 0.0].sum(), -step[step < 0.0].sum()
-    small = force <= NEAR_ZERO * force.max()
-    return bool(force.min() >= 0.0 and small.mean() > TOUCHES and extent > 0.0 and min(ways) > BOTH_WAYS * extent)
+    small, change = force[1:] <= NEAR_ZERO * force.max(), np.abs(np.diff(force))
+    if not 0.0 <= force.min() <= AT_ZERO * force.max() or small.mean() < TOUCHES:
+        return False
+    # a force that only comes near 0 turns slowly; one that rests at 0 for long, and is never below, has lost its sign
+    is_fast = np.median(change[small]) >= 0.5 * np.median(change) or (force == 0.0).mean() > RESTS
+    return bool(is_fast and extent > 0.0 and min(ways) > BOTH_WAYS * extent)
 
 
 def wrapped(column: Numbers) -> float | None:
