@@ -153,8 +153,8 @@ def _only_chain(model: CompiledModel) -> list[str]:
     motors = {joint.index for tendon in driven for joint in motors_of(model, tendon)}
     joints = [joint for joint in joints if joint.index not in motors]
     angles = np.random.default_rng(0).uniform(-0.3, 0.3, (8, len(joints)))
-    moved = moved_velocities(model, joints, angles)[[tendon.index for tendon in driven]].any(axis=0)
-    joints = [joint for joint in joints if moved[joint.velocity]]
+    moved = moved_velocities(model, joints, angles)[[tendon.index for tendon in driven]]
+    joints = [joint for joint in joints if moved[:, joint.velocity].any()]
     ends = [joint for joint in joints if not any(_carries(model, joint, other) for other in joints)]
     chains = [[joint.name for joint in joints if joint == end or _carries(model, joint, end)] for end in ends]
     if len(chains) != 1:
