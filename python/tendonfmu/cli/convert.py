@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,6 +13,7 @@ import typer
 
 from tendonfmu.cli.command import command
 from tendonfmu.cli.console import (
+    DASH,
     check_second_file,
     check_table,
     name_of,
@@ -22,34 +24,40 @@ from tendonfmu.cli.console import (
     write_blocks,
     write_table,
 )
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tendonfmu.recordings import Inspection, Proposal
+    from tendonfmu.recordings import Conversion, Inspection, Proposal
 
 FINGER = "finger"  # what `describe` makes from names alone
-TABLE = "table"  # the format whose columns a map describes
+TABLE, LEROBOT = "table", "lerobot"  # the formats whose columns a map describes
 INSPECT = "inspect"
+CONVERSION = "tendonfmu-conversion-1"  # format of the report
 JOINT = "joint"
 LARGEST = 1e6  # of torques, speeds and inertias of a described machine
 
 
 @command(reads=("file",))
 def convert(
-    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, or inspect")],
+    source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, lerobot, or inspect")],
     file: Annotated[
         Path,
         typer.Argument(
             metavar="FILE",
-            help="third-party recording; for table and inspect any log: CSV, Parquet, MATLAB, HDF5, MCAP, ROS 2 bag",
+            help="third-party recording; for table and inspect any log: CSV, Parquet, MATLAB, HDF5, MCAP, ROS 2 bag; "
+            "for lerobot and inspect the folder of a LeRobot dataset",
         ),
     ],
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="REC.csv", help="recording, .csv, .parquet or .mcap; inspect: MAP.json to write"
+            "-o",
+            "--output",
+            metavar="REC.csv",
+            help="recording, .csv, .parquet or .mcap; lerobot: or a folder, for a recording of each episode; inspect: "
+            "MAP.json to write",
         ),
     ] = None,
     radius: Annotated[
@@ -76,29 +84,37 @@ def convert(
         int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed [default: 10]")
     ] = None,
     map_: Annotated[
-        Path | None, typer.Option("--map", metavar="MAP.json", help="table: name, unit and sign of each column")
+        Path | None,
+        typer.Option("--map", metavar="MAP.json", help="table, lerobot: name, unit and sign of each column"),
     ] = None,
     finger: Annotated[
         Path | None, typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write")
+    ] = None,
+    episodes: Annotated[
+        str | None, typer.Option(metavar="0-9,12", help="lerobot, inspect: episodes to read [default: all]")
     ] = None,
 ) -> None:
     """Convert a third-party recording or any log into a recording of tendonfmu.
 
     convert inspect LOG lists what is in a log and proposes a map; convert table
-    LOG --map MAP.json -o REC.parquet converts it.
+    LOG --map MAP.json -o REC.parquet converts it. convert lerobot FOLDER --map
+    MAP.json -o DIR converts each episode of a LeRobot dataset.
     """
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
     if source == INSPECT:
         _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o")
-        report = _inspect(file, output)
+        report = _inspect(file, output, episodes)
     elif output is None:
         raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
+    elif source == LEROBOT:
+        _refuse_options(source, {**options, "finger": finger}, "--map or --episodes")
+        report = _convert_table(source, file, output, map_, None, episodes)
     elif source == TABLE:
-        _refuse_options(source, options, "--map or --finger")
-        report = _convert_table(file, output, map_, finger)
+        _refuse_options(source, {**options, "episodes": episodes}, "--map or --finger")
+        report = _convert_table(source, file, output, map_, finger, None)
     else:
-        _refuse_options(source, {"map": map_, "finger": finger}, f"convert {TABLE}")
+        _refuse_options(source, {"map": map_, "finger": finger, "episodes": episodes}, f"convert {TABLE}")
         report = _convert_data_set(source, file, output, options)
     print_json(lambda: report)
 
@@ -119,16 +135,16 @@ def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> N
             raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
 
 
-def _inspect(file: Path, output: Path | None) -> dict[str, Any]:
+def _inspect(file: Path, output: Path | None, episodes: str | None) -> dict[str, Any]:
     """Print what is in a log, write the proposed map, and return both."""
     from tendonfmu.files import check_output, counted, write_text
-    from tendonfmu.recordings import inspect_log, inspection_document, propose
+    from tendonfmu.recordings import LeRobotLog, inspect_log, inspection_document, propose
 
     if output is not None:
         if output.suffix.lower() != ".json":
             raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
         check_output(output, file)
-    inspection = inspect_log(file)
+    inspection = inspect_log(file, None if episodes is None else LeRobotLog(file, chosen=episodes))
     proposal = propose(inspection)
     _print_inspection(inspection, proposal)
     for note in (*inspection.notes, *proposal.notes):
@@ -152,24 +168,65 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
     print_results([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
 
 
-def _convert_table(file: Path, output: Path, map_file: Path | None, finger: Path | None) -> dict[str, Any]:
-    """Convert a log by its map, and write the description of a one-joint machine."""
+def _convert_table(
+    source: str, file: Path, output: Path, map_file: Path | None, finger: Path | None, episodes: str | None
+) -> dict[str, Any]:
+    """Convert a log or dataset by its map, and write the description of a one-joint machine."""
+    from tendonfmu.files import OUTPUTS
+    from tendonfmu.recordings import Conversion, LeRobotLog
+
     if map_file is None:
         raise InputError(
-            f"convert {TABLE}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
+            f"convert {source}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
         )
+    if source == LEROBOT and file.resolve() in (output.resolve(), *output.resolve().parents):
+        raise InputError(f"{output}: a place in the dataset {file}; expected another one")
+    if source == LEROBOT and output != DASH and output.suffix.lower() not in OUTPUTS:
+        return _convert_episodes(file, output, map_file, episodes)
     check_table(output, file, map_file)
     check_second_file(finger, output, "recording and description", file, map_file)
-    if finger is None:
-        return _convert_in_blocks(file, output, map_file)
-    return _convert_with_finger(file, output, map_file, finger)
+    if finger is not None:
+        return _convert_with_finger(file, output, map_file, finger)
+    conversion = Conversion(file, map_file, LeRobotLog(file, chosen=episodes) if source == LEROBOT else None)
+    return _written(output, *_write_in_blocks(conversion, output), conversion.notes)
 
 
-def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, Any]:
-    """Convert a log; if its map allows, only some rows are in memory at any time."""
-    from tendonfmu.recordings import Conversion
+def _convert_episodes(folder: Path, output: Path, map_file: Path, episodes: str | None) -> dict[str, Any]:
+    """Write a recording of each episode of a LeRobot dataset to a folder, all or none."""
+    import tempfile
 
-    conversion = Conversion(file, map_file)
+    from tendonfmu.files import check_output_folder, counted, in_use, listed, remove_left_behind
+    from tendonfmu.recordings import Conversion, LeRobotLog
+
+    check_output_folder(output)
+    log = LeRobotLog(folder, chosen=episodes)
+    made: dict[str, dict[str, Any]] = {}  # by the file's name
+    said: dict[str, list[str]] = {}  # the episodes of each note
+    target = output.absolute()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    remove_left_behind(target)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}-") as scratch, in_use(Path(scratch)):
+        for episode in log.episodes:
+            alone, name = log.only(episode), f"episode_{episode.number:06d}.parquet"
+            conversion = Conversion(folder, map_file, alone)
+            try:
+                count, duration = _write_in_blocks(conversion, Path(scratch, name))
+            except OutputError as refused:
+                raise OutputError(str(refused).replace(scratch, str(output))) from None
+            made[name] = {"recording": str(output / name), "samples": count, "duration": duration}
+            for note in conversion.notes:
+                said.setdefault(note.removeprefix(f"{alone.file}: "), []).append(str(episode.number))
+        target.mkdir(exist_ok=True)
+        for name in made:
+            os.replace(Path(scratch, name), target / name)
+    notes = [f"{folder}: {note} (episode {listed(numbers)})" for note, numbers in said.items()]
+    _say_notes(notes)
+    say(f"{output}: {counted(len(made), 'recording')}")
+    return {"format": CONVERSION, "recordings": list(made.values()), "notes": notes}
+
+
+def _write_in_blocks(conversion: Conversion, output: Path) -> tuple[int, float]:
+    """Write a recording, return its samples and s; if its map allows, only some rows are in memory at any time."""
     count, first, last = 0, 0.0, 0.0
 
     def with_count() -> Iterator[dict[str, NDArray[Any]]]:
@@ -180,7 +237,7 @@ def _convert_in_blocks(file: Path, output: Path, map_file: Path) -> dict[str, An
             yield columns
 
     write_blocks(output, with_count())
-    return _written(output, count, last - first, conversion.notes)
+    return count, last - first
 
 
 def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
@@ -201,20 +258,24 @@ def _written(output: Path, count: int, duration: float, notes: list[str]) -> dic
     """Say what was written and what was left out or recovered, and return it."""
     from tendonfmu.files import counted
 
+    _say_notes(notes)
+    say(f"{name_of(output)}: {counted(count, 'sample')}, {duration:.3f} s")
+    return {
+        "format": CONVERSION,
+        "recording": str(output),
+        "samples": count,
+        "duration": duration,
+        "notes": notes,
+    }
+
+
+def _say_notes(notes: list[str]) -> None:
     for note in notes:
         # what the user should look at: doubtful units, and logs that were cut off
         if ": warning: " in note or re.search(" (is|are) kept$", note):
             warn(note.replace(": warning: ", ": ", 1))
         else:
             say(note)
-    say(f"{name_of(output)}: {counted(count, 'sample')}, {duration:.3f} s")
-    return {
-        "format": "tendonfmu-conversion-1",
-        "recording": str(output),
-        "samples": count,
-        "duration": duration,
-        "notes": notes,
-    }
 
 
 @command()

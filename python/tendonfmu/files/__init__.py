@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .json_node import Node, Refusal, finite, read_json, report_text
     from .tables import (
         FORMATS,
+        OUTPUTS,
         Table,
         check_format,
         check_output_format,

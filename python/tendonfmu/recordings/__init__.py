@@ -12,6 +12,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .converters import convert_file
     from .converters.inspection import Inspection, inspect_log
+    from .converters.lerobot_log import LeRobotLog
     from .converters.one_joint import describe_joint, describe_recorded_joint, description_text, joint_description
     from .converters.proposal import (
         Proposal,

@@ -48,7 +48,7 @@ CONVERTERS = {
 def converter(name: str) -> Converter:
     """Return the converter of that name. Raise InputError with the known names."""
     if name not in CONVERTERS:
-        raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}, table")
+        raise InputError(f"convert: unknown format {name!r}; expected one of {', '.join(CONVERTERS)}, table, lerobot")
     convert: Converter = importlib.import_module(CONVERTERS[name].module).convert
     return convert
 

@@ -193,7 +193,7 @@ REFERENCE = {"external", "ext", "reference", "ref", "ft", "sensor"}
 CONTACT = {"contact", "touch", "label", "touching"}
 # words that say that a signal is not measured, or no signal of a finger
 OTHERS = {"desired", "des", "target", "command", "cmd", "setpoint", "goal", "temperature", "temp", "current", "voltage"}
-OTHERS |= {"pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
+OTHERS |= {"action", "pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
 KNOWN = TENDON | FORCES | TORQUES | SPEEDS | ANGLES | REFERENCE
 
 # what an element is by its own name -> what it is in an array of these

@@ -126,9 +126,9 @@ class Inspection:
     messages: bool = False  # whether the log holds messages, whose units are those of ROS if nothing else is said
 
 
-def inspect_log(file: Path) -> Inspection:
-    """Read a log and summarise it."""
-    log = open_log(file, LogFormat())
+def inspect_log(file: Path, log: Log | None = None) -> Inspection:
+    """Read a log and summarise it. log: the log, if it is open."""
+    log = log or open_log(file, LogFormat())
     topics = {topic.name: _empty_summary(topic) for topic in log.topics}
     wanted = {name: [part.key for part in topic.fields if part.field.kind != OTHER] for name, topic in topics.items()}
     texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]

@@ -31,6 +31,7 @@ FORMATS = {
     ".db3": ("ros2_bag_log", "open_bag"),
 }
 FOLDER = ("ros2_bag_log", "open_bag")
+DATASET, INFO = ("lerobot_log", "LeRobotLog"), "meta/info.json"  # a folder with this file is a LeRobot dataset
 
 # Columns of some rows, by name: float64, int64 or bool arrays [N]; texts as an Arrow array. Times that the format
 # declares as such are int64, in ns since 1970.
@@ -110,11 +111,13 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     if not file.is_dir():
         if suffix not in (TEXTS if is_gzip else FORMATS):
             raise InputError(
-                f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or a bag's folder"
+                f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or the folder of a bag "
+                "or dataset"
             )
         if not file.is_file():
             raise InputError(f"{file}: no such file; expected a log, {known}")
-    module, name = FOLDER if file.is_dir() else FORMATS[suffix]
+    folder = DATASET if (file / INFO).is_file() else FOLDER
+    module, name = folder if file.is_dir() else FORMATS[suffix]
     opener = getattr(importlib.import_module(f"tendonfmu.recordings.converters.{module}"), name)
     return cast("Log", opener(file, settings))
 

@@ -23,28 +23,16 @@ class ParquetLog:
     def __init__(self, file: Path, settings: LogFormat) -> None:
         self.file = file
         self.notes: list[str] = []
-        with self._opened() as parquet:
+        with opened(file) as parquet:
             schema, rows = parquet.schema_arrow, parquet.metadata.num_rows
         fields = [Field(field.name, _kind(field.type), str(field.type), _unit(field)) for field in schema]
         self.topics = [Topic("", tuple(fields), rows)]
-
-    def _opened(self) -> Any:
-        try:
-            return pq.ParquetFile(self.file)
-        except (pa.ArrowException, OSError) as error:
-            raise self._cut_off(error) from None
-
-    def _cut_off(self, error: Exception) -> InputError:
-        return InputError(
-            f"{self.file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
-            "nothing can be recovered: copy the file again, or write it again from its source"
-        )
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read columns; see `log.Log`."""
         places = {name: self.topics[0].place(name) for name in wanted.get("", ())}
         row = 0
-        with self._opened() as parquet:
+        with opened(self.file) as parquet:
             names = parquet.schema_arrow.names
             is_unique = len(set(names)) == len(names)  # otherwise columns cannot be chosen by name, and all are read
             chosen = sorted({names[place] for place in places.values()}) if is_unique else None
@@ -53,27 +41,44 @@ class ParquetLog:
                     block = {}
                     for name, place in places.items():
                         column = batch.column(names[place] if is_unique else place)
-                        block[name] = self._values(names[place], column, row)
+                        block[name] = values_of(self.file, names[place], column, row)
                     yield "", block
                     row += batch.num_rows
             except (pa.ArrowException, OSError) as error:
-                raise self._cut_off(error) from None
+                raise cut_off(self.file, error) from None
 
-    def _values(self, name: str, column: Any, row: int) -> Any:
-        """Return a column as numbers or texts. A missing number becomes NaN."""
-        kind = _kind(column.type)
-        if kind == TEXT:
-            return column
-        if kind == TIME:
-            return np.asarray(column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).to_numpy(False))
-        if kind == OTHER:
-            at = next((k for k, value in enumerate(column, start=1) if value.is_valid), 1)
-            raise InputError(f"{self.file}: column {name}, row {row + at}: {column.type} values; expected numbers")
-        if pa.types.is_boolean(column.type):
-            column = column.cast(pa.int8())
-        if pa.types.is_integer(column.type) and not column.null_count:
-            return as_numbers(column.to_numpy(False))
-        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(False), dtype=np.float64)
+
+def opened(file: Path) -> Any:
+    """Open a Parquet file."""
+    try:
+        return pq.ParquetFile(file)
+    except (pa.ArrowException, OSError) as error:
+        raise cut_off(file, error) from None
+
+
+def cut_off(file: Path, error: Exception) -> InputError:
+    """Return the error of a file that cannot be read."""
+    return InputError(
+        f"{file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
+        "nothing can be recovered: copy the file again, or write it again from its source"
+    )
+
+
+def values_of(file: Path, name: str, column: Any, row: int) -> Any:
+    """Return a column as numbers or texts. row: rows before it. A missing number becomes NaN."""
+    kind = _kind(column.type)
+    if kind == TEXT:
+        return column
+    if kind == TIME:
+        return np.asarray(column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).to_numpy(False))
+    if kind == OTHER:
+        at = next((k for k, value in enumerate(column, start=1) if value.is_valid), 1)
+        raise InputError(f"{file}: column {name}, row {row + at}: {column.type} values; expected numbers")
+    if pa.types.is_boolean(column.type):
+        column = column.cast(pa.int8())
+    if pa.types.is_integer(column.type) and not column.null_count:
+        return as_numbers(column.to_numpy(False))
+    return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(False), dtype=np.float64)
 
 
 def _kind(kind: Any) -> str:

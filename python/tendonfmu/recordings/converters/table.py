@@ -54,9 +54,9 @@ def convert_table(file: Path, map_file: Path) -> ConvertedLog:
 class Conversion:
     """A log that is being converted."""
 
-    def __init__(self, file: Path, map_file: Path) -> None:
+    def __init__(self, file: Path, map_file: Path, log: Log | None = None) -> None:
         self.map = read_map(map_file)
-        self.log: Log = open_log(file, self.map.log)
+        self.log: Log = log or open_log(file, self.map.log)
         self.notes: list[str] = []
         self.velocity_cutoff = 0.0
         self._topics: dict[str, Topic] = {}
