@@ -284,7 +284,7 @@ def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypat
     from evidence.detection import mujoco_pushes
 
     monkeypatch.setitem(mujoco_pushes.SECONDS, "free", 130.0)
-    off, covered = [], []
+    off, covered, alone = [], [], []
     for number in (3, 19):
         mujoco_pushes.make(tmp_path, number, ("free",))
         finger = read_finger(mujoco_pushes.description_file(tmp_path, number))
@@ -298,7 +298,12 @@ def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypat
                         abs(each.stiffness.value / each.stiffness.described - 1.0) / 0.05,
                         abs(each.zero.value) / (3.0 * STEP),
                     ]
+                part = whole[begin : begin + 60.0]
+                part.groups.pop("joint_position")
+                alone += [each.stiffness for each in learn_routing(finger, [part]) if each.stiffness.is_known]
     assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
+    assert len(alone) == 36 and max(abs(each.value / each.described - 1.0) for each in alone) < 0.014
+    assert sum(abs(each.value - each.described) <= each.half for each in alone) == 35
 
 
 def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:

@@ -13,10 +13,10 @@ from command import Call
 from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.arrays import Numbers
-from tendonfmu.model import Finding, Finger, read_finger
+from tendonfmu.model import Finding, Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording, belongs, read_recording
 from tendonfmu.recordings.converters.table import convert_table
-from tendonfmu.recordings.traps import wrapped
+from tendonfmu.recordings.traps import is_magnitude, wrapped
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 FREE = ROOT / "examples" / "demo_recording" / "index_finger_free.parquet"
@@ -122,6 +122,20 @@ def test_a_magnitude_is_refused_by_check(tmp_path: Path, call: Call) -> None:
     assert (
         answer.status == 1 and "tendon_force[1]: never negative while servo moves both ways" in answer.out + answer.err
     )
+
+
+def test_what_is_no_magnitude_and_no_slow_sensor() -> None:
+    """A force that only comes near 0, a sensor without signal, and steps that are far apart."""
+    angle = np.sin(np.arange(4000) / 200.0)
+    assert is_magnitude(np.abs(angle), angle)
+    assert not is_magnitude(1.0005 + np.cos(np.arange(4000) / 200.0), angle) and not is_magnitude(0.0 * angle, angle)
+    assert not is_magnitude(np.ones(1), np.ones(1))
+    stairs = np.repeat(np.arange(60.0), 1500)[:, None]
+    groups = {"tendon_force": stairs, "tendon_position": 1e-3 * stairs}
+    recording = Recording(Path("stairs.csv"), np.arange(len(stairs)) / 500.0, groups)
+    data = {"format": "tendonfmu-finger-1", "name": "m", "joints": [{"name": "j"}], "contact": {"threshold": [0.1]}}
+    data["tendons"] = [{"stiffness": 1e5, "moment_arms": [0.01]}]
+    assert "slow" not in [finding.kind for finding in belongs(finger_from_data(data), [recording])]
 
 
 def test_wrap_and_rate_of_a_map(tmp_path: Path) -> None:

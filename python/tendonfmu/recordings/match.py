@@ -16,6 +16,7 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finding, Finger, is_direct_drive
 from tendonfmu.recordings import match_text as text
+from tendonfmu.recordings import trap_text
 from tendonfmu.recordings.faults import (
     TURNS,
     clipped_channels,
@@ -111,7 +112,7 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
     unit = clock.entries.get("time", {}).get("scale") if clock else None
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
-    traps = [text.trap(recording.path, found) for found in find_traps(finger, recording)]
+    traps = [trap_text.trap(recording.path, found) for found in find_traps(finger, recording)]
     if _has_error(traps):  # equations and other channels tell nothing then
         return [*findings, *traps]
     findings += traps
@@ -190,7 +191,7 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         findings = [text.repair(recording.path, fitting) for fitting in done]
         findings += [text.routing(recording.path, finger, each, "warning") for each in off]
         if (drift := clock_drift(learned)) is not None and drift.differs:
-            findings.append(text.drift(recording.path, drift, float(np.ptp(recording.time))))
+            findings.append(trap_text.drift(recording.path, drift, float(np.ptp(recording.time))))
         for fitting in done:
             recording = _mended(recording, fitting.correction)
         if left > POOR:

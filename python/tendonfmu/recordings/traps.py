@@ -62,6 +62,8 @@ def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
 
 def is_magnitude(force: Numbers, angle: Numbers) -> bool:
     """Return whether a force [N] comes to 0 fast, and turns back there, although the joint [N] moves both ways."""
+    if len(force) < FEWEST or not force.any():
+        return False
     step, extent = np.diff(angle), float(np.ptp(angle))
     ways = step[step > 0.0].sum(), -step[step < 0.0].sum()
     small, change = force[1:] <= NEAR_ZERO * force.max(), np.abs(np.diff(force))
@@ -143,8 +145,8 @@ def _between_changes(column: Numbers) -> float | None:
     apart = np.diff(np.flatnonzero(np.diff(column)))
     if len(apart) < FEWEST_CHANGES:
         return None
-    counts = np.bincount(apart[apart < LONG])
-    usual = int(np.argmax(counts))
+    counts = np.bincount(apart[apart < LONG], minlength=2)
+    usual = max(int(np.argmax(counts)), 1)
     pair = max((counts[usual : usual + 2].sum(), usual), (counts[usual - 1 : usual + 1].sum(), usual - 1))
     is_even = usual > 1 and bool((apart % usual == 0).mean() > REGULAR)
     if is_even:
