@@ -28,14 +28,14 @@ from tendonfmu.recordings import describe_recorded_joint
 KINEMATICS = 3  # angle and velocity are measured
 JUDGED = {"other excitations": SECOND, "another identification": OTHERS, "ramps, breaking away": RAMPS[:1],
           "constant speeds": RAMPS[1:]}  # fmt: skip
+PAIR = (1, 2)  # whose axes are perpendicular
 SHOWN = 10.0  # s of the figure
 
 
-def error(finger: Any, name: str, joint: int) -> float:
-    """Error of a finger on a recording, as a part of the effort's root mean square."""
-    recording = recording_of(name, joint)
+def errors(finger: Any, recording: tf.Recording) -> Any:
+    """Errors of a finger on a recording, as parts of the effort's root mean square, by joint."""
     left = tf.run(finger, recording, kinematics=KINEMATICS).outputs["compensated_torque"]
-    return float(np.sqrt(np.mean(left**2) / np.mean(recording.groups["tendon_force"] ** 2)))
+    return np.sqrt(np.mean(left**2, axis=0) / np.mean(recording.groups["tendon_force"] ** 2, axis=0))
 
 
 def mean_of(errors: Sequence[float]) -> str:
@@ -47,7 +47,7 @@ def named(found: tf.Diagnosis) -> dict[str, str]:
     return {cause.effect: cause.size for cause in found.causes if cause.effect not in ("contact", "unknown")}
 
 
-def judge(joint: int, rows: list[str]) -> tuple[Any, list[tf.Diagnosis]]:
+def judge(joint: int, together: Any, rows: list[str]) -> tuple[Any, list[tf.Diagnosis]]:
     """Fit, diagnose twice, and add the joint's rows to the table."""
     start = describe_recorded_joint(f"joint_{joint}", recording_of(FIRST[0], joint), 1.0)
     parts = [[recording_of(name, joint) for name in names] for names in (FIRST, SECOND)]
@@ -55,27 +55,40 @@ def judge(joint: int, rows: list[str]) -> tuple[Any, list[tf.Diagnosis]]:
     found = [tf.diagnose(start, parts[k], test=parts[1 - k], kinematics=KINEMATICS) for k in (0, 1)]
     fields = [RigidBody(joint, FIRST, stribeck) for stribeck in (False, True)]
     for words, names in JUDGED.items():
-        own = [[error(finger, name, joint) for name in names] for finger in (fitted, found[0].extended)]
+        own = [
+            [errors(finger, recording_of(name, joint))[0] for name in names] for finger in (fitted, found[0].extended)
+        ]
         theirs = [[field.error(name) for name in names] for field in fields]
-        rows.append(f"| {joint} | {words} | " + " | ".join(map(mean_of, [*theirs, *own])) + " |")
+        if joint in PAIR:
+            place = PAIR.index(joint)
+            own.append([errors(together, coupled_recording(name, PAIR))[place] for name in names])
+        row = [*map(mean_of, [*theirs, *own]), *([] if joint in PAIR else ["–"])]
+        rows.append(f"| {joint} | {words} | " + " | ".join(row) + " |")
     return found[0].extended, found
 
 
-def couple(joints: Sequence[int]) -> None:
-    """Say what several joints together show that each alone does not."""
+def couple(joints: Sequence[int]) -> list[tf.Diagnosis]:
+    """Say what several joints together show that each alone does not, on either half."""
     starts = [describe_recorded_joint(f"joint_{joint}", recording_of(FIRST[0], joint), 1.0) for joint in joints]
-    seen, unseen = ([coupled_recording(name, joints) for name in names] for names in (FIRST, SECOND))
-    report = (found := tf.diagnose(coupled_finger(starts), seen, test=unseen, kinematics=KINEMATICS)).report
-    print(f"\njoints {joints} together: {named(found) or 'nothing'}; {report['unexplained']['description']}")
-    for name, values in (
-        ("left", report["extended"]["test_rms"]),
-        ("follow no signal of any joint", report["noise_floor"]),
-    ):
-        print(f"  {', '.join(f'{1e3 * value:.0f}' for value in values)} mN·m {name}")
+    parts = [[coupled_recording(name, joints) for name in names] for names in (FIRST, SECOND)]
+    found = [tf.diagnose(coupled_finger(starts), parts[k], test=parts[1 - k], kinematics=KINEMATICS) for k in (0, 1)]
+    for diagnosis in found:
+        report = diagnosis.report
+        print(f"\njoints {joints} together: {named(diagnosis) or 'nothing'}; {report['unexplained']['description']}")
+        for cause in report["causes"]:
+            for place in cause.get("places", ()):
+                print(f"  {cause['effect']} at joint {place['joint']}: {place['parameters']}")
+        for name, values in (
+            ("left", report["extended"]["test_rms"]),
+            ("follow no signal of any joint", report["noise_floor"]),
+        ):
+            print(f"  {', '.join(f'{1e3 * value:.0f}' for value in values)} mN·m {name}")
+    return found
 
 
-def draw(file: Path, fingers: dict[int, Any]) -> None:
-    """Effort of each joint and what the extended model says, on an excitation that nothing was learned on."""
+def draw(file: Path, fingers: dict[int, Any], together: Any) -> None:
+    """Effort of each joint and what the extended models say, on an excitation that nothing was learned on."""
+    both = tf.run(together, coupled_recording(SECOND[0], PAIR), kinematics=KINEMATICS).outputs
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
     panels = figure.subplots(len(fingers), 1, sharex=True)
     for panel, (joint, finger) in zip(panels, fingers.items(), strict=True):
@@ -84,7 +97,14 @@ def draw(file: Path, fingers: dict[int, Any]) -> None:
         left = tf.run(finger, recording, kinematics=KINEMATICS).outputs["compensated_torque"][:, 0]
         shown = recording.time < recording.time[0] + SHOWN
         panel.plot(recording.time[shown], effort[shown], color=GREY, linewidth=1.8, label="measured")
-        panel.plot(recording.time[shown], (effort - left)[shown], color=BLUE, linewidth=1.2, label="extended model")
+        alone = (
+            effort - left
+            if joint not in PAIR
+            else np.interp(
+                recording.time, both["time"], (both["joint_torque"] - both["compensated_torque"])[:, PAIR.index(joint)]
+            )
+        )
+        panel.plot(recording.time[shown], alone[shown], color=BLUE, linewidth=1.2, label="extended model")
         panel.set_ylabel(f"joint {joint}: effort ({'N' if joint == 3 else 'N·m'})")
         clean(panel)
     panels[0].legend(ncols=2, frameon=False)
@@ -103,8 +123,10 @@ def main() -> int:
         print(f"SKIPPED: {absent}", file=sys.stderr)
         return 2
     rows, fingers = [], {}
+    together = couple(PAIR)[0].extended
+    couple(JOINTS)
     for joint in JOINTS:
-        fingers[joint], found = judge(joint, rows)
+        fingers[joint], found = judge(joint, together, rows)
         for names, diagnosis in zip((FIRST, SECOND), found, strict=True):
             causes = "; ".join(f"{effect} ({size})" for effect, size in named(diagnosis).items()) or "nothing"
             report = diagnosis.report
@@ -114,12 +136,10 @@ def main() -> int:
             print(f"  {left:.0f} {unit} are left, {floor:.0f} of it follow no signal of the joint")
         if given.output is not None:
             found[0].write(given.output / f"joint_{joint}")
-    couple((1, 2))
-    couple(JOINTS)
-    print("\n| joint | judged on | rigid body | with Stribeck | one joint | extended |")
-    print("| --- | --- | ---: | ---: | ---: | ---: |\n" + "\n".join(rows))
+    print("\n| joint | judged on | rigid body | with Stribeck | one joint | extended | joints 1 and 2 extended |")
+    print("| --- | --- | ---: | ---: | ---: | ---: | ---: |\n" + "\n".join(rows))
     if given.figure is not None:
-        draw(given.figure, fingers)
+        draw(given.figure, fingers, together)
     return 0
 
 

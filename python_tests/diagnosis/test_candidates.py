@@ -43,7 +43,8 @@ Data = dict[str, Any]
 CONTRACT = (
     "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",
     "joint_load_friction", "preload_friction", "load_friction", "cover_stiffness", "cover_hardening", "gravity",
-    "inertia", "presliding", "friction_drift", "force_gain", "force_offset", "time_delay", "moment_arm",
+    "inertia", "inertia_variation", "presliding", "friction_drift", "force_gain", "force_offset", "time_delay",
+    "moment_arm",
     "moment_arm_variation", "pulley_eccentricity", "tendon_nonlinearity", "joint_coupling", "backlash",
 )  # fmt: skip
 COORDINATES = {"velocity", "angle", "force", "time", "travel", "acceleration", "load"}
@@ -197,6 +198,7 @@ def test_places_follow_the_structure(case: Case) -> None:
         "cover_stiffness": {(2, None)},
         "gravity": {(2, None)},
         "joint_coupling": {(1, None)},
+        "inertia_variation": {(1, None)},
         "time_delay": {(None, None)},
         "load_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
         "preload_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},

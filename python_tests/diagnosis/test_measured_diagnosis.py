@@ -1,4 +1,4 @@
-"""The diagnosed models of EMPS and the da Vinci jaw hold: needs the recordings in ../shared/data or $TENDONFMU_DATA."""
+"""The diagnosed models of EMPS, the da Vinci jaw and PSM hold: needs ../shared/data or $TENDONFMU_DATA."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ from optional_parts import DATA, needs
 from repository_paths import ROOT
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.files.tables import write_table
+from tendonfmu.interface import diagnose as find
 from tendonfmu.model.native import run_recording
+from tendonfmu.recordings import describe_recorded_joint
 from tendonfmu.recordings.converters import convert_file
 from tendonfmu.recordings.recording import Recording
 
 emps = needs("emps data")
 davinci = needs("davinci data")
+psm = needs("psm data")
 EMPS_LIMITS = {"DATA_EMPS": 2.2, "DATA_EMPS_PULSES": 3.1}  # % of the force
 JAW_LIMIT = 0.008  # N·m
 ODD = ("01", "03", "05", "07", "09")
@@ -105,3 +108,20 @@ def test_the_jaw_s_causes_are_named_and_its_stall_is_an_event(tmp_path: Path) ->
     stalls = [event for event in found.events if Path(event.recording).stem == "07"]
     assert any(event.start < STALL[1] and event.end > STALL[0] for event in stalls)
     assert jaw_error(dict(found.extended_data)) <= JAW_LIMIT
+
+
+@psm
+@pytest.mark.long
+def test_the_arm_s_inertia_varies_as_it_folds() -> None:
+    recordings = example("psm", "psm_recordings")
+    starts = [
+        describe_recorded_joint(f"joint_{j}", recordings.recording_of(recordings.FIRST[0], j), 1.0) for j in (1, 2)
+    ]
+    seen, unseen = (
+        [recordings.coupled_recording(name, (1, 2)) for name in names]
+        for names in (recordings.FIRST, recordings.SECOND)
+    )
+    report = find(recordings.coupled_finger(starts), seen, test=unseen, kinematics=3).report
+    cause = report["causes"][0]
+    assert (cause["effect"], cause["joint"]) == ("inertia_variation", 1)
+    assert max(report["extended"]["test_rms"]) < 0.15  # N·m, of efforts of 0.8

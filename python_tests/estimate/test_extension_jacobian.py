@@ -22,7 +22,7 @@ from tendonfmu.estimate import estimation
 
 Array = NDArray[Any]
 
-FINGERS = range(700, 712)
+FINGERS = range(700, 713)
 SAMPLES = 50
 SIGNALS = ("time_delay", "backlash", "tendon_nonlinearity")
 ROUNDING = 1e-9  # of the column's largest

@@ -106,7 +106,7 @@ def nothing_undeclared_influences(
             seen |= steps_apart(finger, state, rows_of(recording, k, k + 1))
             finger.restore_state(state)
     assert seen - allowed == set()
-    assert len(seen) > 0.3 * len(allowed)
+    assert len(seen) > 0.25 * len(allowed)
 
 
 @pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 3)))
@@ -292,12 +292,12 @@ def test_a_delay_leaves_no_fixed_factor(tmp_path: Path) -> None:
 def test_numbers_say_of_which_effect_they_are(tmp_path: Path) -> None:
     found = {variable["name"]: variable for variable in described(ROWS, tmp_path)["variables"]}
     numbers = {name: found[name] for name in found if name.startswith("extensions[")}
-    assert len(numbers) == 44
+    assert len(numbers) == 46
     assert (
-        numbers["extensions[10].coulomb"]["description"]
-        == "Extension 10: coulomb, of load_friction at joint 2, tendon 1"
+        numbers["extensions[11].coulomb"]["description"]
+        == "Extension 11: coulomb, of load_friction at joint 2, tendon 1"
     )
-    assert numbers["extensions[25].delay"]["description"] == "Extension 25: delay, of time_delay"
+    assert numbers["extensions[26].delay"]["description"] == "Extension 26: delay, of time_delay"
     for number in numbers.values():
         assert number["variability"] == "tunable" and number["causality"] == "parameter"
-    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (17, 18, 28)} == {"rad", "m", "s"}
+    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (18, 19, 29)} == {"rad", "m", "s"}

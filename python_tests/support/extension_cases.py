@@ -9,6 +9,7 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
     {"effect": "gravity", "joint": 1, "sine": 0.02},
     {"effect": "inertia", "joint": 1, "inertia": 1e-4},
+    {"effect": "inertia_variation", "joint": 1, "sine": 2e-5, "cosine": -1e-4},
     {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05},
     {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05, "reaction": 0.3},
     {"effect": "preload_friction", "tendon": 1, "coulomb": 0.4},

@@ -21,7 +21,11 @@ from oracle_finger import Effect, Joint, Key, Step, given
 Array = NDArray[Any]
 
 HISTORY = 64  # samples that a delay looks back on
-OPTIONAL_NUMBERS = {"gravity": ("sine", "cosine"), "pulley_eccentricity": ("sine", "cosine")}
+OPTIONAL_NUMBERS = {
+    "gravity": ("sine", "cosine"),
+    "inertia_variation": ("sine", "cosine"),
+    "pulley_eccentricity": ("sine", "cosine"),
+}
 MECHANISM = {
     "pulley_eccentricity": {"turns": 1.0},
     "joint_coupling": {"reaction": 1.0},
@@ -113,6 +117,12 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
             T[before] = cosines[before, j] * weight
     elif row.effect == "inertia":
         T[j] = numbers["inertia"] * at.acceleration[j]
+    elif row.effect == "inertia_variation":
+        assert j is not None
+        angle, v, w = 2.0 * at.q[j + 1], at.v[j], at.v[j + 1]
+        inertia = numbers["sine"] * np.sin(angle) + numbers["cosine"] * np.cos(angle)
+        by_angle = 2.0 * (numbers["sine"] * np.cos(angle) - numbers["cosine"] * np.sin(angle))
+        T[j], T[j + 1] = inertia * at.acceleration[j] + by_angle * w * v, -0.5 * by_angle * v * v
     elif row.effect == "joint_coupling":
         assert j is not None
         c = numbers["stiffness"] * ((at.q[j] - at.rest[j]) - (at.q[j + 1] - at.rest[j + 1]))

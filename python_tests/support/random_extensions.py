@@ -76,6 +76,10 @@ MAKE: dict[str, Make] = {
     "cover_hardening": lambda rng, n, m, j, i: {"joint": j, "stiffness": either(rng, 0.1)},
     "gravity": gravity,
     "inertia": lambda rng, n, m, j, i: {"joint": j, "inertia": either(rng, 1e-3)},
+    "inertia_variation": lambda rng, n, m, j, i: (
+        {"joint": 1 + (j - 1) % max(n - 1, 1), "cosine": either(rng, 1e-3)}
+        | ({"sine": either(rng, 1e-3)} if i % 2 else {})
+    ),
     "joint_coupling": lambda rng, n, m, j, i: (
         {"joint": 1 + (j - 1) % max(n - 1, 1), "stiffness": either(rng, 0.05)}
         | ({"reaction": 0.3 * i - 0.5} if i % 2 else {})
@@ -114,7 +118,7 @@ def random_extensions(
     likely = np.ones(len(names))
     if source != 1:
         likely[names.index("tendon_nonlinearity")] = 0.2
-    likely[names.index("joint_coupling")] *= joints > 1
+    likely[[names.index("joint_coupling"), names.index("inertia_variation")]] *= joints > 1
     rows: list[Row] = []
     for name in rng.choice(names, int(rng.integers(2, 15)), p=likely / likely.sum()):
         made = MAKE[name](rng, joints, tendons, int(rng.integers(1, joints + 1)), int(rng.integers(1, tendons + 1)))

@@ -39,13 +39,14 @@ TEST(SineCosine, AtTheAxesAndBeyond) {
 
 // --- in a description ------------------------------------------------------------------------------------------------
 
-// All seventeen, as the rows of a model image: id, joint, tendon.
+// All eighteen, as the rows of a model image: id, joint, tendon.
 TEST(Described, EachEffectIsARowOfTheImage) {
   nlohmann::json finger = small_finger();
   finger["extensions"] = nlohmann::json::parse(R"([
     {"effect": "cover_hardening", "joint": 2, "stiffness": 0.3},
     {"effect": "gravity", "joint": 2, "cosine": 0.01},
     {"effect": "inertia", "joint": 1, "inertia": 1e-5},
+    {"effect": "inertia_variation", "joint": 1, "cosine": 2e-5},
     {"effect": "joint_coupling", "joint": 1, "stiffness": 0.01},
     {"effect": "preload_friction", "tendon": 2, "coulomb": 0.1},
     {"effect": "preload_friction", "joint": 2, "tendon": 1, "coulomb": 0.1},
@@ -71,9 +72,9 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   const Model model(reading.image);
   ASSERT_TRUE(model.accepted) << model.message;
   const std::vector<std::array<std::uint32_t, 3>> expected = {
-      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},  {7, 0, 2},
-      {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {20, 0, 0}, {21, 0, 0},
-      {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
+      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {12, 1, 0}, {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},
+      {7, 0, 2},  {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {20, 0, 0},
+      {21, 0, 0}, {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
   ASSERT_EQ(model.shape.extension_count, expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
     const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
@@ -82,12 +83,12 @@ TEST(Described, EachEffectIsARowOfTheImage) {
   }
   // what is left out
   const std::size_t last = model.values.size();
-  const std::vector<double> numbers(model.values.end() - 33, model.values.end());
+  const std::vector<double> numbers(model.values.end() - 35, model.values.end());
   EXPECT_EQ(numbers.front(), 0.3);
   EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
   EXPECT_EQ(numbers[2], 0.01);  // its cosine
-  EXPECT_EQ(numbers[5], 1.0);   // joint_coupling's reaction
-  EXPECT_EQ(numbers[7], 1.0);   // preload_friction's beyond
+  EXPECT_EQ(numbers[7], 1.0);   // joint_coupling's reaction
+  EXPECT_EQ(numbers[9], 1.0);   // preload_friction's beyond
   EXPECT_EQ(model.values[last - 1], -0.001);
 }
 

@@ -4,124 +4,17 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "model_inside.h"
+#include "sampled_effect.h"
 
 #include "floating_point.h"
 
 namespace {
-
-constexpr std::size_t joints = 3, tendons = 2, lanes = 4;
-using PerJoint = std::array<double, joints>;
-using PerTendon = std::array<double, tendons>;
-
-// A sample of three joints and two tendons; the second tendon passes the first two joints only.
-struct Sample {
-  PerJoint angle{0.3, -0.4, 0.9}, velocity{0.5, -0.2, 0.7}, rest{0.1, 0.0, -0.2};
-  PerTendon force{20.0, 30.0};
-  std::array<double, joints * lanes> arm{0.010, -0.008, 0, 0, 0.006, -0.005, 0, 0, 0.004, 0.0, 0, 0};
-  std::array<double, joints * joints> cosine{1, 1, 1, 1, 1, 1, 1, 1, 1};
-  double time = 0.1, step = 0.01;
-  int first = 0;
-
-  // ẋ_ij = Σ_{j' >= j} r_ij'·q̇_j'
-  std::array<double, joints * lanes> tendon_velocity() const {
-    std::array<double, joints * lanes> result{};
-    for (std::size_t j = 0; j < joints; ++j) {
-      for (std::size_t k = j; k < joints; ++k) {
-        for (std::size_t i = 0; i < tendons; ++i) {
-          result[j * lanes + i] += arm[k * lanes + i] * velocity[k];
-        }
-      }
-    }
-    return result;
-  }
-};
-
-// An effect at a place, with its numbers and what it remembers.
-struct Effect {
-  const effect_type* type;
-  effect_place place;
-  std::vector<double> numbers, memory;
-
-  // from 1, as in a description; 0: nowhere
-  Effect(const char* name, std::uint32_t joint, std::uint32_t tendon, std::vector<double> values)
-      : type(effect_by_name(name)),
-        place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE},
-        numbers(std::move(values)) {
-    memory.resize(type->state_count ? type->state_count(joints, tendons, place) : type->memory_count, 0.0);
-  }
-
-  // calls with the sample as an effect sees it
-  template <class Call>
-  static void see(const Sample& sample, Call call) {
-    const auto velocity = sample.tendon_velocity();
-    effect_sample seen{};
-    seen.joints = joints;
-    seen.tendons = tendons;
-    seen.lanes = lanes;
-    seen.first = sample.first;
-    seen.source = 3;
-    seen.time = sample.time;
-    seen.step = sample.step;
-    seen.angle = sample.angle.data();
-    seen.velocity = sample.velocity.data();
-    seen.tendon_velocity = velocity.data();
-    seen.force = sample.force.data();
-    seen.moment_arm = sample.arm.data();
-    seen.rest_angle = sample.rest.data();
-    seen.axis_cosine = sample.cosine.data();
-    seen.tendon_threshold = 0.0005;
-    seen.joint_threshold = 0.01;
-    call(&seen);
-  }
-
-  std::vector<double> advanced(const Sample& sample) const {
-    std::vector<double> after(memory.size(), std::numeric_limits<double>::quiet_NaN());
-    if (type->advance) {
-      see(sample, [&](auto* seen) { type->advance(place, numbers.data(), seen, memory.data(), after.data()); });
-    }
-    return after;
-  }
-
-  static effect_direction along_of(const Sample& direction) {
-    effect_direction along{};
-    along.angle = direction.angle.data();
-    along.velocity = direction.velocity.data();
-    along.force = direction.force.data();
-    return along;
-  }
-
-  PerJoint torque(const Sample& sample, const std::vector<double>& parameters, const std::vector<double>& after) const {
-    PerJoint result{1.0, 2.0, 3.0};  // it adds
-    see(sample, [&](auto* seen) { type->torque(place, parameters.data(), seen, after.data(), result.data()); });
-    return {result[0] - 1.0, result[1] - 2.0, result[2] - 3.0};
-  }
-  PerJoint torque(const Sample& sample) const { return torque(sample, numbers, advanced(sample)); }
-
-  PerJoint accept(const Sample& sample) {
-    memory = advanced(sample);
-    return torque(sample, numbers, memory);
-  }
-
-  PerJoint slope(const Sample& sample, const Sample& direction, const std::vector<double>& after) const {
-    PerJoint result{};
-    const effect_direction along = along_of(direction);
-    see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
-    return result;
-  }
-};
-
-void expect_near(const PerJoint& found, const PerJoint& expected, double tolerance = 1e-15) {
-  for (std::size_t j = 0; j < joints; ++j) {
-    EXPECT_NEAR(found[j], expected[j], tolerance) << "joint " << j + 1;
-  }
-}
 
 // One of each, at each kind of place that it has.
 std::vector<Effect> all_torques() {
@@ -129,6 +22,7 @@ std::vector<Effect> all_torques() {
           {"gravity", 3, 0, {0.02, -0.03}},
           {"gravity", 1, 0, {0.02, -0.03}},
           {"inertia", 2, 0, {2e-4}},
+          {"inertia_variation", 2, 0, {2e-3, -1e-3}},
           {"joint_coupling", 1, 0, {0.05, 0.3}},
           {"preload_friction", 0, 1, {0.4, 1.0}},
           {"preload_friction", 1, 1, {0.4, 0.2}},
@@ -175,6 +69,40 @@ TEST(Torque, OfInertiaByTheVelocityBefore) {
   s.step = 0.02;
   s.velocity[1] = 0.2;
   expect_near(inertia.accept(s), {0, -2e-3 * 0.1 / 0.02, 0});
+}
+
+TEST(Torque, OfInertiaThatTheNextJointVaries) {
+  Effect varying("inertia_variation", 1, 0, {3e-3, 2e-3});
+  Sample s;
+  s.first = 1;
+  s.velocity = {0.0, 0.0, 0.0};
+  expect_near(varying.accept(s), {0, 0, 0});
+  s.first = 0;
+  s.velocity = {0.3, -0.7, 0.0};
+  const double twice = 2.0 * s.angle[1], inertia = 3e-3 * std::sin(twice) + 2e-3 * std::cos(twice);
+  const double by_angle = 6e-3 * std::cos(twice) - 4e-3 * std::sin(twice);
+  const double expected = inertia * 0.3 / 0.01 - by_angle * 0.7 * 0.3;
+  expect_near(varying.accept(s), {expected, -0.5 * by_angle * 0.09, 0});
+}
+
+// Work of both joints over time is the gain of the kinetic energy.
+TEST(Torque, OfAVaryingInertiaIsThatOfAnEnergy) {
+  Effect varying("inertia_variation", 1, 0, {3e-3, 2e-3});
+  Sample s;
+  s.step = 1e-5;
+  double work = 0.0, start = 0.0, end = 0.0;
+  for (int k = 0; k < 20000; ++k) {
+    const double t = s.step * k;
+    s.first = k == 0;
+    s.velocity = {std::sin(9.0 * t) + 0.4, 2.0 * std::cos(5.0 * t), 0.0};
+    s.angle[1] = 0.4 * std::sin(5.0 * t);
+    const PerJoint torque = varying.accept(s);
+    work += k ? (torque[0] * s.velocity[0] + torque[1] * s.velocity[1]) * s.step : 0.0;
+    end = 0.5 * (3e-3 * std::sin(2.0 * s.angle[1]) + 2e-3 * std::cos(2.0 * s.angle[1])) * s.velocity[0] * s.velocity[0];
+    start = k ? start : end;
+  }
+  EXPECT_GT(std::abs(end - start), 1e-4);
+  EXPECT_NEAR(work, end - start, 1e-3 * std::abs(end - start));
 }
 
 TEST(Torque, OfFrictionOfATendonWithoutItsForce) {
@@ -313,6 +241,41 @@ TEST(Slope, OfInertiaFollowsTheVelocityBeforeToo) {
     slopes = next;
   }
   expect_near(inertia.torque(second, inertia.numbers, slopes), {0, 2e-3 * (-0.5 - 0.3) / 0.01, 0});
+}
+
+TEST(Slope, OfAVaryingInertiaFollowsAllThatItReadBefore) {
+  Effect varying("inertia_variation", 1, 0, {3e-3, 2e-3});
+  Sample first, direction;
+  first.first = 1;
+  first.velocity = {0.2, 0.5, 0.0};
+  direction.angle = {0.0, 0.6, 0.0};
+  direction.velocity = {-0.9, 0.3, 0.0};
+  const double h = 1e-6;
+  PerJoint difference{};
+  for (const double side : {1.0, -1.0}) {
+    Effect moved = varying;
+    for (Sample sample : {first, Sample{}}) {
+      for (std::size_t j = 0; j < joints; ++j) {
+        sample.angle[j] += side * h * direction.angle[j];
+        sample.velocity[j] += side * h * direction.velocity[j];
+      }
+      const PerJoint torque = moved.accept(sample);
+      for (std::size_t j = 0; j < joints && !sample.first; ++j) {
+        difference[j] += side * torque[j] / (2.0 * h);
+      }
+    }
+  }
+  const effect_direction along = Effect::along_of(direction);
+  std::vector<double> slopes(varying.memory.size(), 0.0), next = slopes;
+  for (const Sample& sample : {first, Sample{}}) {
+    Effect::see(sample, [&](auto* seen) {
+      varying.type->advance_slope(varying.place, varying.numbers.data(), seen, varying.memory.data(), &along,
+                                  slopes.data(), next.data());
+    });
+    varying.accept(sample);
+    slopes = next;
+  }
+  expect_near(varying.torque(Sample{}, varying.numbers, slopes), difference, 1e-9);
 }
 
 TEST(Slope, OfLoadFrictionFollowsTheMagnitudeOfTheForce) {
@@ -487,9 +450,10 @@ TEST(Table, HasDifferentNamesAndNumbers) {
 
 TEST(Table, KeepsItsNumbers) {  // they stand in model images
   const char* const torques[] = {
-      "cover_hardening", "gravity",      "inertia",    "joint_coupling",       "preload_friction",   "load_friction",
-      "force_gain",      "force_offset", "moment_arm", "moment_arm_variation", "pulley_eccentricity"};
-  for (std::uint32_t id = 1; id <= 11; ++id) {
+      "cover_hardening",     "gravity",          "inertia",      "joint_coupling", "preload_friction",
+      "load_friction",       "force_gain",       "force_offset", "moment_arm",     "moment_arm_variation",
+      "pulley_eccentricity", "inertia_variation"};
+  for (std::uint32_t id = 1; id <= 12; ++id) {
     ASSERT_NE(effect_by_id(id), nullptr) << id;
     EXPECT_STREQ(effect_by_id(id)->name, torques[id - 1]);
     EXPECT_EQ(effect_by_id(id)->kind, EFFECT_TORQUE);

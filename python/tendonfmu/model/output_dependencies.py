@@ -180,6 +180,9 @@ def _extension(structure: Structure, extension: Mapping[str, Any], j: int) -> Mo
         return _weight(structure, place, j)
     if effect == "joint_coupling":
         return Motion(angles={place, place + 1}) if j in (place, place + 1) else Motion()
+    if effect == "inertia_variation":  # the next joint feels no acceleration of its own
+        both = {place, place + 1}
+        return Motion({place + 1}, both if j == place else {place}) if j in both else Motion()
     if effect == "preload_friction":  # the directions of the tendon before joint `place`, or before each joint
         first = max(place, 0)
         felt = structure.passes[tendon, j] and j >= first

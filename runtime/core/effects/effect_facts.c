@@ -17,6 +17,11 @@ const effect_parameter inertia_numbers[1] = {
   {.name = "inertia", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 1e-05, .scale_everywhere = 0.0},
 };
 
+const effect_parameter inertia_variation_numbers[2] = {
+  {.name = "sine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0},
+  {.name = "cosine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0},
+};
+
 const effect_parameter joint_coupling_numbers[2] = {
   {.name = "stiffness", .unit = "N.m/rad", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.02, .scale_everywhere = 0.0},
   {.name = "reaction", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -10.0, .maximum = 10.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
@@ -83,6 +88,7 @@ const effect_type* const all_effects[EFFECT_COUNT] = {
   &effect_cover_hardening,
   &effect_gravity,
   &effect_inertia,
+  &effect_inertia_variation,
   &effect_joint_coupling,
   &effect_preload_friction,
   &effect_load_friction,

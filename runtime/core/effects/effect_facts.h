@@ -8,6 +8,7 @@
 #define COVER_HARDENING_FACTS .name = "cover_hardening", .id = 1, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .once = 0, .parameter_count = 1, .parameters = cover_hardening_numbers
 #define GRAVITY_FACTS .name = "gravity", .id = 2, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .once = 0, .parameter_count = 2, .parameters = gravity_numbers
 #define INERTIA_FACTS .name = "inertia", .id = 3, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .once = 0, .parameter_count = 1, .parameters = inertia_numbers
+#define INERTIA_VARIATION_FACTS .name = "inertia_variation", .id = 12, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_NOT_LAST_JOINT, .once = 0, .parameter_count = 2, .parameters = inertia_variation_numbers
 #define JOINT_COUPLING_FACTS .name = "joint_coupling", .id = 4, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_NOT_LAST_JOINT, .once = 0, .parameter_count = 2, .parameters = joint_coupling_numbers
 #define PRELOAD_FRICTION_FACTS .name = "preload_friction", .id = 5, .joint = PLACE_OPTIONAL, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .once = 0, .parameter_count = 2, .parameters = preload_friction_numbers
 #define LOAD_FRICTION_FACTS .name = "load_friction", .id = 6, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .once = 0, .parameter_count = 1, .parameters = load_friction_numbers
@@ -26,6 +27,7 @@
 extern const effect_parameter cover_hardening_numbers[1];
 extern const effect_parameter gravity_numbers[2];
 extern const effect_parameter inertia_numbers[1];
+extern const effect_parameter inertia_variation_numbers[2];
 extern const effect_parameter joint_coupling_numbers[2];
 extern const effect_parameter preload_friction_numbers[2];
 extern const effect_parameter load_friction_numbers[1];
@@ -44,6 +46,7 @@ extern const effect_parameter stribeck_numbers[2];
 extern const effect_type effect_cover_hardening;
 extern const effect_type effect_gravity;
 extern const effect_type effect_inertia;
+extern const effect_type effect_inertia_variation;
 extern const effect_type effect_joint_coupling;
 extern const effect_type effect_preload_friction;
 extern const effect_type effect_load_friction;
@@ -59,7 +62,7 @@ extern const effect_type effect_backlash;
 extern const effect_type effect_time_delay;
 extern const effect_type effect_stribeck;
 
-enum { EFFECT_COUNT = 17 };
+enum { EFFECT_COUNT = 18 };
 
 /* All effects, in the order of the table. */
 extern const effect_type* const all_effects[EFFECT_COUNT];

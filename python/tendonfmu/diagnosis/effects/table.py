@@ -200,6 +200,19 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("{}", "inertia"),
     ),
     Candidate(
+        name="inertia_variation",
+        title="the inertia varies with the next joint's angle",
+        explanation=(
+            "What this joint accelerates is nearer to its axis or farther from it as the next joint turns, whose axis "
+            "is perpendicular: the arm of a robot beyond its shoulder. The next joint feels the centrifugal torque."
+        ),
+        excited_by="fast starts and stops of this joint with the next one at several angles, and both in fast motion",
+        coordinate="acceleration",
+        possible_places=places.joints_before_others,
+        make=terms.row(sine=0, cosine=0),
+        size=words.wave("{} more and less"),
+    ),
+    Candidate(
         name="presliding",
         title="friction builds up over a short way after each reversal",
         explanation=(
