@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tendonfmu.diagnosis import contact_scan as module
-from tendonfmu.diagnosis.contact_scan import event_gain
+from tendonfmu.diagnosis.contact_scan import event_gain, unusual
 from tendonfmu.diagnosis.result import Event
 
 TIME = np.arange(0.0, 60.0, 0.01)
@@ -47,3 +47,13 @@ def test_samples_that_are_not_judged_do_not_count(recording: Callable[[float], A
     assert found is not None and abs(found.value) < 1e-9
     touched.train[:] = False
     assert event_gain({}, [touched], PUSHES) is None
+
+
+def test_what_the_reference_has_as_well_is_no_change() -> None:
+    kick, larger = (Event("b.csv", 0.0, 0.4, (1,), peak, "a kick") for peak in (0.06, 0.08))
+    assert list(unusual([kick, larger], PUSHES[:1], 1.0)) == [larger]
+    elsewhere = Event("b.csv", 9.0, 9.5, (2,), 0.01, "a touch")
+    assert list(unusual([kick, elsewhere], PUSHES, 1.0)) == [elsewhere]
+    assert list(unusual([kick], (), 1.0)) == [kick]
+    assert list(unusual(PUSHES, PUSHES[:1], 1.0)) == list(PUSHES)  # four where there was one
+    assert not unusual(PUSHES, PUSHES[:1], 4.0)  # as many an hour

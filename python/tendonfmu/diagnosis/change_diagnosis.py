@@ -17,12 +17,12 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
 from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
-from tendonfmu.diagnosis.contact_scan import event_gain, events_of, without_events
+from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
 from tendonfmu.diagnosis.extension_fit import fit_numbers
 from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.pictures import Compared
-from tendonfmu.diagnosis.result import Diagnosis, Experiment, SteadyLoad, Unexplained
+from tendonfmu.diagnosis.result import Diagnosis, Event, Experiment, SteadyLoad, Unexplained
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
 from tendonfmu.diagnosis.series import Series, make_grid
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings
@@ -88,7 +88,12 @@ class _Changes:
         names = {str(recording.path) for recording in self._all[len(self._reference) :]}
         events, out = events_of(self._chosen.model.data, self._all, self._grid, self._asked.seed)
         self._events = tuple(event for event in events if event.recording in names)
+        self._usual = tuple(event for event in events if event.recording not in names)
         return out
+
+    def _changed_events(self) -> Sequence[Event]:
+        durations = [sum(recording.duration for recording in side) for side in (self._now, self._reference)]
+        return unusual(self._events, self._usual, durations[0] / durations[1])
 
     def _searching(self, out: Flags) -> ChangeSearch:
         first, last = len(self._reference), len(self._reference) + len(self._now)
@@ -209,7 +214,7 @@ class _Changes:
             nominal_data=models[0],
             extended_data=self._online(search.causes) if causes else models[0],
             tested=search.tried,
-            event_gain=event_gain(models[-1], given.whole, self._events),
+            event_gain=event_gain(models[-1], given.whole, self._changed_events()),
             kind="change",
             load=load,
             repeated=search.repeated,

@@ -48,6 +48,8 @@ MERGED = 0.3  # s between parts of one event
 EXPLAINED = 0.5  # of the residual's variance: a learner that predicts more is subtracted
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: something that is there more often is not an event
+# times the events of a reference: kicks at the start of a motion differ by a third in size
+LARGER, MORE = 1.5, 3.0
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 _TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
@@ -234,6 +236,15 @@ def events_of(
     names = [str(recording.path) for recording in recordings]
     events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
     return events, left_out(series, events, names)
+
+
+def unusual(events: Sequence[Event], usual: Sequence[Event], longer: float) -> Sequence[Event]:
+    """Return the events that are not as the usual ones: all if there are far more of them, else the larger ones."""
+    # longer: duration of the recordings of the events over that of the usual ones
+    if len(events) > MORE * longer * len(usual):
+        return events
+    at = {event: [other.peak for other in usual if set(other.joints) & set(event.joints)] for event in events}
+    return [event for event, peaks in at.items() if event.peak > LARGER * max(peaks, default=0.0)]
 
 
 def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
