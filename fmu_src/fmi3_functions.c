@@ -18,14 +18,15 @@ static void send_message(const log_target* target, fmu_status status, const char
   log_message(target->environment, (fmi3Status)status, category, text);
 }
 
-/* Why there is no instance is said whatever loggingOn says: nobody could ask afterwards. */
+/* Errors are logged whatever loggingOn and fmi3SetDebugLogging say: FMI 3.0.3 asks for it. */
 static log_target target_of(fmi3String instanceName, fmi3InstanceEnvironment environment,
                             fmi3LogMessageCallback logMessage) {
   return (log_target){.logger = (void (*)(void))logMessage,
                       .send = send_message,
                       .environment = environment,
                       .instance_name = instanceName ? instanceName : "",
-                      .wanted = LOG_EVERYTHING};
+                      .wanted = LOG_NOTHING,
+                      .always = 1u << LOG_STATUS_ERROR};
 }
 
 /* --- creation ----------------------------------------------------------------------------------------------------- */

@@ -55,7 +55,7 @@ log_text log_start(const char* function, const char* reason) {
 }
 
 void log_send(const log_target* target, fmu_status status, log_category category, const log_text* text) {
-  if (target->logger && (target->wanted & (1u << category))) {
+  if (target->logger && ((target->wanted | target->always) & (1u << category))) {
     target->send(target, status, log_category_names[category], text->bytes);
   }
 }

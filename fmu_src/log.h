@@ -28,6 +28,7 @@ typedef struct log_target {
   void* environment;
   const char* instance_name;
   unsigned wanted; /* bit 1 << category */
+  unsigned always; /* the same: sent whatever is wanted */
 } log_target;
 
 enum { LOG_NOTHING = 0, LOG_EVERYTHING = (1 << LOG_CATEGORY_COUNT) - 1 };

@@ -311,6 +311,27 @@ def test_log_categories_and_no_log(small_fmu3: UnpackedFmu3) -> None:
         assert instance.last_message == "fmi3Reset: as after fmi3InstantiateCoSimulation"
 
 
+def test_errors_are_logged_whatever_is_switched_off(small_fmu3: UnpackedFmu3) -> None:
+    """FMI 3.0.3: an error is logged without loggingOn and without its category; all else follows the settings."""
+    events, unknown = ((ctypes.c_char_p * 1)(name) for name in (b"logEvents", b"no such"))
+    with Instance3(small_fmu3, logging=False) as instance:
+        for settings in ((), (True, 1, events), (False, 0, None)):
+            assert not settings or instance.call("SetDebugLogging", *settings) == OK
+            instance.messages.clear()
+            assert instance.call("ExitInitializationMode") == ERROR
+            assert [message[:2] for message in instance.messages] == [(ERROR, "logStatusError")]
+            assert instance.last_message.startswith("fmi3ExitInitializationMode: not allowed in state ")
+        assert instance.call("SetDebugLogging", False, 1, unknown) == WARNING and len(instance.messages) == 1
+
+
+def test_the_environment_may_be_null(small_fmu3: UnpackedFmu3) -> None:
+    calls: list[object] = []
+    logger = LOGGER(lambda environment, *more: calls.append((environment, *more[:2])))
+    with Instance3(small_fmu3, environment=None, logger=logger) as instance:
+        assert instance.step(0.0) == ERROR
+        assert calls == [(None, ERROR, b"logStatusError")]
+
+
 def test_integers_are_32_bits(small_fmu3: UnpackedFmu3) -> None:
     with Instance3(small_fmu3) as instance:
         for value in (0, 4, 2**31 - 1, -(2**31)):

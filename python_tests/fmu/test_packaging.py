@@ -21,6 +21,7 @@ from fmpy.validation import validate_fmu
 from command import Call
 from fmi3_binary import UnpackedFmu3
 from fmu_binary import FINGER, Instance, UnpackedFmu, fmi_platform, unpack
+from plant_rigs import needs_plant
 from random_fingers import random_finger
 from repetitions import repeated
 from repository_paths import ROOT
@@ -261,6 +262,20 @@ def test_binaries_of_a_folder_take_the_place_of_the_installed_ones(tmp_path: Pat
         "binaries/win64/small_finger.dll": b"win64",
         "binaries/darwin64/small_finger.dylib": b"darwin64",
     }
+
+
+@needs_plant
+def test_folders_of_binaries_are_those_that_importers_look_for(
+    small_fmu_path: Path, small_fmu3_path: Path, plant_fmu_path: Path
+) -> None:
+    """FMI 2.0 keeps linux64, win64, darwin64: some of its importers do not find the platform tuples of FMI 3.0."""
+    for fmu, pattern in (
+        (small_fmu_path, r"(linux|win|darwin)64"),
+        (plant_fmu_path, r"(linux|win|darwin)64"),
+        (small_fmu3_path, r"(x86_64|aarch64)-(linux|windows|darwin)"),
+    ):
+        folders = {name.split("/")[1] for name in members(fmu) if name.startswith("binaries/")}
+        assert folders and all(re.fullmatch(pattern, folder) for folder in folders), (fmu.name, folders)
 
 
 def test_command_and_function_build_fmi_3_0(call: Call, tmp_path: Path) -> None:

@@ -139,6 +139,13 @@ def parts(path: Path) -> list[bytes]:
     return [data[offset : offset + size] for _, _, offset, size, _ in places]
 
 
+def test_folders_are_named_as_the_importers_of_each_version_look_for_them() -> None:
+    """For aarch64 Linux, FMI 2.0 has no name."""
+    platforms = {fmi: {target.platform for target in portable.TARGETS if target.fmi == fmi} for fmi in (2, 3)}
+    assert platforms[2] == {"linux64", "win64", "darwin64", "aarch64-linux"}
+    assert all(re.fullmatch(r"(x86_64|aarch64)-(linux|windows|darwin)", platform) for platform in platforms[3])
+
+
 EXPECTED = {
     "linux64": ["x86_64 ELF"],
     "aarch64-linux": ["aarch64 ELF"],

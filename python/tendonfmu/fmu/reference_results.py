@@ -155,10 +155,10 @@ def _on_grid(finger: Finger, recording: Recording) -> tuple[Recording, float]:
 
 
 def _csv(table: Mapping[str, NDArray[Any]]) -> bytes:
-    """Return a table as CSV; of a column [N, k], each cell has k numbers."""
+    """Return a table as CSV by the rules of fmi-standard.org; of a column [N, k], each cell has k numbers."""
     columns = [map(_cell, values.tolist()) for values in table.values()]
     rows = (",".join(row) + "\n" for row in zip(*columns, strict=True))
-    return "".join([",".join(table) + "\n", *rows]).encode()
+    return "".join([",".join(f'"{name}"' for name in table) + "\n", *rows]).encode()
 
 
 def _cell(value: Any) -> str:
