@@ -32,7 +32,6 @@ from evidence.runner import ROOT, parser, say, write
 
 PACKAGES = {
     "requirements-foreign.lock": ("mujoco",),
-    "requirements-peers.lock": ("pythonfmu",),
 }
 LINKED = ("evidence", "docs", "examples", "python_tests")  # that commands of the pages name
 RUNNER = "python -m evidence -o"

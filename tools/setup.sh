@@ -207,7 +207,7 @@ set_up_python() {
   printf '%s\n' "$wanted" >"$stamp"
 }
 
-# An extra, such as `portable`, `peers`, `coupling` or `foreign`, into the same environment.
+# An extra, such as `portable`, `coupling` or `foreign`, into the same environment.
 set_up_extra() {
   local stamp=.venv/.tendonfmu-requirements-$1 wanted
   wanted=$(digest <"requirements-$1.lock")

@@ -77,7 +77,7 @@ def test_the_lock_holds_what_pyproject_asks_for() -> None:
         PYPROJECT["project"]["dependencies"] + PYPROJECT["build-system"]["requires"] + groups["build"] + groups["test"]
     )
     assert {name_of(requirement) for requirement in wanted} <= set(locked(ROOT / "requirements.lock"))
-    for group in ("portable", "peers", "foreign", "site"):
+    for group in ("portable", "foreign", "site", "viewers"):
         assert {name_of(r) for r in groups[group]} <= set(locked(ROOT / f"requirements-{group}.lock"))
 
 
