@@ -33,6 +33,7 @@ class Case:
     truths: tuple[Truth, ...] = ()  # one for each hidden effect that the list has
     test: Sequence[pd.DataFrame] = ()
     reference: Sequence[pd.DataFrame] = ()
+    unaltered: Sequence[pd.DataFrame] = ()  # the recordings before anything was hidden in them
     gain_recordings: Sequence[pd.DataFrame] = ()  # of other motions, for the true gain of the extended model
     facts: Mapping[str, Any] = field(default_factory=dict)  # columns of the case's row
 

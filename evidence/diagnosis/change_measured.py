@@ -66,7 +66,8 @@ PLAIN = {"emps": EXAMPLES / "emps" / "emps.json", "davinci": EXAMPLES / "davinci
 STRENGTHS = (0.1, 0.3, 1.0)
 ABSORBED = 0.5  # share of the variance that refitting to `now` leaves, below which numbers of the model have changed
 LOUDEST = 0.5  # of the machine's largest torque: a change that adds more is no longer the same machine
-HALF_EMPS, HALF_JAW = 12.48, 10.0  # s: two of the four cycles; one of the two at 0.1 Hz, five of the ten at 0.5 Hz
+# s: two of the four cycles; one of the two at 0.1 Hz, five of the ten at 0.5 Hz; half of an excitation
+HALF_EMPS, HALF_JAW, HALF_PSM = 12.48, 10.0, 15.0
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
@@ -216,6 +217,7 @@ FORWARD["psm"] = [
     *(whole("psm", "excitation", [FOURIER[0], FOURIER[k]], [run for run in FOURIER[1:] if run != FOURIER[k]])
       for k in (1, 2, 3)),
     *(whole("psm", "identification", FOURIER[k : k + 2], LATEST) for k in (0, 2)),
+    *(halves("psm", FOURIER[k : k + 2], HALF_PSM) for k in (0, 1, 2)),
 ]  # fmt: skip
 PAIRS = {machine: [*pairs, *(pair.reversed for pair in pairs)] for machine, pairs in FORWARD.items()}
 OLDER, ARM = ("emps", "davinci"), ("psm",)  # machines of the beds `hidden` and `arm`
@@ -294,16 +296,19 @@ def made_of(plan: Plan, pair: Pair) -> Case:
     model = model_of(pair.machine, plan.model, pair.then)
     then, now = cut(pair.machine, pair.then), cut(pair.machine, pair.now)
     allowed = BY_SPEED if pair.conditions == "speed" else ()
-    truth = Truth(joint=1, tendon=1, allowed=allowed)
+    truth, unaltered, by = Truth(joint=1, tendon=1, allowed=allowed), (), ""
     if plan.hidden != UNCHANGED:
         effect = EFFECTS[plan.hidden]
         seen = Machine(pair.machine, model, {name: dict(part) for name, part in now.items()}, KINEMATICS[pair.machine])
-        now = dict(hide(seen, effect, plan.strength).now)
+        hidden = hide(seen, effect, plan.strength)
+        unaltered, now, by = tuple(now.values()), dict(hidden.now), hidden.by
         signs = {name: effect.sign * sign for name, sign in effect.signs.items() if name in effect.names}
         truth = replace(truth, effects=effect.names, allowed=(*allowed, *effect.also), signs=signs)
-    return changed_case(
+    case = changed_case(
         pair.machine, plan.model, plan.hidden, pair.conditions, model, then.values(), now.values(), truth, plan.strength
     )
+    before = [pd.DataFrame(thinned(columns, THINNED[pair.machine])) for columns in unaltered]
+    return replace(case, unaltered=before, facts=case.facts | {"by": by})
 
 
 def changed_case(

@@ -192,7 +192,7 @@ def test_then_and_now_share_no_sample(pair: change_measured.Pair) -> None:
     assert not any(share_samples(one, other) for one, other in product(pair.then, pair.now))
 
 
-@pytest.mark.parametrize(("machines", "cases", "unchanged"), [(OLDER, 258, 84), (ARM, 116, 20)])
+@pytest.mark.parametrize(("machines", "cases", "unchanged"), [(OLDER, 258, 84), (ARM, 128, 32)])
 def test_both_halves_are_alike(machines: tuple[str, ...], cases: int, unchanged: int) -> None:
     plans = change_measured.plans(machines)
     assert len({plan.number for plan in plans}) == len(plans) == cases
@@ -269,7 +269,10 @@ def row(bed: str, of: Case, *causes: dict[str, Any], exit_code: int = 0) -> dict
 def test_tables_count_cases_apart_by_what_they_hide() -> None:
     nothing, coulomb = change(UNCHANGED, Truth(joint=1, tendon=1)), change("coulomb", MORE_FRICTION)
     load = change("other_load", Truth(LOAD_NAMES), "load")
+    taken_up = row("hidden", coulomb) | {"by": "whole"}
+    taken_up["answers"] = [answer | {"asked": "no reference"} for answer in taken_up["answers"]]
     rows = [
+        taken_up,
         row("hidden", nothing),
         row("hidden", nothing, cause("gravity")),
         row("hidden", nothing, exit_code=3),
@@ -279,8 +282,9 @@ def test_tables_count_cases_apart_by_what_they_hide() -> None:
         {"bed": "hidden", "impossible": "no sound magnitude"},
     ]
     text = markdown(rows)
-    assert "6 answers, 1 without a report; 7 cases, 1 that cannot be made." in text and "exit 3: broken" in text
+    assert "7 answers, 1 without a report; 8 cases, 1 that cannot be made." in text and "exit 3: broken" in text
     assert "| reference | 1/2 (1 to 99 %) | 1/2 (1 to 99 %) | 0/2 (0 to 84 %) | 2.0, 2.0 |" in text
+    assert "1 answers without a reference are left out" in text and "| no reference |" not in text
     once = "1/1 (3 to 100 %)"
     assert f"| reference | 0.3 | {once} | {once} | {once} | {once} | 0/1 (0 to 98 %) | 2.0, 2.0 |" in text
     assert "| reference | plain | 1/2 (1 to 99 %) | 1/2 (1 to 99 %) | 0/2 (0 to 84 %) | 0/2 (0 to 84 %) |" in text
@@ -304,3 +308,17 @@ def test_the_reference_is_given_only_where_it_is_asked_for(monkeypatch: pytest.M
     base, kinematics = ["finger.json", "recording_1.parquet"], ["--kinematics", "3"]
     assert calls == [[*base, "--reference", "reference_1.parquet", *kinematics], [*base, *kinematics]]
     assert run_case("hidden", 2) == {"bed": "hidden", "impossible": "no sound magnitude"}
+
+
+def test_what_the_machine_lacks_anyway_is_not_false_beside_a_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {"before": [cause("gravity")], "after": [cause("gravity"), cause("backlash")]}
+
+    def run(case: Case, with_reference: bool) -> Run:
+        causes = found["before" if case.recordings is case.unaltered else "after"]
+        return Run(0, "", 1.0, 1.0, {"verdict": "explained", "causes": causes})
+
+    of = change("coulomb", MORE_FRICTION)
+    monkeypatch.setattr(changes, "makers", lambda bed: {1: lambda: replace(of, unaltered=list(of.recordings))})
+    monkeypatch.setattr(changes, "run_command", run)
+    with_it, without = (answer["false"] for answer in run_case("hidden", 1)["answers"])
+    assert tuple(with_it) == ("gravity", "backlash") and tuple(without) == ("backlash",)
