@@ -296,7 +296,7 @@ class _Changes:
         loads: list[SteadyLoad] = []
         for means in (False, True) if search.causes else (False,):
             load = steady_load(search.series, search.torque_left(means), search.sides.now, self._asked.seed)
-            if load is None or load.gain.low <= 0.0:
+            if load is None:
                 return None
             loads.append(load)
         return min(loads, key=lambda load: abs(load.size.change.value))

@@ -32,7 +32,7 @@ def reported_causes(diagnosis: Diagnosis) -> list[Cause]:
 
 def _load(diagnosis: Diagnosis) -> Iterator[Cause]:
     load = diagnosis.load
-    if load is None or not load.gain.low > 0.0:
+    if load is None:
         return
     size = load.size
     yield Cause(

@@ -79,6 +79,8 @@ def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
     if float(np.mean(np.sign(now.means - then.level) != np.sign(moved))) > LEVEL:
         return None
     gain = gain_interval(now.about(then.level), now.about(now.level), seed)
+    if not gain.low > 0.0:  # NaN where too little is left to say
+        return None
     error = float(np.hypot(then.error, now.error))
     levels = (with_error(then.level, then.error), with_error(now.level, now.error), with_error(moved, error))
     size = ChangedSize("torque", "N.m", *levels)
