@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from wire_recordings import FREE, HALVES, SMEAR, Array, WireRecording, read
+from wire_recordings import CONDITIONS, FREE, HALVES, SMEAR, Array, WireRecording, read
 
 import tendonfmu as tf
 from tendonfmu.drawing.panel import BLUE, GREEN, GREY, VERMILION
@@ -76,6 +76,20 @@ def print_forces(finger: tf.Finger, scale: float, groups: dict[str, Runs]) -> No
     row("fy", lambda run: run.torque(finger) * run.least[:, 1], lambda run: run.force[:, 1])
 
 
+def print_changes(finger: tf.Finger) -> None:
+    """What `diagnose --reference` says of a preloaded tip against a free one, and of halves of one recording."""
+    for name in CONDITIONS:
+        untight, tight = (read(f"{name}_{kind}", np.inf).recording for kind in ("un-tight", "tight"))
+        middle = untight.time[len(untight) // 2]
+        for words, then, now in (("tight", untight, tight), ("second half", untight[:middle], untight[middle:])):
+            try:
+                found = tf.diagnose(finger, now, reference=then)
+                said = "; ".join(f"{cause.effect} ({cause.size})" for cause in found.causes) or found.verdict
+            except InputError as refused:
+                said = f"refused: {str(refused).rsplit('.parquet: ')[-1][:90]}"
+            print(f"| {name} un-tight, then {words} | {said} |")
+
+
 def draw(finger: tf.Finger, scale: float, runs: Runs, file: Path) -> None:
     figure = Figure(figsize=(14.0, 7.5), layout="constrained")
     panels = figure.subplots(2, 2).ravel()
@@ -100,6 +114,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--figure", type=Path, help="picture to write")
     parser.add_argument("--touch", type=float, default=100.0, help="least bending force of a contact, sensor's units")
+    parser.add_argument("--changes", action="store_true", help="compare recordings with diagnose --reference, no more")
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # they are printed with the results
     free = read(FREE, options.touch)
@@ -111,6 +126,9 @@ def main() -> None:
     print(fit.parameters[["value", "standard_error", "identified"]].to_string(), *fit.warnings, sep="\n")
     found = tf.diagnose(DESCRIPTION, free.recording)
     print(*(f"{cause.effect}: {cause.size}; gain {cause.gain.value:.2f}" for cause in found.causes), sep="\n")
+    if options.changes:
+        print_changes(found.extended)
+        return
     errors = [1e3 * found.report[model]["test_rms"][0] for model in ("nominal", "extended")]
     print("unseen free motion: {:.2f} mN·m as described and fitted, {:.2f} extended".format(*errors))
 
