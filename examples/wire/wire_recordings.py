@@ -63,12 +63,11 @@ def levers(bend: Array) -> Array:
 
 
 def read(name: str, touch: float) -> WireRecording:
-    """Convert one file by map.json. `convert table` knows no time in two columns, so they are joined before."""
+    """Convert one file by map.json, with a label `touch` from the force at the tip."""
     folder = data_folder()
     if not (files := list(folder.glob(f"*_{name}.parquet"))):
         raise InputError(f"{folder}: no file *_{name}.parquet")
     log: Any = pd.read_parquet(files[0])
-    log["time"] = (log["sec"] - log["sec"][0]) + 1e-9 * log["nanosec"]
     bend = (log["wire length #0"] - log["wire length #1"]).to_numpy() / (2 * ARM)
     force = log[["fx", "fy"]].to_numpy()
     if name == FREE:  # the sensor was zeroed only after it

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
 from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic, open_log
+from tendonfmu.recordings.converters.split_stamps import SplitStamps
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
@@ -214,6 +215,7 @@ def _as_times(log: Log, name: str, texts: Any) -> NDArray[np.int64] | None:
 
 def _settings(log: Log) -> dict[str, Any]:
     """Return what was found in the first lines, so that `convert table` reads the log in the same way."""
+    log = log.log if isinstance(log, SplitStamps) else log
     if not isinstance(log, TextLog):
         return {}
     layout = log.layout

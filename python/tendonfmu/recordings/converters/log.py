@@ -119,7 +119,11 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     folder = DATASET if (file / INFO).is_file() else FOLDER
     module, name = folder if file.is_dir() else FORMATS[suffix]
     opener = getattr(importlib.import_module(f"tendonfmu.recordings.converters.{module}"), name)
-    return cast("Log", opener(file, settings))
+    from tendonfmu.recordings.converters.split_stamps import SplitStamps  # which knows logs itself
+
+    log = cast("Log", opener(file, settings))
+    split = SplitStamps(log)
+    return split if split.topics != log.topics else log
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
