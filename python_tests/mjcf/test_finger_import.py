@@ -238,6 +238,12 @@ def test_refusals_name_what_is_wrong(tmp_path: Path, call: Call, options: list[s
     assert not output.exists()
 
 
+def test_a_model_whose_motors_are_at_the_joints_is_refused_as_such(tmp_path: Path, call: Call) -> None:
+    text = re.sub("<actuator>.*</actuator>", "", fixed_model(), flags=re.DOTALL)
+    line = refused(call("import", "mjcf", str(written(tmp_path, text)), "-o", str(tmp_path / "f.json")))
+    assert re.search(r"model.xml: \d+ tendons, none with an actuator or a motor on a slide; expected tendons", line)
+
+
 def refused(answer: Answer) -> str:
     assert answer.status == 2 and answer.out == "" and len(answer.err.splitlines()) == 1, answer
     return answer.err

@@ -150,6 +150,11 @@ def _only_chain(model: CompiledModel) -> list[str]:
     """Return the names of the joints that driven tendons move, base first, if they are one chain."""
     joints = [joint for joint in model.joints if joint.kind in ("hinge", "slide") and joint.name]
     driven = [tendon for tendon in model.tendons if is_driven(model, tendon)]
+    if not driven:
+        raise InputError(
+            f"{model.path}: {counted(len(model.tendons), 'tendon')}, none with an actuator or a motor on a slide; "
+            "expected tendons that pull, or passive ones named by --tendons, with --joints"
+        )
     motors = {joint.index for tendon in driven for joint in motors_of(model, tendon)}
     joints = [joint for joint in joints if joint.index not in motors]
     angles = np.random.default_rng(0).uniform(-0.3, 0.3, (8, len(joints)))
