@@ -6,7 +6,6 @@ import importlib
 import json
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -15,11 +14,9 @@ import pytest
 from command import Call
 from evidence.recordings.log_faults import FORMATS, START, TYPE, header, ros_store, sound, truth, write
 from map_cases import LOG, SMALL, VALIDATOR, edited, written
-from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_blocks, write_table
 from tendonfmu.recordings.converters import text_log, units
-from tendonfmu.recordings.converters.inspection import inspect_log
 from tendonfmu.recordings.converters.table import Conversion, convert_table
 
 # --- several clocks ---------------------------------------------------------------------------------------------------
@@ -310,16 +307,3 @@ def test_what_mcap_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column time"):
         write_table(tmp_path / "rec.mcap", {"force": np.array([1.0])})
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_layout_of_plotjuggler_has_the_outputs_of_run(call: Call, tmp_path: Path) -> None:
-    """Its curves are fields of the MCAP file that `run` writes."""
-    demo = ROOT / "examples" / "demo_recording"
-    table = read_table(demo / "two_joints_unseen.parquet", lambda *_: None)
-    write_table(tmp_path / "rec.parquet", {name: values[:200] for name, values in table.items()})
-    answer = call("run", demo / "two_joints.json", "rec.parquet", "-o", "free.mcap")
-    assert answer.status == 0, answer.err
-    fields = {field.field.name for topic in inspect_log(tmp_path / "free.mcap").topics for field in topic.fields}
-    layout = ElementTree.parse(ROOT / "examples" / "plotjuggler" / "two_joints.xml")
-    curves = [curve.get("name", "") for curve in layout.iter("curve")]
-    assert len(curves) > 10 and {curve.replace("/tendonfmu/", "/tendonfmu.", 1) for curve in curves} <= fields

@@ -62,6 +62,15 @@ def test_a_slower_sensor(sound: tuple[Finger, Recording], every: int) -> None:
     assert finding.kind == "slow" and f"only once in {every} samples, of 500 a second" in finding.line()
 
 
+def test_a_log_written_by_another_clock(sound: tuple[Finger, Recording]) -> None:
+    """At 490 samples a second of a sensor and 500 of the log each 50th sample repeats; at 450 each tenth."""
+    position = sound[1].groups["tendon_position"]
+    for rate, named in ((490.0, []), (450.0, ["repeated"])):
+        held = position[np.floor(np.floor(np.arange(len(position)) * rate / 500.0) * 500.0 / rate).astype(int)]
+        kinds = [finding.kind for finding in found(sound, tendon_position=held)]
+        assert kinds == named
+
+
 @pytest.mark.parametrize(
     ("group", "factor", "unit"),
     [("tendon_position", 1e3, "mm"), ("tendon_force", 1e3, "mN"), ("joint_position", 180 / np.pi, "degrees")],

@@ -34,6 +34,12 @@ _TRAPS = {
         "a log resampled from a slower sensor",
         "log at the sensor's own rate, or let convert table interpolate with the sensor's own time",
     ),
+    "repeated": (
+        "warning",
+        "{size:.2g} % of the samples repeat the one before in the middle of a motion",
+        "written by another clock than the sensor's: velocities jump there",
+        "log each sample with the sensor's own time, or smooth the velocity (velocity_cutoff)",
+    ),
     "switched": (
         "error",
         "moves {size:.4g} times as much after {at:.4g} s as before, and no other signal does",

@@ -27,6 +27,7 @@ MADE_UP = 0.5  # of the samples; more straight lines are signals that are made u
 SAME = 0.02  # relative, between the jumps and the word
 STRAIGHT, LONGEST_STRAIGHT = 1e-6, 0.1  # of the range, second differences of a line; s
 FEWEST = 8  # samples of a line
+FAST, REPEATED = 5.0, 0.04  # steps of the sensor, of a motion that no repeat belongs in; of its samples
 REGULAR, FEWEST_CHANGES, LONG = 0.9, 50, 1000  # of the changes; changes that are needed; samples of a rest
 WINDOWS = 24  # over which units are compared
 OFF = 0.25  # of the logarithm of a unit, by which the change of scale differs from it
@@ -40,9 +41,9 @@ LEAST_CHANGE = 1.5  # of a logarithm
 class Trap:
     """What is wrong with columns."""
 
-    kind: str  # "magnitude", "wrapped", "filled", "slow" or "switched"
+    kind: str  # "magnitude", "wrapped", "filled", "slow", "repeated" or "switched"
     columns: tuple[str, ...]
-    size: float  # steps of a word, s of a line, samples between changes, factor of the unit
+    size: float  # steps of a word, s of a line, samples between changes, % of the samples, factor of the unit
     at: float = 0.0  # s, where it begins
     what: str = ""  # the joint, or the unit
 
@@ -138,6 +139,19 @@ def _slow(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
         between = [found for column in values.T if (found := _between_changes(column)) is not None]
         if len(between) == values.shape[1]:
             yield Trap("slow", (name,), float(np.median(between)), what=f"{1.0 / np.median(np.diff(time)):.4g}")
+        elif name.endswith("position") and (share := _repeats(values)) > REPEATED:
+            yield Trap("repeated", (name,), 100.0 * share)
+
+
+def _repeats(values: Numbers) -> float:
+    """Return the share of samples that repeat the one before in the middle of a fast motion, in all columns [N, k]."""
+    step = np.abs(np.diff(values, axis=0))
+    if len(step) < 3 * FEWEST or not step.any():
+        return 0.0
+    finest = np.array([value_step(column) or 0.0 for column in values.T])
+    fast = (step > FAST * finest).any(axis=1) & step.any(axis=1)
+    between = ~step[1:-1].any(axis=1) & fast[:-2] & fast[2:]
+    return float(between.sum() / max(fast.sum(), FEWEST_CHANGES))
 
 
 def _between_changes(column: Numbers) -> float | None:
