@@ -296,19 +296,20 @@ def made_of(plan: Plan, pair: Pair) -> Case:
     model = model_of(pair.machine, plan.model, pair.then)
     then, now = cut(pair.machine, pair.then), cut(pair.machine, pair.now)
     allowed = BY_SPEED if pair.conditions == "speed" else ()
-    truth, unaltered, by = Truth(joint=1, tendon=1, allowed=allowed), (), ""
+    truth, by = Truth(joint=1, tendon=1, allowed=allowed), ""
+    unaltered: Iterable[Columns] = ()
     if plan.hidden != UNCHANGED:
         effect = EFFECTS[plan.hidden]
         seen = Machine(pair.machine, model, {name: dict(part) for name, part in now.items()}, KINEMATICS[pair.machine])
         hidden = hide(seen, effect, plan.strength)
-        unaltered, now, by = tuple(now.values()), dict(hidden.now), hidden.by
+        unaltered, now, by = now.values(), dict(hidden.now), hidden.by
         signs = {name: effect.sign * sign for name, sign in effect.signs.items() if name in effect.names}
         truth = replace(truth, effects=effect.names, allowed=(*allowed, *effect.also), signs=signs)
     case = changed_case(
         pair.machine, plan.model, plan.hidden, pair.conditions, model, then.values(), now.values(), truth, plan.strength
     )
     before = [pd.DataFrame(thinned(columns, THINNED[pair.machine])) for columns in unaltered]
-    return replace(case, unaltered=before, facts=case.facts | {"by": by})
+    return replace(case, unaltered=before, facts={**case.facts, "by": by})
 
 
 def changed_case(

@@ -149,8 +149,9 @@ def _repeats(values: Numbers) -> float:
     if len(step) < 3 * FEWEST or not step.any():
         return 0.0
     finest = np.array([value_step(column) or 0.0 for column in values.T])
-    fast = (step > FAST * finest).any(axis=1) & step.any(axis=1)
-    between = ~step[1:-1].any(axis=1) & fast[:-2] & fast[2:]
+    moves = np.asarray(step.any(axis=1))
+    fast = np.asarray((step > FAST * finest).any(axis=1)) & moves
+    between = ~moves[1:-1] & fast[:-2] & fast[2:]
     return float(between.sum() / max(fast.sum(), FEWEST_CHANGES))
 
 

@@ -123,7 +123,7 @@ def open_log(file: Path, settings: LogFormat) -> Log:
 
     log = cast("Log", opener(file, settings))
     split = SplitStamps(log)
-    return split if split.topics != log.topics else log
+    return cast("Log", split) if split.topics != log.topics else log
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
