@@ -16,6 +16,7 @@ import pytest
 from optional_parts import require
 from plant_rigs import needs_plant
 from repository_paths import ROOT
+from tendonfmu.simulate.ssp import build_ssp
 
 pytestmark = needs_plant
 
@@ -34,9 +35,8 @@ def example() -> Any:
 
 
 @pytest.fixture(scope="module")
-def package(example: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path: Path = example("make_ssp").build(FINGER, tmp_path_factory.mktemp("grasp") / "grasp.ssp")
-    return path
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_ssp(EXAMPLE / "rig.json", tmp_path_factory.mktemp("grasp") / "grasp.ssp", FINGER)
 
 
 @pytest.fixture(scope="module")

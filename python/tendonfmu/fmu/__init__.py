@@ -29,5 +29,17 @@ if TYPE_CHECKING:
     from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
     from .reference_results import bridged_rows, reference_run, related_members
     from .running import check_model, columns_of, finger_of, outputs_of, run_model, summary
+    from .system_structure import (
+        OMS,
+        SPACES,
+        SSC,
+        SSD,
+        SSV,
+        component,
+        connection,
+        connectors,
+        parameter_values,
+        xml_text,
+    )
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

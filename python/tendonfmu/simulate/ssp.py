@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lxml import etree
-from lxml.builder import ElementMaker
 
 from tendonfmu.files import check_output, whole_file
-from tendonfmu.fmu import NOT_IN_XML, members, pack
-from tendonfmu.model import INPUTS
+from tendonfmu.fmu import NOT_IN_XML, OMS, SSC, SSD, component, connection, members, pack, parameter_values, xml_text
+from tendonfmu.model import INPUTS, read_finger
 from tendonfmu.simulate.fmu_packaging import DURATION, STEP, plant_members
 from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, plant_of, read_rig
@@ -31,27 +29,20 @@ START_VALUES = "resources/start_values.ssv"
 PLANT_OUTPUTS = ("truth.external_torque",)
 FRICTION_OUTPUTS = ("compensated_torque", "friction_torque")
 
-_SPACES = {
-    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
-    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
-    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
-}
-_SSC = ElementMaker(namespace=_SPACES["ssc"])
-_SSD = ElementMaker(namespace=_SPACES["ssd"], nsmap={key: _SPACES[key] for key in ("ssd", "ssc", "oms")})
-_OMS = ElementMaker(namespace=_SPACES["oms"])
-_SSV = ElementMaker(namespace=_SPACES["ssv"], nsmap={"ssv": _SPACES["ssv"]})
 
-
-def build_ssp(rig_path: Path, output_path: Path) -> Path:
+def build_ssp(rig_path: Path, output_path: Path, finger: Path | None = None) -> Path:
     """Package the SSP package of a rig and return its path. The same input gives the same bytes.
 
-    The friction FMU is made from the rig's finger description: a model without the rig's additional physics. Raises
-    InputError, also if output_path is a file that the rig is made from. The file is written whole or not at all.
+    The friction FMU is made from `finger`, or from the rig's finger description: a model without the rig's additional
+    physics. Raises InputError, also if output_path is a file that the rig is made from. The file is written whole or
+    not at all.
     """
     rig = read_rig(rig_path)
-    check_output(output_path, *rig.files)
-    archive = pack(ssp_members(rig))
+    check_output(output_path, *rig.files, *([] if finger is None else [finger]))
+    content = ssp_members(rig)
+    if finger is not None:
+        content[f"resources/{FRICTION_FMU}"] = pack(members(read_finger(finger)))
+    archive = pack(content)
     with whole_file(output_path) as file:
         file.write_bytes(archive)
     return output_path
@@ -77,23 +68,18 @@ def system_structure(rig: Rig) -> bytes:
     coupled = names(INPUTS)
     plant = [(name, "output") for name in coupled + names(PLANT_OUTPUTS)]
     friction = [(name, "input") for name in coupled] + [(name, "output") for name in names(FRICTION_OUTPUTS)]
-    return _text(
-        _SSD.SystemStructureDescription(
-            _SSD.System(
-                _SSD.Elements(
-                    _component(PLANT, PLANT_FMU, plant),
-                    _component(FRICTION, FRICTION_FMU, friction),
+    return xml_text(
+        SSD.SystemStructureDescription(
+            SSD.System(
+                SSD.Elements(
+                    component(PLANT, PLANT_FMU, plant),
+                    component(FRICTION, FRICTION_FMU, friction),
                 ),
-                _SSD.Connections(
-                    *(
-                        _SSD.Connection(startElement=PLANT, startConnector=name, endElement=FRICTION, endConnector=name)
-                        for name in coupled
-                    )
-                ),
-                _SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
+                SSD.Connections(*(connection(PLANT, name, FRICTION, name) for name in coupled)),
+                SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
                 name="finger",
             ),
-            _SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
+            SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
             version="1.0",
             name=NOT_IN_XML.sub("?", rig.name),
         )
@@ -111,8 +97,7 @@ def start_values(rig: Rig) -> bytes:
         for group in INPUTS
         for i, value in enumerate(signals[f"measured_{group}"][0], start=1)
     }
-    parameters = (_SSV.Parameter(_SSV.Real(value=repr(value)), name=name) for name, value in values.items())
-    return _text(_SSV.ParameterSet(_SSV.Parameters(*parameters), version="1.0", name="start_values"))
+    return parameter_values("start_values", values)
 
 
 def _relative_tolerance(rig: Rig) -> float:
@@ -123,21 +108,7 @@ def _relative_tolerance(rig: Rig) -> float:
 
 def _master_of_omsimulator(tolerance: float) -> Any:
     """Return OMSimulator's annotation of a system that it couples with a fixed step."""
-    master = _OMS.FixedStepMaster(
+    master = OMS.FixedStepMaster(
         description="oms-ma", stepSize=repr(STEP), absoluteTolerance=repr(tolerance), relativeTolerance=repr(tolerance)
     )
-    return _SSC.Annotation(_OMS.Annotations(_OMS.SimulationInformation(master)), type="org.openmodelica")
-
-
-def _component(name: str, fmu: str, connectors: list[tuple[str, str]]) -> Any:
-    return _SSD.Component(
-        _SSD.Connectors(*(_SSD.Connector(_SSC.Real(), name=connector, kind=kind) for connector, kind in connectors)),
-        name=name,
-        type="application/x-fmu-sharedlibrary",
-        source=f"resources/{fmu}",
-        implementation="CoSimulation",
-    )
-
-
-def _text(root: Any) -> bytes:
-    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    return SSC.Annotation(OMS.Annotations(OMS.SimulationInformation(master)), type="org.openmodelica")
