@@ -175,7 +175,7 @@ class ChangeSearch(CauseSearch):
         grams, own = self.selection.grams, cause.direction
         _, by_fold = grams.error(own.mix, own.low, own.high)
         gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
-        p_value, covariance = self.certainty_of(grams, own.mix, cause.magnitudes, by_fold)
+        p_value, covariance = self.certainty_of(grams, own.mix)
         alike = self.selection.alike(cause, self.selection.ranked())
         change = replace(cause, covariance=covariance, gain=with_error(gain, error), p_value=p_value, alike=alike)
         return change, gain > CERTAIN * error and p_value < SIGNIFICANCE
@@ -212,9 +212,7 @@ class ChangeSearch(CauseSearch):
         change, grams = self.causes[number], self.grams(number)
         own = change.direction
         mix = own.mix[own.mix.any(axis=1)]  # only its own columns are candidates
-        _, by_fold = grams.error(mix, own.low, own.high)
-        magnitudes = grams.magnitudes(mix, own.low, own.high)
-        p_value, covariance = self.certainty_of(grams, mix, magnitudes, by_fold)
+        p_value, covariance = self.certainty_of(grams, mix)
         return replace(change, covariance=covariance, p_value=p_value)
 
     def moved_on(self, grams: Grams) -> list[Cause]:
@@ -295,9 +293,8 @@ class ChangeSearch(CauseSearch):
         for recording in self.new_recordings:
             grams = self.grams_of_recording(number, recording)
             mix = np.eye(1)
-            _, by_fold = grams.error(mix, low, high)
             share = grams.magnitudes(mix, low, high)
-            _, covariance = self.certainty_of(grams, mix, share, by_fold)
+            _, covariance = self.certainty_of(grams, mix)
             shares.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
         return shares
 
@@ -380,11 +377,13 @@ class ChangeSearch(CauseSearch):
 
     # --- certainty ---
 
-    def certainty_of(self, grams: Grams, mix: Numbers, magnitudes: Numbers, by_fold: Numbers) -> tuple[float, Numbers]:
+    def certainty_of(self, grams: Grams, mix: Numbers) -> tuple[float, Numbers]:
         """Return the p-value of there being no change, corrected for all that was tried, and the covariance [d, d]."""
-        energy, scores = grams.scores(mix, by_fold)
+        # Without bounds: what a size at its bound leaves of a large change is no noise against which the change counts.
+        free = np.full(mix.shape[1], np.inf)
+        energy, scores = grams.scores(mix, grams.error(mix, -free, free)[1])
         inverse = np.linalg.pinv(energy, hermitian=True)
-        score = energy @ magnitudes
+        score = energy @ grams.magnitudes(mix, -free, free)
         spreads = [values.T @ values for values in (scores, _in_twos(scores))]
         squares = [float(score @ np.linalg.pinv(spread, hermitian=True) @ score) for spread in spreads]
         least = int(np.argmin(squares))
