@@ -12,8 +12,18 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
-from tendonfmu.recordings.converters.log import NUMBER, NUMBERED, OTHER, TEXT, TIME, Field, Log, Topic, open_log
-from tendonfmu.recordings.converters.split_stamps import SplitStamps
+from tendonfmu.recordings.converters.log import (
+    NUMBER,
+    NUMBERED,
+    OTHER,
+    TEXT,
+    TIME,
+    Field,
+    Log,
+    SplitStamps,
+    Topic,
+    open_log,
+)
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
