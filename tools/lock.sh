@@ -14,7 +14,7 @@ compile() {
 compile requirements.lock pyproject.toml --group build --group test
 compile requirements-portable.lock --group portable --constraints requirements.lock
 compile requirements-wheel.lock --group wheel --constraints requirements.lock --constraints requirements-portable.lock
-compile requirements-peers.lock --group peers --constraints requirements.lock
 compile requirements-coupling.lock --group coupling --constraints requirements.lock
 compile requirements-foreign.lock --group foreign --constraints requirements.lock
+compile requirements-viewers.lock --group viewers --constraints requirements.lock
 compile requirements-site.lock --group site

@@ -49,6 +49,7 @@ ONLY = {
     "tendonfmu._estimation": "estimate/estimation.py",
     "plotly": "drawing/figures.py",
     "PIL": "drawing/finger_picture.py",
+    "rerun": "report/rerun_recording.py",
     "rich": "cli/console.py",
     "dask": "tasks/jobs.py",
     "distributed": "tasks/jobs.py",

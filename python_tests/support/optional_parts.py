@@ -63,6 +63,7 @@ def _file(untested: str, path: Path, source: str) -> Part:
 
 PARTS = {
     "mujoco": _package("fingers of MuJoCo", "mujoco", "requirements-foreign.lock"),
+    "rerun": _package("runs in the viewer Rerun", "rerun", "requirements-viewers.lock"),
     "ecos": _package("our FMUs in ecos", "ecospy", "requirements-coupling.lock and the library libtbb12"),
     "libcosim": _package("our FMUs in libcosim", "libcosimpy", "requirements-coupling.lock"),
     "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "requirements-coupling.lock"),

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from . import contact_at_rest, score_report, tune_report
     from .alarm_level import NotEnough, least_hours, rate_limit
     from .bounds import tail_levels
+    from .contact_bound import residual_and_bound
     from .counting import GRACE, DetectionScore, Event, pooled, score_detection
     from .free_motion import SETTLING, FreeRun, free_parts
     from .reference_sensor import require_no_contact

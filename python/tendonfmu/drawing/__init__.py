@@ -16,11 +16,16 @@ if TYPE_CHECKING:
     from .grid import SeriesRow, series_figure, sheets_figure
     from .panel import (
         BLUE,
+        DARK,
         DIVERGING,
+        GREEN,
         GREY,
+        IN_DARK,
+        LIGHT,
         ORANGE,
         SKY,
         STYLES,
+        VERMILION,
         Band,
         Bars,
         Curve,

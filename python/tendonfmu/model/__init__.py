@@ -11,6 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import native
+    from .bent_drawing import BentDrawing
     from .description import (
         Finger,
         FingerSource,

@@ -25,6 +25,7 @@ IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from
 FORMAT = "tendonfmu-finger-1"
 _OTHER_FORMATS = {
     "tendonfmu-rig-": "a rig",
+    "tendonfmu-hand-": "a hand",
     "tendonfmu-fit-": "file of a fit",
     "tendonfmu-tune-": "report of a tuning",
     "tendonfmu-score-": "report of a score",
