@@ -2,6 +2,11 @@ from .detect import TuneWarning as TuneWarning
 from .errors import InputError as InputError
 from .errors import InputWarning as InputWarning
 from .estimate import FitWarning as FitWarning
+from .hand import Hand as Hand
+from .hand import HandRun as HandRun
+from .hand import read_hand as read_hand
+from .hand import run_hand as run_hand
+from .hand import split_recording as split_recording
 from .interface import CalibrateResult as CalibrateResult
 from .interface import CalibrationWarning as CalibrationWarning
 from .interface import CheckResult as CheckResult

@@ -32,6 +32,7 @@ PACKAGES = (
     "report",
     "calibration",
     "interface",
+    "hand",
     "demo",
     "cli",
 )

@@ -11,6 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import text
     from .calibration import DIAGNOSIS, Calibration, calibrate
-    from .text import PAGE, REPORT, calibration_page, check_folder, write_calibration
+    from .text import FINGER, PAGE, REPORT, calibration_page, check_folder, write_calibration
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

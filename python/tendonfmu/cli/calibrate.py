@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,8 @@ import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeAtPretensions, Progress, command
 from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, say, say_files
+from tendonfmu.cli.hand import show_outcome
+from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions
 
 
@@ -35,6 +38,10 @@ def calibrate(
             help="finger.json of an earlier calibration, or report of a fit, as the prior; for little data",
         ),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="dask cluster for the fingers of a hand [default: --jobs processes]"),
+    ] = None,
     *,
     options: CalibrateOptions,
     progress: Progress = None,
@@ -45,14 +52,24 @@ def calibrate(
     calibration.json and the diagnosis. A repeated call with the same files
     continues where the previous one ended.
 
+    Of a hand, every finger is calibrated in DIR/FINGER; DIR gets hand.html,
+    hand.json and hand.ssp.
+
     --test and --pushes take several files at once after the recordings. With
     --from the structure of the earlier model stays and its numbers are the
     prior.
     """
     from tendonfmu.calibration import REPORT, check_folder, text, write_calibration
     from tendonfmu.calibration import calibrate as run
+    from tendonfmu.hand import calibrate_hand, is_hand
 
     tests, labelled = test or [], pushes or []
+    if is_hand(finger):
+        groups = (recordings, tests, labelled)
+        show_outcome(finger, partial(calibrate_hand, groups, output, options, scheduler, previous), progress)
+        return
+    if scheduler is not None:
+        raise InputError("--scheduler: given with a finger; expected a hand, whose fingers it computes")
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
     with PhaseDisplay(progress) as display:
         calibration = run(

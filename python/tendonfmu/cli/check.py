@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu.cli.command import Progress, Subject, command
+from tendonfmu.cli.command import Progress, command
 from tendonfmu.cli.console import NO, PRINTED, fail, print_json, progress_bar, show, warn
+from tendonfmu.cli.hand import check_hand
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,18 +18,21 @@ if TYPE_CHECKING:
 
 @command(reads=("file", "recordings"))
 def check(
-    file: Subject,
+    file: Annotated[
+        Path, typer.Argument(metavar="FINGER.json|HAND.json|RIG.json", help="finger description, hand or rig")
+    ],
     recordings: Annotated[
         list[Path] | None, typer.Argument(metavar="[RECORDING]...", help="recordings of this finger, .csv or .parquet")
     ] = None,
     progress: Progress = None,
 ) -> None:
-    """Validate a finger description or a rig and describe it. Exit status 1 if it is refused.
+    """Validate a finger description, a hand or a rig and describe it. Exit status 1 if it is refused.
 
     With recordings: report whether they belong to the finger and, where they do
     not, what to write into the map of columns. Exit status 1 if one does not.
     """
     from tendonfmu.files import check_format
+    from tendonfmu.hand import is_hand
     from tendonfmu.model import description_findings, read_finger
     from tendonfmu.recordings import check_report, refusal_report
     from tendonfmu.simulate import describe_rig, is_rig, require_plant
@@ -37,6 +41,10 @@ def check(
         raise InputError(f"{file}: a recording; expected the description first: check FINGER.json {file.name}")
     for recording in recordings or []:
         check_format(recording)
+    if is_hand(file):
+        if not check_hand(file, recordings or [], progress):
+            raise typer.Exit(NO)
+        return
     rig = is_rig(file)
     if rig:
         require_plant()

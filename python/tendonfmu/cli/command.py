@@ -45,9 +45,14 @@ _BEGINNINGS = {
 
 FingerFile = Annotated[Path, typer.Argument(metavar="FINGER.json", help="finger description; its structure is kept")]
 ExtendedFinger = Annotated[
-    Path, typer.Argument(metavar="FINGER.json", help="finger description; it is kept, and extended by the causes found")
+    Path,
+    typer.Argument(
+        metavar="FINGER.json|HAND.json", help="finger description, or hand; kept, and extended by the causes found"
+    ),
 ]
-Model = Annotated[Path, typer.Argument(metavar="FINGER.json|FINGER.fmu", help="finger description, or its FMU")]
+Model = Annotated[
+    Path, typer.Argument(metavar="FINGER.json|FINGER.fmu|HAND.json", help="finger description, its FMU, or a hand")
+]
 FreeRecordings = Annotated[list[Path], typer.Argument(metavar="RECORDING", help="free motion, .csv or .parquet")]
 FreeAtPretensions = Annotated[
     list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")

@@ -10,6 +10,7 @@ import typer
 
 from tendonfmu.cli.command import Figures, FreeAtPretensions, Model, Progress, Report, command
 from tendonfmu.cli.console import NO, fail, print_json, print_results, progress_bar, say, say_files
+from tendonfmu.cli.hand import score_hand
 from tendonfmu.files import counted
 from tendonfmu.options import ScoreOptions, TuneOptions
 
@@ -79,10 +80,14 @@ def score(
     """
     from tendonfmu.estimate import check_outputs
     from tendonfmu.files import report_text
+    from tendonfmu.hand import is_hand
     from tendonfmu.interface import ScoreWarning
     from tendonfmu.interface import score as score_finger
     from tendonfmu.report import detect_text
 
+    if is_hand(model):
+        score_hand(model, recordings, output, figures, options, progress)
+        return
     check_outputs(output, None, figures, [model, *recordings])
     with progress_bar("runs", progress) as show, warnings.catch_warnings():
         warnings.simplefilter("ignore", ScoreWarning)  # printed below, one line each

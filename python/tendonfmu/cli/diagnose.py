@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeRecordings, Progress, command
 from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, progress_bar, say_files, warn
+from tendonfmu.cli.hand import show_outcome
 from tendonfmu.errors import InputError
 from tendonfmu.options import DiagnoseOptions
 
@@ -41,7 +43,8 @@ def diagnose(
         ),
     ] = False,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="dask cluster for --history [default: --jobs processes]")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="dask cluster for --history or a hand [default: --jobs processes]"),
     ] = None,
     *,
     options: DiagnoseOptions,
@@ -57,19 +60,27 @@ def diagnose(
     another motion, pretension or length, but the same motion shows most.
     Several recordings of now, in order of time, show how the change grows.
 
+    Of a hand, every finger is diagnosed in DIR/FINGER, and DIR gets the page
+    hand.html.
+
     DIR gets the page diagnosis.html, diagnosis.json, figures, and the model
     with its causes, extended.json and extended.fmu. With --history it gets the
     page history.html, history.csv and history.png: a line per recording and
     cause, and how fast each cause grows.
     """
+    from tendonfmu.hand import diagnose_hand, is_hand
     from tendonfmu.interface import DiagnosisWarning
     from tendonfmu.interface import diagnose as find
     from tendonfmu.report import REPORT, check_folder, diagnosis_text
 
     tests, before = test or [], reference or []
+    if history and tests:
+        raise InputError("--test: given with --history; expected recordings in order of time only")
+    if is_hand(finger):
+        groups = (recordings, tests, before)
+        show_outcome(finger, partial(diagnose_hand, groups, output, options, scheduler, history), progress)
+        return
     if history:
-        if tests:
-            raise InputError("--test: given with --history; expected recordings in order of time only")
         _history(finger, recordings, before, output, scheduler, options, progress)
         return
     if scheduler is not None:

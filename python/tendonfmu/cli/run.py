@@ -9,6 +9,7 @@ import typer
 
 from tendonfmu.cli.command import Model, Progress, Subject, command
 from tendonfmu.cli.console import check_second_file, check_table, name_of, print_json, progress_bar, say, write_table
+from tendonfmu.cli.hand import run_hand
 from tendonfmu.errors import InputError
 from tendonfmu.options import BuildOptions, RunOptions
 
@@ -45,16 +46,29 @@ def run(
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html|DIR", help="page of the run; in a folder run.html")
     ] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(metavar="OUT.rrd", help="recording for the viewer Rerun: signals and moving drawing")
+    ] = None,
     *,
     options: RunOptions,
     progress: Progress = None,
 ) -> None:
-    """Run the model over a recording and write all outputs, one row per sample at the time of that sample."""
+    """Run the model over a recording and write all outputs, one row per sample at the time of that sample.
+
+    Of a hand, all fingers run: their outputs are in one table, as
+    index.joint_torque[1].
+    """
     from tendonfmu.fmu import check_model, finger_of
+    from tendonfmu.hand import is_hand
     from tendonfmu.interface import run as run_finger
     from tendonfmu.recordings import read_recording
     from tendonfmu.report import run_report
 
+    if is_hand(model):
+        if rerun is not None:
+            raise InputError(f"{model}: a hand; --rerun shows one finger, expected FINGER.json or FINGER.fmu")
+        run_hand(model, recording, output, report, options)
+        return
     check_model(model)
     check_table(output, model, recording)
     if report is not None:
@@ -63,6 +77,10 @@ def run(
         check_page(report, model, recording)
         if report.resolve() == output.resolve():
             raise InputError(f"{report}: the same file for outputs and page; expected two names")
+    if rerun is not None:
+        from tendonfmu.report import check_rerun, write_rerun
+
+        check_rerun(rerun, model, recording)
     samples = read_recording(recording)
     with progress_bar("samples", progress, total=len(samples)) as show:
         result = run_finger(model, samples, progress=show, **vars(options))
@@ -74,6 +92,9 @@ def run(
     say(f"{name_of(output)}: {result.summary}")
     if report is not None:
         say(f"{write_run_page(report, numbers, table, samples.contact)}: the run, to be read in a browser")
+    if rerun is not None:
+        write_rerun(rerun, result.outputs, samples, finger_of(model), options.kinematics)
+        say(f"{rerun}: the run, for the viewer Rerun")
     print_json(lambda: numbers)
 
 

@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from .fit_laws import law_sheets
     from .fit_page import write_fit_page
     from .fit_text import ResidualTable, residual_tables
-    from .history import headline, history_report, rows_of_lines, write_history
+    from .history import headline, history_report, rows_of_lines, trend_sentence, write_history
     from .marked_finger import friction_figure
     from .numbers import Row, Table, capital, column, html_of, percent, rms, rounded, together
     from .page import Tile, drawn, render, write_figures
+    from .rerun_recording import check_rerun, write_rerun
     from .run_page import check_page, run_report, write_run_page
     from .score_figures import write_score_figures
     from .tune_figures import write_tune_figures

@@ -1,0 +1,249 @@
+"""Commands on hands: the worst finger is named first, one that fails is left out; the page; the whole story."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tendonfmu as tf
+from command import Call, run_script
+from plant_rigs import needs_plant
+from real_browser import Elements
+from repository_paths import ROOT
+from small_hand import FINGERS, worn_columns, write_hand, write_worn_hand
+from tendonfmu.hand.page import COLOURS, PAGE, hand_svg, write_hand_page
+from tendonfmu.hand.parts import PartResult, split_files
+from tendonfmu.hand.report import (
+    CALIBRATION,
+    PartRow,
+    calibration_rows,
+    diagnosis_rows,
+    share_that_is_wrong,
+    shared_warnings,
+)
+
+
+def words(page: Path) -> str:
+    return " ".join(" ".join(Elements(page.read_text("utf-8")).words).replace("\u00a0", " ").split())
+
+
+# --- pages, from reports ----------------------------------------------------------------------------------------------
+
+
+def calibration(error: float, before: float = 4.0) -> dict[str, Any]:
+    return {
+        "error": {"as_given": [1e-3 * before], "calibrated": [1e-3 * error], "held_out": True},
+        "structure": {"causes": []},
+        "detection": {"held_out": {"alarms": 0, "minutes": 2.0, "limit": None}},
+        "pushes": None,
+        "warnings": [],
+    }
+
+
+@pytest.fixture
+def hand(tmp_path: Path) -> tf.Hand:
+    return tf.read_hand(write_worn_hand(tmp_path)["hand"])
+
+
+def results(hand: tf.Hand, reports: Mapping[str, Any]) -> list[PartResult]:
+    return [
+        PartResult(part, *((reports[part.name], "") if part.name in reports else (None, "no motion")))
+        for part in hand.parts
+    ]
+
+
+def test_the_page_has_the_worst_finger_first(hand: tf.Hand, tmp_path: Path) -> None:
+    rows = calibration_rows(hand, results(hand, {"index": calibration(1.0), "ring": calibration(3.0)}))
+    assert [row.name for row in rows] == ["ring", "index"] and [row.tone for row in rows] == ["fine", "fine"]
+    rows = calibration_rows(hand, results(hand, {"index": calibration(5.0), "ring": calibration(1.0)}))
+    assert [(row.name, row.tone) for row in rows] == [("index", "bad"), ("ring", "fine")]
+    write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
+    page = tmp_path / PAGE
+    text = page.read_text("utf-8")
+    assert (
+        "index is the worst: 5.00 mN·m are left on unseen motion." in words(page)
+        and 'href="index/calibration.html"' in text
+    )
+    table = text[text.index("<table") :]
+    assert table.index(">index</a>") < table.index(">ring</a>") and table.count("doubtful") == 1
+
+
+def test_a_finger_that_failed_is_last_with_its_reason(hand: tf.Hand, tmp_path: Path) -> None:
+    rows = calibration_rows(hand, results(hand, {"ring": calibration(1.0)}))
+    assert [(row.name, row.tone) for row in rows] == [("ring", "fine"), ("index", "failed")]
+    write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
+    page = tmp_path / PAGE
+    assert "1 finger left out: index." in words(page) and "index was left out: no motion" in words(page)
+    assert "index/calibration.html" not in page.read_text("utf-8")
+
+
+def test_what_is_wrong_is_what_causes_explain_and_what_nothing_does(hand: tf.Hand) -> None:
+    def report(verdict: str, gain: float, unexplained: float) -> dict[str, Any]:
+        rms = {"test_rms": [1e-3]}
+        return {
+            "verdict": verdict,
+            "gain": {"value": gain},
+            "unexplained": {"share": unexplained},
+            "causes": [{"title": "it rubs", "joint": 1, "tendon": 2}] if gain else [],
+            "nominal": rms,
+        }
+
+    assert share_that_is_wrong(report("explained", 0.4, 0.0)) == pytest.approx(0.4)
+    assert share_that_is_wrong(report("unexplained", 0.0, 0.75)) == pytest.approx(0.5)
+    given = {"index": report("unexplained", 0.0, 0.75), "ring": report("explained", 0.4, 0.0)}
+    rows = diagnosis_rows(hand, results(hand, given))
+    assert [row.name for row in rows] == ["index", "ring"] and rows[1].cells[1] == "it rubs (at joint 1 on tendon 2)"
+    given["index"] = report("adequate", 0.0, 0.02)
+    rows = diagnosis_rows(hand, results(hand, given))
+    assert [(row.name, row.tone, row.badness) for row in rows] == [("ring", "bad", 0.4), ("index", "fine", 0.0)]
+
+
+def test_the_drawing_is_narrow_and_escapes_names(tmp_path: Path) -> None:
+    write_worn_hand(tmp_path)
+    names = ["thumb", *(f"finger_{k}" for k in range(4))]
+    file = write_hand(tmp_path, [{"name": name, "description": "index.json"} for name in names])
+    file.write_text(file.read_text().replace("right_hand", "<script>"))
+    hand = tf.read_hand(file)
+    rows = [PartRow(name, "fine", 0.0, "<b>", "", (), "x.html" * (name == "thumb")) for name in names]
+    svg = hand_svg(hand, rows)
+    width = float(svg.split('viewBox="0 0 ')[1].split()[0])
+    assert width <= 366 and "<script>" not in svg and "<b>" not in svg and svg.count("<circle") == 5
+    assert svg.count("<a href") == 1 and svg.count(COLOURS["fine"]) == 5
+
+
+def test_one_warning_for_several_fingers_is_one_line() -> None:
+    found = shared_warnings({"index": ["short", "cold"], "ring": ["short"]})
+    assert found == ["index, ring: short", "index: cold"]
+
+
+# --- splitting --------------------------------------------------------------------------------------------------------
+
+
+def test_split_files_keep_their_time_if_nothing_changed(tmp_path: Path) -> None:
+    """By their time a repeated history knows what it has done."""
+    files = write_worn_hand(tmp_path, monday=worn_columns(1, seconds=2.0))
+    (tmp_path / "other").mkdir()
+    shutil.copy(files["monday"], tmp_path / "other" / "monday.parquet")
+    hand, out = tf.read_hand(files["hand"]), tmp_path / "out"
+    groups = [[files["monday"]], [tmp_path / "other" / "monday.parquet"]]
+    first, second = split_files(hand, groups, out)
+    assert [Path(each[0]).name for each in (first["ring"], second["ring"])] == [
+        "monday.parquet",
+        "monday_2.parquet",
+    ]
+    before = {file: file.stat().st_mtime_ns for file in out.rglob("*.parquet")}
+    split_files(hand, groups, out)
+    assert len(before) == 4 and {file: file.stat().st_mtime_ns for file in before} == before
+    read = tf.read_recording(first["ring"][0])
+    np.testing.assert_array_equal(read["tendon_force[1]"], worn_columns(1, seconds=2.0)["ring_tendon_force[1]"])
+
+
+# --- commands ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_worse_finger_is_named(tmp_path: Path, call: Call) -> None:
+    """And the finger whose reference says contact all the time is left out with its reason."""
+    then, later = worn_columns(1), worn_columns(2, "ring")
+    files = write_worn_hand(tmp_path, then=then | {"index_contact": np.ones_like(then["time"])}, later=later)
+    answer = call(
+        *("diagnose", files["hand"], files["later"], "--reference", files["then"], "-o", "out"),
+        *("--kinematics", "3", "--json"),
+    )
+    assert answer.status == 0, answer.err
+    report = json.loads(answer.out)
+    assert report["format"] == "tendonfmu-hand-diagnosis-1" and list(report["fingers"]) == ["ring"]
+    assert [cause["effect"] for cause in report["fingers"]["ring"]["causes"]] == ["joint_friction"]
+    assert "labelled contact" in report["failed"]["index"] and "warning: index: left out: " in answer.err
+    assert "ring is the worst: " in words(Path("out/hand.html")) and Path("out/ring/diagnosis.html").is_file()
+    assert not Path("out/index").exists() and report["failed"]["index"].startswith("recordings/index/then.parquet: ")
+
+
+def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:
+    columns = worn_columns(1, seconds=8.0)
+    pushed = (columns["time"] % 4.0 > 3.0).astype(float)
+    files = write_worn_hand(tmp_path, day=columns | {"ring_touch": pushed, "ring_force": pushed})
+    answer = call(
+        *("score", files["hand"], files["day"], "-o", "score.json", "--json", "--labels", "ring_touch"),
+        *("--kinematics", "3"),
+    )
+    assert answer.status == 0, answer.err
+    assert {part["events"] for part in json.loads(answer.out)["fingers"].values()} == {2}  # the label of all
+    answer = call("score", files["hand"], files["day"], "-o", "score.json", "--labels", "touch", "--kinematics", "3")
+    report = json.loads(Path("score.json").read_text())
+    assert report["format"] == "tendonfmu-hand-score-1" and report["events"] == 2
+    alone = tf.split_recording(tf.read_hand(files["hand"]), files["day"], ["touch"])["ring"]
+    score = tf.score(tmp_path / "ring.json", alone, labels="touch", kinematics=3)
+    assert report["fingers"]["ring"]["false_alarms"] == score.false_alarms
+    assert "index" in report["failed"]  # it has no column with that label
+
+
+def test_a_scheduler_needs_a_hand_or_a_history(tmp_path: Path, call: Call) -> None:
+    write_worn_hand(tmp_path)
+    for command in ("calibrate", "diagnose"):
+        answer = call(command, tmp_path / "index.json", "free.csv", "-o", "out", "--scheduler", "tcp://127.0.0.1:1")
+        assert answer.status == 2 and answer.err.startswith("tendonfmu: --scheduler: given with")
+    answer = call("calibrate", tmp_path / "hand.json", "free.csv", "-o", "out", "--from", tmp_path / "index.json")
+    assert answer.status == 2 and "index.json: no hand; expected hand.json of an earlier calibration" in answer.err
+
+
+# --- for real ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_a_calibrated_hand_does_not_depend_on_jobs(tmp_path: Path, call: Call) -> None:
+    """It is a hand again, for `run` and `--from`; another call repeats nothing."""
+    files = write_worn_hand(tmp_path, free=worn_columns(1, seconds=24.0), more=worn_columns(4, seconds=16.0))
+    assert call("calibrate", files["hand"], files["free"], "-o", "one").status == 0
+    assert call("calibrate", files["hand"], files["free"], "-o", "two", "--jobs", "2").status == 0
+    for name in FINGERS:
+        assert Path(f"one/{name}/finger.json").read_bytes() == Path(f"two/{name}/finger.json").read_bytes()
+    assert Path("one/hand.json").read_bytes() == Path("two/hand.json").read_bytes()
+    assert call("calibrate", files["hand"], files["free"], "-o", "one").status == 0
+    report = json.loads(Path("one/ring/calibration.json").read_text())
+    assert report["steps"]["repeated"] == ["diagnosis", "fit", "tune"]
+    assert call("run", "one/hand.json", files["more"], "-o", "out.csv").status == 0
+    assert call("calibrate", files["hand"], files["more"], "-o", "later", "--from", "one/hand.json").status == 0
+    assert "previous" in json.loads(Path("later/ring/calibration.json").read_text())["error"]
+
+
+@pytest.mark.long
+def test_a_history_follows_each_finger(tmp_path: Path, call: Call) -> None:
+    days = {f"2026-03-{day:02d}": worn_columns(day, "ring", more=1.0 + 0.02 * day) for day in (9, 16, 23)}
+    files = write_worn_hand(tmp_path, well=worn_columns(1), **days)
+    command = ["diagnose", files["hand"], *(files[day] for day in days), "--history", "--reference", files["well"]]
+    answer = call(*command, "-o", "out", "--kinematics", "3", "--json")
+    assert answer.status == 0, answer.err
+    report = json.loads(answer.out)
+    assert list(report["fingers"]) == ["ring", "index"] and report["fingers"]["index"]["causes"] == []
+    assert report["fingers"]["ring"]["causes"][0]["where"]["effect"] == "joint_friction"
+    assert "ring is the worst: 1 change." in words(Path("out/hand.html"))
+    rows = {file: file.stat().st_mtime_ns for file in Path("out").glob("*/rows/*.json")}
+    call(*command, "-o", "out", "--kinematics", "3")
+    assert len(rows) >= 6 and {file: file.stat().st_mtime_ns for file in rows} == rows
+
+
+@needs_plant
+@pytest.mark.long
+def test_the_worse_finger_of_a_simulated_hand_is_first(tmp_path: Path, call: Call) -> None:
+    """The example: five fingers of four joints; only the ring finger's edges rub more later."""
+    made = run_script(ROOT / "examples/hand/make_hand.py", "-o", tmp_path / "hand", "--seconds", "24")
+    assert made.status == 0, made.err
+    hand, then, later = (tmp_path / "hand" / name for name in ("hand.json", "then.parquet", "later.parquet"))
+    assert pd.read_parquet(then).shape == (4800, 1 + 5 * 16)
+    checked = call("check", hand, then, later)
+    assert checked.status == 0 and checked.out.count("belongs to this finger") == 10
+    answer = call("diagnose", hand, later, "--reference", then, "-o", "out", "--jobs", "2", "--json")
+    assert answer.status == 0, answer.err
+    report = json.loads(answer.out)
+    names = list(report["fingers"])
+    assert names[0] == "ring" and len(names) == 5 and report["failed"] == {}
+    assert [cause["effect"] for cause in report["fingers"]["ring"]["causes"]] == ["edge_friction"]
+    assert {report["fingers"][name]["verdict"] for name in names[1:]} == {"adequate"}
+    assert words(Path("out/hand.html")).index("ring is the worst") > 0
