@@ -15,7 +15,7 @@ from tendonfmu.interface import ScoreResult
 from tendonfmu.report import capital, headline, rounded, together, trend_sentence
 
 FAR = 2.0  # times the median error of the fingers from which on a finger stands out
-MUCH = 0.25  # share of an error that is no noise from which on a finger is bad
+MUCH = 0.25  # share of an error beyond noise from which on a finger is bad
 Report = Mapping[str, Any]
 
 
@@ -75,7 +75,7 @@ def calibration_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]
 
 
 def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
-    """Return a row for each finger: verdict, causes, error, and how much of it is no noise."""
+    """Return a row for each finger: verdict, causes, error, and how much of it is beyond noise."""
 
     def row(result: PartResult, report: Report) -> PartRow:
         adequate = report["verdict"] == "adequate"
@@ -85,7 +85,7 @@ def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
         nominal = f"{_mnm(_own(hand, result, report['nominal']['test_rms']))} mN·m"
         cells = (report["verdict"], ("; ".join(causes[:2]) + more) or "–", nominal, percent(wrong))
         tone = "fine" if adequate else "bad" if wrong >= MUCH else "doubt"
-        value, sentence = "adequate" if adequate else percent(wrong), f"{percent(wrong)} of its error is no noise"
+        value, sentence = "adequate" if adequate else percent(wrong), f"{percent(wrong)} of its error is more than noise"
         badness = 0.0 if adequate else wrong
         return PartRow(result.part.name, tone, badness, value, sentence, cells, "diagnosis.html")
 
@@ -124,13 +124,13 @@ CALIBRATION = Kind(
 DIAGNOSIS = Kind(
     "diagnosis",
     diagnosis_rows,
-    ("verdict", "causes", "error", "of it no noise"),
+    ("verdict", "causes", "error", "more than noise"),
     (
         "adequate",
-        f"less than {percent(MUCH)} of its error is no noise",
-        f"{percent(MUCH)} of its error or more is no noise",
+        f"more than noise: below {percent(MUCH)} of its error",
+        f"more than noise: {percent(MUCH)} of its error and above",
     ),
-    "Above each finger: the share of its error that is no noise, explained by causes or not.",
+    "Above each finger: the share of its error that is more than noise, explained by causes or not.",
 )
 HISTORY = Kind(
     "history",
@@ -165,7 +165,7 @@ def score_rows(scores: Mapping[str, ScoreResult], failed: Mapping[str, str]) -> 
 
 
 def share_that_is_wrong(report: Report) -> float:
-    """Return the share of a finger's error that is no noise: what its causes explain, and what nothing explains."""
+    """Return the share of a finger's error that is more than noise: what its causes explain, and what nothing explains."""
     gain, unexplained = report["gain"]["value"], report["unexplained"]["share"]
     return float(1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0)))
 
