@@ -6,10 +6,12 @@ Each gets the first sample before the initialisation ends, and returns the outpu
 from __future__ import annotations
 
 import importlib.metadata
+import multiprocessing
 import subprocess
 import sysconfig
 import tempfile
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -122,7 +124,8 @@ def _libcosim(task: Task) -> Array:
 
 
 def _container(task: Task) -> Array:
-    # The container is an FMU in C that loads and steps ours; fmpy steps the container.
+    # The container is an FMU in C that loads and steps ours; fmpy steps it in a process of its own, since it crashed in
+    # one that had loaded much else.
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "finger.fmu").write_bytes(task.fmu.read_bytes())
@@ -131,7 +134,8 @@ def _container(task: Task) -> Array:
         done = subprocess.run([*command, "-fmi", str(task.fmi)], cwd=folder, capture_output=True, text=True)
         if done.returncode:
             raise RuntimeError(f"fmucontainer: {(done.stderr or done.stdout).strip()}")
-        return _fmpy(Task(folder / "box.fmu", task.fmi, task.signals, task.outputs))
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as apart:
+            return apart.submit(_fmpy, Task(folder / "box.fmu", task.fmi, task.signals, task.outputs)).result()
 
 
 def _kinds(fmu: Path) -> dict[str, str]:
