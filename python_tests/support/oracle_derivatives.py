@@ -65,6 +65,6 @@ def derivatives(
             narrow = np.stack([each[output] for each in fine], axis=1)
             found[output, name] = (4.0 * narrow - wide) / 3.0
             bend = np.abs(np.stack([each[output] for each in bends], axis=1))
-            kinked = bend > 0.1 * np.abs(narrow) + 1e-6 * (np.abs(narrow).max() + 1.0)
+            kinked = bend > 0.1 * np.abs(narrow) + 1e-4 * (np.abs(narrow).max() + 1.0)
             errors[output, name] = np.where(kinked, np.inf, np.abs(narrow - wide))
     return found, errors
