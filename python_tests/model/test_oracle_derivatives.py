@@ -68,7 +68,7 @@ def test_random_fingers_have_derivatives_that_predict() -> None:
                 scale = np.abs(found["friction_torque", name]).max() + 1e-6
                 np.testing.assert_allclose(total, found["joint_torque", name], atol=1e-6 * scale)
                 small = errors["friction_torque", name] < 1e-2 * scale  # infinite at the edge of a play
-                assert small.mean() > 0.97
+                assert small.mean() > 0.95
 
 
 def test_the_core_has_the_oracles_derivatives() -> None:
