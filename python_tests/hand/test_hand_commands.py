@@ -233,10 +233,10 @@ def test_a_history_follows_each_finger(tmp_path: Path, call: Call) -> None:
 @pytest.mark.long
 def test_the_worse_finger_of_a_simulated_hand_is_first(tmp_path: Path, call: Call) -> None:
     """The example: five fingers of four joints; only the ring finger's edges rub more later."""
-    made = run_script(ROOT / "examples/hand/make_hand.py", "-o", tmp_path / "hand", "--seconds", "24")
+    made = run_script(ROOT / "examples/hand/make_hand.py", "-o", tmp_path / "hand", "--seconds", "16")
     assert made.status == 0, made.err
     hand, then, later = (tmp_path / "hand" / name for name in ("hand.json", "then.parquet", "later.parquet"))
-    assert pd.read_parquet(then).shape == (4800, 1 + 5 * 16)
+    assert pd.read_parquet(then).shape == (3200, 1 + 5 * 16)
     checked = call("check", hand, then, later)
     assert checked.status == 0 and checked.out.count("belongs to this finger") == 10
     answer = call("diagnose", hand, later, "--reference", then, "-o", "out", "--jobs", "2", "--json")
