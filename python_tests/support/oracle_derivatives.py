@@ -32,8 +32,10 @@ STEPS = {"tendon_force": 1e-3, "tendon_position": 1e-7, "joint_position": 1e-5, 
 def derivatives(
     description: Mapping[str, Any], recording: Mapping[str, Array], kinematics_source: int, k: int
 ) -> tuple[dict[tuple[str, str], Array], dict[tuple[str, str], Array]]:
-    """d output / d input after sample k: {(output, input): [outputs, inputs]}, and the estimated errors: infinite at the
-    edge of a play, which moves on in one direction only."""
+    """d output / d input after sample k: {(output, input): [outputs, inputs]}, and the estimated errors.
+
+    They are infinite at the edge of a play, which moves on in one direction only.
+    """
     finger = oracle.FingerOracle(description, kinematics_source)
     names = [name for name in oracle.INPUTS if recording.get(name) is not None]
 

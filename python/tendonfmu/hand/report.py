@@ -85,7 +85,10 @@ def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
         nominal = f"{_mnm(_own(hand, result, report['nominal']['test_rms']))} mN·m"
         cells = (report["verdict"], ("; ".join(causes[:2]) + more) or "–", nominal, percent(wrong))
         tone = "fine" if adequate else "bad" if wrong >= MUCH else "doubt"
-        value, sentence = "adequate" if adequate else percent(wrong), f"{percent(wrong)} of its error is more than noise"
+        value, sentence = (
+            "adequate" if adequate else percent(wrong),
+            f"{percent(wrong)} of its error is more than noise",
+        )
         badness = 0.0 if adequate else wrong
         return PartRow(result.part.name, tone, badness, value, sentence, cells, "diagnosis.html")
 
@@ -165,7 +168,7 @@ def score_rows(scores: Mapping[str, ScoreResult], failed: Mapping[str, str]) -> 
 
 
 def share_that_is_wrong(report: Report) -> float:
-    """Return the share of a finger's error that is more than noise: what its causes explain, and what nothing explains."""
+    """Return the share of a finger's error that is more than noise: what causes explain, and what nothing does."""
     gain, unexplained = report["gain"]["value"], report["unexplained"]["share"]
     return float(1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0)))
 
