@@ -141,7 +141,7 @@ def test_pieces_add_up_to_the_tendon() -> None:
 
 
 def waved(model: Any, data: Any, rest: Any, steps: int) -> Any:
-    """States of the finger while its tendons are pulled to and fro."""
+    """States of the finger while its tendons are pulled back and forth."""
     arms = np.array([[0.0085, 0.0065], [0.0075, 0.0], [-0.007, -0.0055], [-0.0065, 0.0]])
     rows = []
     for _ in range(steps):
