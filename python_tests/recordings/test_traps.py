@@ -174,3 +174,11 @@ def test_the_servo_arm_s_currents_are_named(call: Call) -> None:
     folder = require("so101 data") / "friction_gravity"
     answer = call("convert", "inspect", folder / "state_motor.csv")
     assert "torques[1], torques[2], torques[3]" in answer.err and "a magnitude" in answer.err
+
+
+def test_a_load_that_friction_nearly_balances_one_way_is_no_magnitude() -> None:
+    phase = np.linspace(0.0, 40.0, 4000)
+    angle, way = np.sin(phase), np.tanh(20.0 * np.cos(phase))
+    signed = 10.0 + 9.99 * way + 0.005 * np.sin(300.0 * phase)  # closing against a spring, opening with it
+    assert 0.0 <= signed.min() < 0.005 * signed.max()
+    assert not is_magnitude(signed, angle)

@@ -19,6 +19,7 @@ from tendonfmu.recordings.recording import Recording
 NEAR_ZERO, TOUCHES = 0.02, 0.005  # of the largest value, and of the samples that are so small
 AT_ZERO = 0.005  # of the largest value: the smallest
 RESTS = 0.1  # of the samples at exactly 0
+ALIKE = 1.0 / 3.0  # of the mean force in the other direction
 BOTH_WAYS = 0.25  # of a joint's range, that it travels in each direction
 GRID = 0.01  # of the smallest difference: others are as near to a multiple of it
 LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
@@ -71,8 +72,13 @@ def is_magnitude(force: Numbers, angle: Numbers) -> bool:
     if not 0.0 <= force.min() <= AT_ZERO * force.max() or small.mean() < TOUCHES:
         return False
     # a force that only comes near 0 turns slowly; one that rests at 0 for long, and is never below, has lost its sign
-    is_fast = np.median(change[small]) >= 0.5 * np.median(change) or (force == 0.0).mean() > RESTS
-    return bool(is_fast and extent > 0.0 and min(ways) > BOTH_WAYS * extent)
+    rests = bool((force == 0.0).mean() > RESTS)
+    is_fast = rests or np.median(change[small]) >= 0.5 * np.median(change)
+    if not (is_fast and extent > 0.0 and min(ways) > BOTH_WAYS * extent):
+        return False
+    # under a load that friction nearly balances one way, a force with its sign comes near 0 that way only
+    pulls = [float(force[1:][way].mean()) for way in (step > 0.0, step < 0.0)]
+    return rests or min(pulls) > ALIKE * max(pulls)
 
 
 def wrapped(column: Numbers) -> float | None:
