@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the documentation site with MkDocs into FOLDER (default build/site): tools/build_site.sh [FOLDER]
 # Broken links, anchors and references are errors. MkDocs has an environment of its own, build/site-venv.
-# The notebooks are run by $PYTHON if it has the package; else they are shown as last run, or without outputs.
+# Notebooks are shown as `python tools/run_notebooks.py build/notebooks` last ran them, or without outputs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 output=$(realpath -m "${1:-build/site}")
@@ -11,14 +11,6 @@ if [ "$(cat "$environment/requirements" 2>/dev/null)" != "$(cat requirements-sit
   "${PYTHON:-python3}" -m venv --clear "$environment"
   "$environment/bin/python" -m pip install --disable-pip-version-check --no-input --quiet --require-hashes -r requirements-site.lock
   cp requirements-site.lock "$environment/requirements"
-fi
-if "${PYTHON:-python3}" -c 'import ipykernel, nbclient, tendonfmu._native' 2>/dev/null; then
-  "${PYTHON:-python3}" tools/run_notebooks.py build/notebooks 2>build/notebooks.log || {
-    cat build/notebooks.log >&2
-    exit 1
-  }
-else
-  echo "${PYTHON:-python3} has no tendonfmu, nbclient or ipykernel: notebooks are shown as last run, or without outputs" >&2
 fi
 # A notice of the theme about other software is no finding of this build.
 export NO_MKDOCS_2_WARNING=1

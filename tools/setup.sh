@@ -4,7 +4,7 @@
 #   set_up_system FLAVOUR   compiler, headers and a Python >= 3.10; FLAVOUR `run`, or `test`: GoogleTest as well
 #   set_up_sundials         SUNDIALS for the simulated finger, unpacked into build/sundials; going on without it is possible
 #   set_up_python           .venv with the locked packages
-#   set_up_java_clients     FMI4j and Maestro in build/clients, for the tests of ./test --all
+#   set_up_java_clients     FMI4j and Maestro in build/clients, for tools/nightly
 #   set_up_package          tendonfmu itself, rebuilt when a source changed
 #
 # Stamps make a second call skip what is done: each holds a digest of what its step depends on.

@@ -1,6 +1,6 @@
 """Descriptions and recordings that do not belong together well: a diagnosis that can be used, or a refusal that helps.
 
-`./test --all python_tests/diagnosis/test_diagnose_pairs.py` runs all of them, the ordinary run a few.
+`./test -m "" python_tests/diagnosis/test_diagnose_pairs.py` runs all of them, the ordinary run a few.
 """
 
 from __future__ import annotations

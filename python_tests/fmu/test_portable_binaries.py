@@ -1,6 +1,6 @@
 """The cross-compiled libraries: what they export and need, and that they compute what the native one computes.
 
-The whole build takes two minutes (zig's first build for Windows several), so it runs with `./test --all`.
+The whole build takes two minutes (zig's first build for Windows several), so it runs with `tools/nightly tests`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """VDMCheck2 reads the model descriptions: a formal model of FMI 2.0's text in VDM, by INTO-CPS.
 
-It is inside Maestro's program, which `./test --all` fetches: its converter from XML, the model, and the interpreter.
+It is inside Maestro's program, which `tools/nightly` fetches: its converter from XML, the model, and the interpreter.
 """
 
 from __future__ import annotations

@@ -73,8 +73,8 @@ PARTS = {
         "our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"
     ),
     "java": _program("our FMUs in programs in Java", "a Java runtime", "java"),
-    "fmi4j": _file("our FMUs in FMI4j", FMI4J, "./test --all fetches it with Maven"),
-    "maestro": _file("our FMUs in Maestro and VDMCheck", MAESTRO, "./test --all fetches it with Maven"),
+    "fmi4j": _file("our FMUs in FMI4j", FMI4J, "tools/nightly fetches it with Maven"),
+    "maestro": _file("our FMUs in Maestro and VDMCheck", MAESTRO, "tools/nightly fetches it with Maven"),
     "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
     "davinci data": _file("the da Vinci tools", DATA / "davinci_tool", RECORDINGS),
     "emps data": _file("the carriage EMPS", DATA / "emps", RECORDINGS),

@@ -1,4 +1,4 @@
-"""Repetitions of a test: a few in `./test`, all in `./test --all`."""
+"""Repetitions of a test: a few in `./test`, all in `tools/nightly tests`."""
 
 from __future__ import annotations
 
