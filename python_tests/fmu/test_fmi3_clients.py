@@ -263,6 +263,7 @@ def test_ecos(one_joint: dict[int, Path]) -> None:
     assert found[2] == found[3] and len(set(found[2])) > 0.9 * SAMPLES
 
 
+@pytest.mark.long
 def test_fmi_sim(one_joint: dict[int, Path], tmp_path: Path) -> None:
     """fmi-sim 0.7.0: its reader refuses these three attributes of a Float64, so they are left out."""
     program, rows = require("fmi-sim"), {}

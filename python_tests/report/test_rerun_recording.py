@@ -1,4 +1,7 @@
-"""A run as a recording for Rerun, read back: numbers of the table, contacts, residual and bound, drawing, layout."""
+"""A run as a recording for Rerun, read back: numbers of the table, contacts, residual and bound, drawing, layout.
+
+The viewer takes 0.5 GB, so what needs it is long.
+"""
 
 from __future__ import annotations
 
@@ -90,6 +93,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     return Written(recording, result, contents_of(file))
 
 
+@pytest.mark.long
 def test_the_signals_are_those_of_the_table(written: Written) -> None:
     time, found = written.result.outputs["time"], written.contents
     for j, name in enumerate(JOINTS, start=1):
@@ -110,6 +114,7 @@ def test_the_signals_are_those_of_the_table(written: Written) -> None:
         np.testing.assert_array_equal(found.curve(f"tendons/{name}/tendon_force"), force)
 
 
+@pytest.mark.long
 def test_contacts_and_labels_are_lanes(written: Written) -> None:
     time = written.result.outputs["time"]
     flags = {f"contact/{j}_{name}": written.output("joint_contact", j) for j, name in enumerate(JOINTS, start=1)}
@@ -131,6 +136,7 @@ def test_contacts_and_labels_are_lanes(written: Written) -> None:
     assert seen >= 5  # all joints and the label
 
 
+@pytest.mark.long
 def test_the_residual_exceeds_its_bound_in_contact_and_only_then(tmp_path: Path) -> None:
     """By the rule of the paper the bound decides alone. It has all that adds to the threshold."""
     data = json.loads(CALIBRATED.read_text(encoding="utf-8"))
@@ -152,6 +158,7 @@ def test_the_residual_exceeds_its_bound_in_contact_and_only_then(tmp_path: Path)
     np.testing.assert_allclose(residual_and_bound(tf.read_finger(plain), recording, 1)[1], expected, rtol=1e-15)
 
 
+@pytest.mark.long
 def test_residual_and_bound_are_drawn(written: Written) -> None:
     finger = tf.read_finger(CALIBRATED)
     residual, bound = residual_and_bound(finger, written.recording, 1)
@@ -164,6 +171,7 @@ def test_residual_and_bound_are_drawn(written: Written) -> None:
         np.testing.assert_array_equal(found.curve(f"{path}/in_contact"), np.where(contact, residual[:, j], np.nan))
 
 
+@pytest.mark.long
 def test_the_drawing_moves_with_the_joints(written: Written) -> None:
     found = written.contents
     times, places = found.times["finger/joints"], found.values["finger/joints"]["Points2D:positions"]
@@ -184,6 +192,7 @@ def test_the_drawing_moves_with_the_joints(written: Written) -> None:
     assert len([path for path in found.times if path.startswith("finger/tendons/")]) == 8
 
 
+@pytest.mark.long
 def test_it_opens_with_a_layout(written: Written) -> None:
     views, origins = written.contents.views, written.contents.origins
     assert {"finger", "contact", "tendon forces (N)"} <= views
@@ -207,6 +216,7 @@ def files(tmp_path: Path) -> tuple[str, str]:
     return "finger.json", "r.csv"
 
 
+@pytest.mark.long
 def test_the_command_writes_the_same_of_a_description_and_its_fmu(
     call: Call, files: tuple[str, str], tmp_path: Path
 ) -> None:
@@ -224,6 +234,7 @@ def test_the_command_writes_the_same_of_a_description_and_its_fmu(
         np.testing.assert_array_equal(found.curve(f"joints/{name}/torque/joint_torque"), table["joint_torque[1]"])
 
 
+@pytest.mark.long
 def test_without_a_description_it_has_numbers_for_names(files: tuple[str, str], tmp_path: Path) -> None:
     require("rerun")
     recording = tf.read_recording(tmp_path / "r.csv")
@@ -234,6 +245,7 @@ def test_without_a_description_it_has_numbers_for_names(files: tuple[str, str], 
     assert not any(path.startswith("finger/") or "/residual/" in path for path in found.values)
 
 
+@pytest.mark.long
 def test_joints_of_one_name_stay_apart(files: tuple[str, str], tmp_path: Path) -> None:
     require("rerun")
     data = json.loads(json.dumps(FINGER))
@@ -254,6 +266,7 @@ def test_without_the_package_it_names_what_to_install(
     assert not (tmp_path / "out.csv").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("target", "words"), [("out.csv", "unknown format '.csv'; expected .rrd"), ("absent/out.rrd", "no folder absent")]
 )
@@ -271,6 +284,7 @@ def test_a_hand_is_refused(call: Call, files: tuple[str, str], tmp_path: Path) -
     assert answer.status == 2 and "hand.json: a hand; --rerun shows one finger" in answer.err
 
 
+@pytest.mark.long
 def test_times_that_rerun_cannot_hold_are_refused(files: tuple[str, str], tmp_path: Path) -> None:
     require("rerun")
     recording = replace(tf.read_recording(tmp_path / "r.csv"), time=1e10 + np.arange(50.0))
