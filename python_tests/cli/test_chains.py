@@ -91,7 +91,7 @@ def faults_of(pair: Pair, finger: Path, recordings: Path, folder: Path) -> Itera
             if answer.status not in (0, 1, 2):
                 reports = [file.read_text() for file in Path().glob("tendonfmu-error-*.txt")]
                 yield f"{told}: {answer.status}: {answer.err}\n{''.join(reports)}"
-            if _CODE.search(answer.err):
+            if answer.status and _CODE.search(answer.err):
                 yield f"{told}: not in plain words: {answer.err}"
             if answer.status == 2:
                 last = answer.err.strip().splitlines()[-1]

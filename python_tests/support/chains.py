@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 import tendonfmu.cli
@@ -22,7 +23,7 @@ from command import Answer, run_script
 from fit_cases import lasting_finger
 from fit_data import recorded
 from plant_fmu_rig import fmu_rig
-from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.files.tables import write_table
 
 Columns = dict[str, NDArray[Any]]
 Command = list[str | Path]
@@ -87,7 +88,8 @@ SERVO_MAP = {
 
 
 def simulated(seed: int) -> dict[str, Any]:
-    rig = fmu_rig(seed=seed, pushes=[], recording={"duration": SECONDS})
+    columns = ["joint_position", "joint_velocity"]
+    rig = fmu_rig(seed=seed, pushes=[], recording={"duration": SECONDS, "columns": columns})
     rig["sensors"]["rate"] = 100
     return rig | {"motion": rig["motion"] | {"seed": seed, "duration": SECONDS}}
 
@@ -140,8 +142,12 @@ VARIATIONS: dict[str, tuple[Callable[[Columns], Columns], ...]] = {
 }
 
 
+def columns_of(file: Path) -> Columns:
+    return {name: np.asarray(values) for name, values in pd.read_parquet(file).items()}
+
+
 def varied(source: Path, variation: str, target: Path) -> Path:
-    columns = {name: np.asarray(values) for name, values in read_table(source).items()}
+    columns = columns_of(source)
     for change in VARIATIONS[variation]:
         columns = change(columns)
     write_table(target, columns)
@@ -191,13 +197,6 @@ def _described(joints: list[str], arms: list[list[float]], names: list[str]) -> 
     return ["describe", "finger", "--name", "small", "--joints", ",".join(joints), *options, "-o", "described.json"]
 
 
-def _rig_described(first: Path, second: Path) -> list[Command]:
-    rig = json.loads((first.parent / "rig_1.json").read_text())
-    arms = [tendon["moment_arms"] for tendon in rig["finger"]["tendons"]]
-    described = _described(["a", "b"], arms, [f"t{i}" for i in range(len(arms))])
-    return [described, ["fit", "described.json", first, "--routing", "-o", "out.json"]]
-
-
 def _hand_calibrated(first: Path, second: Path) -> list[Command]:
     Path("hand.json").write_text(json.dumps(hand_of("before.json")))
     write_hand_recording(first, Path("hand.parquet"))
@@ -214,7 +213,7 @@ FIRST: dict[str, Writer] = {
         "out.json",
     ),
     "convert --finger": Writer("servo", lambda *_: [], "before.json"),
-    "simulate": Writer("simulated", _rig_described, "out.json"),
+    "simulate": Writer("simulated", lambda *_: [], "before.json"),
 }
 LATER: dict[str, Writer] = {
     "fit": Writer("made", lambda a, b: [["fit", "before.json", a, b, "-o", "out.json"]], "out.json", "given"),
@@ -267,6 +266,8 @@ def write_description(folder: Path, name: str, recordings: Path, before: Path | 
     with inside(folder):
         if name == "given":
             Path("before.json").write_text(json.dumps(lasting_finger()))
+        if name == "simulate":
+            Path("before.json").write_text(json.dumps(simulated(1)["finger"]))
         if name == "convert --finger":
             Path("before.json").write_text((recordings / "converted.json").read_text())
         if before is not None:
@@ -287,8 +288,8 @@ def hand_of(description: str | Path) -> dict[str, Any]:
 
 
 def write_hand_recording(source: Path, target: Path) -> Path:
-    table = read_table(source)
-    write_table(target, {name if name == "time" else f"index_{name}": values for name, values in table.items()})
+    columns = columns_of(source).items()
+    write_table(target, {name if name == "time" else f"index_{name}": values for name, values in columns})
     return target
 
 
