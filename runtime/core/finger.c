@@ -292,6 +292,9 @@ tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, 
     return fail(finger, TENDONFMU_WRONG_ORDER,
                 "the first sample is already taken: expected a reset before a guided run");
   }
+  if (finger->derived.settings.watches_sensors) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT, "a guided run with sensor_fault: expected a finger without");
+  }
   return run_rows(finger, samples, time, inputs, guide, outputs, done);
 }
 

@@ -141,10 +141,11 @@ typedef struct tendonfmu_guide {
 } tendonfmu_guide;
 
 /* What a finger leaves of a recording: tendonfmu_run() with a finger that has taken no sample, in which the caller says
- * what the bias learns from. Contact is not decided, and its outputs say nothing. joint_torque is τ less the known
- * torque, and so is what follows from it. Where the bias may not learn it still jumps with stiction, and P grows by
- * drift_variance. Without bias.initial_torque it begins with the first sample that it may learn from; residual means
- * nothing before the sample after. */
+ * what the bias learns from. Neither contact nor a failing sensor is detected: a finger with sensor_fault is refused,
+ * and the outputs of the detection say nothing. joint_torque is τ less the known torque, and so is what follows from
+ * it. Where the bias may not learn it still jumps with stiction, and P grows by drift_variance. Without
+ * bias.initial_torque it begins with the first sample that it may learn from; residual means nothing before the sample
+ * after. */
 tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, const double* time,
                                       const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
                                       const tendonfmu_outputs* outputs, size_t* done);

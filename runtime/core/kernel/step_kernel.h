@@ -254,18 +254,44 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   s->scalar[STATE_CONTACT] = 0.0;
 }
 
-/* step 6 where the caller says what the bias learns from: S, and the bias begins with what it has not learned from yet
- */
-COLD_STATIC void track_guided(tendonfmu_finger* f, double step, double mean_force, double noise) {
+/* noise variance of step 6 */
+HOT_INLINE double noise_of_step(const tendonfmu_finger* f, double step, double mean_force) {
+  const finger_settings* settings = &f->derived.settings;
+  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
+  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
+  return noise_variance(settings, mean_force, scale);
+}
+
+HOT_INLINE void jump_bias(tendonfmu_finger* f) {
+  const finger_state* s = &f->remembered;
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
+  }
+}
+
+/* steps 4 and 6 of a guided sample: the caller knows what the bias learns from, and contact is not decided */
+COLD_STATIC void track_guided(tendonfmu_finger* f, double step, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const double noise = noise_of_step(f, step, mean_force);
+  jump_bias(f);
+  leave_residual(f, step);
+  if (start_is_open(f)) {
+    add_unlearned(f);
+  }
+  s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
   predict_residual(f, step, noise);
   if (f->guide.begins) {
     begin_bias(f, mean_force);
     for (size_t j = 0; start_is_open(f) && j < f->joints; ++j) {
-      f->remembered.unlearned[j] = 0.0;
+      s->unlearned[j] = 0.0;
     }
   } else if (f->guide.learns) {
     track_bias(f, step, noise);
   }
+  if (start_is_open(f)) {
+    close_start(f);
+  }
+  s->scalar[STATE_FIRST_SAMPLE] = 0.0;
 }
 
 /* steps 4 to 6 (docs/reference/semantics.md#order-of-the-steps) for every later sample */
@@ -273,11 +299,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
   const int unwell = settings->watches_sensors && f->scratch.unwell;
-  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
-  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
-  }
+  jump_bias(f);
   if (unwell) {
     begin_bias_anew(f);
   }
@@ -296,12 +318,10 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   if (settings->watches_drift) {
     watch_drift(f, time, step);
   }
-  const int contact = !f->guide.guides && detect_contact(f, mean_force, time, step);
-  const double noise = noise_variance(settings, mean_force, scale);
+  const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
-  if (f->guide.guides) {
-    track_guided(f, step, mean_force, noise);
-  } else if (bias_is_updated(f, contact, time)) {
+  if (bias_is_updated(f, contact, time)) {
+    const double noise = noise_of_step(f, step, mean_force);
     if (settings->watches_drift) {
       follow_drift(f, contact, step, noise);
     }
@@ -314,7 +334,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     }
   } else {
     restart_rest(f, time);
-    for (size_t j = 0; j < f->joint_lanes; ++j) {
+    for (size_t j = 0; j < f->joints; ++j) {
       s->gain[j] = 0.0;
     }
   }
@@ -383,6 +403,8 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   remember_sample(f, time, velocity_gain, transitions);
   if (first) {
     begin_tracking(f, time, mean_force);
+  } else if (f->guide.guides) {
+    track_guided(f, step, mean_force);
   } else {
     track_sample(f, time, step, mean_force);
   }
