@@ -243,31 +243,6 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
   return take(finger, time, inputs);
 }
 
-static tendonfmu_status run_rows(tendonfmu_finger* finger, size_t samples, const double* time,
-                                 const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
-                                 const tendonfmu_outputs* outputs, size_t* done) {
-  tendonfmu_status status = TENDONFMU_OK;
-  for (size_t row = 0; row < samples; ++row) {
-    const tendonfmu_inputs sample = samples_row(finger, inputs, row);
-    if (guide) {
-      samples_guide(finger, guide, row);
-    }
-    status = take(finger, time[row], &sample);
-    if (status != TENDONFMU_OK) {
-      break;
-    }
-    samples_give_outputs(finger, outputs, row);
-    if (guide) {
-      samples_give_variance(finger, guide->variance, row);
-    }
-    if (done) {
-      *done = row + 1;
-    }
-  }
-  finger->guide = (sample_guide){0};
-  return status;
-}
-
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
                                const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done) {
   if (done) {
@@ -276,26 +251,18 @@ tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const d
   if (!finger || !inputs || !outputs || (!time && samples)) {
     return missing(finger);
   }
-  return run_rows(finger, samples, time, inputs, NULL, outputs, done);
-}
-
-tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, const double* time,
-                                      const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
-                                      const tendonfmu_outputs* outputs, size_t* done) {
-  if (done) {
-    *done = 0;
+  for (size_t row = 0; row < samples; ++row) {
+    const tendonfmu_inputs sample = samples_row(finger, inputs, row);
+    const tendonfmu_status status = take(finger, time[row], &sample);
+    if (status != TENDONFMU_OK) {
+      return status;
+    }
+    samples_give_outputs(finger, outputs, row);
+    if (done) {
+      *done = row + 1;
+    }
   }
-  if (!finger || !inputs || !guide || !outputs || (!time && samples)) {
-    return missing(finger);
-  }
-  if (tendonfmu_is_initialised(finger)) {
-    return fail(finger, TENDONFMU_WRONG_ORDER,
-                "the first sample is already taken: expected a reset before a guided run");
-  }
-  if (finger->derived.settings.watches_sensors) {
-    return fail(finger, TENDONFMU_BAD_ARGUMENT, "a guided run with sensor_fault: expected a finger without");
-  }
-  return run_rows(finger, samples, time, inputs, guide, outputs, done);
+  return TENDONFMU_OK;
 }
 
 tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs) {

@@ -203,23 +203,8 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_sensors(finger, outputs, row);
 }
 
-void samples_give_variance(const tendonfmu_finger* finger, double* variance, size_t row) {
-  for (size_t j = 0; variance && j < finger->joints; ++j) {
-    variance[row * finger->joints + j] = finger->guide.begins ? NAN : finger->scratch.residual_variance[j];
-  }
-}
-
 static const double* row_of(const double* values, size_t row, size_t count) {
   return values ? values + row * count : NULL;
-}
-
-void samples_guide(tendonfmu_finger* finger, const tendonfmu_guide* guide, size_t row) {
-  const sample_guide before = finger->guide;
-  const int begins_late = before.begins && !before.learns && !finger->derived.settings.has_initial_torque;
-  finger->guide = (sample_guide){.guides = 1,
-                                 .begins = row == 0 || begins_late,
-                                 .learns = !guide->learns || guide->learns[row],
-                                 .known_torque = row_of(guide->known_torque, row, finger->joints)};
 }
 
 tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row) {

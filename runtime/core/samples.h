@@ -15,11 +15,5 @@ void samples_name_bad_input(const tendonfmu_finger* finger, double time, const t
 /* Copies the outputs of the last sample into row `row` of the caller's arrays. */
 void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row);
 
-/* Copies S of the last, guided sample into row `row`: NaN where the bias begins. */
-void samples_give_variance(const tendonfmu_finger* finger, double* variance, size_t row);
-
-/* Says what the bias makes of row `row`, after the rows before it. */
-void samples_guide(tendonfmu_finger* finger, const tendonfmu_guide* guide, size_t row);
-
 /* Row `row` of many samples. */
 tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row);
