@@ -1,8 +1,8 @@
 """What one command writes every other takes: it does its work, answers no, or refuses by name; it never fails inside.
 
-All pairs of a writer and a reader are generated (support/chains.py), each with one of the variations of the recordings
-and one kinematics source, so that every writer and every reader meets all of them. A seeded sample in which each writer
-and each reader is once runs in `./test`; `./test --all python_tests/cli/test_chains.py` runs all.
+All pairs of a writer and a reader are generated (support/chains.py), each with some variations of the recordings and
+kinematics sources, so that every writer and every reader meets all of them. A seeded sample in which each writer and
+each reader is once runs in `./test`; `./test --all python_tests/cli/test_chains.py` runs all.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from repetitions import repeated
 
 Pair = tuple[str, str, str, int]  # writer, reader, variation, kinematics
 # of Python, not of a user's language
-_CODE = re.compile(r"\b\w+(Error|Exception)\b|Traceback|object at 0x|<class|\bNoneType\b")
-EXPENSIVE = ("calibrate", "diagnose", "hand", "build")  # begins of writers and readers that take seconds
+_CODE = re.compile(r"\b\w+(Error|Exception)\b|object at 0x|<class|\bNoneType\b")
 
 
 def all_pairs() -> list[Pair]:
-    """A Latin square: the variation and the source follow from the numbers of writer and reader."""
+    """Two Latin squares, the first one first: variation and source follow from the numbers of writer and reader."""
     kinds = list(itertools.product(VARIATIONS, KINEMATICS))
     return [
-        (writer, reader, *kinds[(w + 4 * r) % len(kinds)])
+        (writer, reader, *kinds[(w + 4 * r + turn) % len(kinds)])
+        for turn in (0, 7)
         for w, writer in enumerate(WRITERS)
         for r, reader in enumerate(READERS)
     ]
@@ -41,7 +41,7 @@ def some_pairs() -> list[int]:
     rng = np.random.default_rng(1)
     writers = [str(name) for name in rng.permutation(list(WRITERS))]
     chosen = dict(zip(READERS, itertools.cycle(writers), strict=False))
-    return [k for k, (writer, reader, *_) in enumerate(PAIRS) if chosen[reader] == writer]
+    return [k for k, (writer, reader, *_) in enumerate(PAIRS[: len(PAIRS) // 2]) if chosen[reader] == writer]
 
 
 PAIRS = all_pairs()
@@ -59,19 +59,13 @@ def description(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> C
     def written(name: str) -> Path:
         writer = WRITERS[name]
         before = written(writer.after) if writer.after else None
-        folder = re.sub(r"[^a-z]+", "_", f"chain_{name}")
-        return (
-            made_once(
-                tmp_path_factory, folder, lambda target: void(write_description(target, name, recordings, before))
-            )
-            / writer.file
-        )
+
+        def make(folder: Path) -> None:
+            write_description(folder, name, recordings, before)
+
+        return made_once(tmp_path_factory, re.sub(r"[^a-z]+", "_", f"chain_{name}"), make) / writer.file
 
     return written
-
-
-def void(_: object) -> None:
-    """Return nothing."""
 
 
 def faults_of(pair: Pair, finger: Path, recordings: Path, folder: Path) -> Iterator[str]:
@@ -91,12 +85,11 @@ def faults_of(pair: Pair, finger: Path, recordings: Path, folder: Path) -> Itera
             if answer.status not in (0, 1, 2):
                 reports = [file.read_text() for file in Path().glob("tendonfmu-error-*.txt")]
                 yield f"{told}: {answer.status}: {answer.err}\n{''.join(reports)}"
-            if answer.status and _CODE.search(answer.err):
+            if "Traceback" in answer.err or (answer.status and _CODE.search(answer.err)):
                 yield f"{told}: not in plain words: {answer.err}"
             if answer.status == 2:
                 last = answer.err.strip().splitlines()[-1]
-                named = [str(word) for word in command[1:] if "." in str(word) or str(word).startswith("--")]
-                if not any(name in last for name in named):
+                if not any(str(word) in last for word in command[1:] if Path(str(word)).suffix):
                     yield f"{told}: refused without a name: {last}"
             if answer.status:
                 return
