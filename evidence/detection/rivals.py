@@ -33,8 +33,8 @@ from evidence.runner import digest, plain
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import DetectionScore, score_detection
 from tendonfmu.detect.counting import stretches
-from tendonfmu.model import moment_arms, native
-from tendonfmu.recordings import Recording, bias_settings, model_alone, track
+from tendonfmu.model import moment_arms, native, number_of, without_friction
+from tendonfmu.recordings import Recording, run_parts
 
 Description = dict[str, Any]
 
@@ -93,12 +93,8 @@ class Detector:
 
     def residual(self, inputs: Mapping[str, Numbers]) -> Numbers:
         """[N, n] N·m before the bias update, without any detection; 0 for the first sample."""
-        time, force = inputs["time"], inputs["tendon_force"]
-        whole = [slice(0, len(time))]
-        model = model_alone(self.description, [dict(inputs)], whole, len(time), 1)
-        remainder = force @ moment_arms(self.description) - model.torque
-        settings, mean = bias_settings(self.description), np.abs(force).mean(axis=1)
-        left = track(settings, time, mean, remainder, model.jump, np.ones(len(time), dtype=bool), whole).residual
+        whole = np.ones(len(inputs["time"]), dtype=bool)
+        left = run_parts(self.description, inputs, [slice(0, len(whole))], whole, 1).residual
         return np.nan_to_num(left)
 
     @property
@@ -126,7 +122,7 @@ class _Moved:
 
 def moved_by(description: Mapping[str, Any], recording: Recording) -> _Moved:
     """Kinematics as the C core takes them from tendon positions and forces."""
-    run = native.run_recording(without_friction(description), recording.arrays())
+    run = native.run_recording(without_friction(description, "cover"), recording.arrays())
     still = float((description.get("velocity_threshold") or {}).get("joint", 0.01))
     force = recording.groups["tendon_force"]
     return _Moved(force, run["joint_angle"], run["joint_speed"], moment_arms(description), still)
@@ -178,11 +174,12 @@ class HighPass:
     @classmethod
     def of(cls, description: Mapping[str, Any], time: Numbers, force: Numbers) -> HighPass:
         """Of the bias settings at a recording's mean force. The root of P² = q (P + R)."""
-        settings, step = bias_settings(description), float(np.median(np.diff(time)))
-        noise = (settings.noise + settings.per_force * float(np.abs(force).mean())) ** 2
-        if settings.noise_time is not None:
-            noise *= settings.noise_time / step
-        drift = settings.drift * step
+        settings, step = description.get("bias") or {}, float(np.median(np.diff(time)))
+        base, per_force = (number_of(description, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
+        noise = (base + per_force * float(np.abs(force).mean())) ** 2
+        if settings.get("noise_time") is not None:
+            noise *= settings["noise_time"] / step
+        drift = number_of(description, "bias.drift_variance") * step
         known = 0.5 * (drift + np.sqrt(drift**2 + 4 * drift * noise))
         return cls(float(known / (known + noise)))
 
@@ -194,22 +191,9 @@ class HighPass:
 # --- descriptions -----------------------------------------------------------------------------------------------------
 
 
-def without_friction(description: Mapping[str, Any], covers: bool = True) -> Description:
-    """The finger with all friction removed."""
-    bare = copy.deepcopy(dict(description))
-    bare["extensions"] = []
-    for joint in bare["joints"]:
-        for key in ("friction", "load_friction", *(() if covers else ("cover",))):
-            joint.pop(key, None)
-    for tendon in bare["tendons"]:
-        for key in ("pulley_friction", "edge_friction"):
-            tendon.pop(key, None)
-    return bare
-
-
 def constant_bias(description: Mapping[str, Any], torque: Numbers) -> Description:
     """Without friction and covers, with a bias that stays at torque [n], N·m."""
-    bare = without_friction(description, covers=False)
+    bare = without_friction(description)
     bare["bias"] = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": torque.tolist()}
     return bare
 
@@ -218,10 +202,10 @@ def make_rivals(product: Mapping[str, Any], training: Recording, free: Sequence[
     """Without thresholds of their own yet. product: the description whose bias filter all of them have."""
     arms = moment_arms(product)
     mean = np.mean([(recording.groups["tendon_force"] @ arms).mean(axis=0) for recording in free], axis=0)
-    bare = without_friction(product, covers=False)
+    bare = without_friction(product)
     return [
         Detector("no model", constant_bias(product, mean)),
-        Detector("bias alone", without_friction(product)),
+        Detector("bias alone", without_friction(product, "cover")),
         Detector("joint Coulomb", bare, fit_predictor(product, training, tensions=False)[0]),
         Detector("tension-proportional", bare, fit_predictor(product, training, tensions=True)[0]),
         Detector("paper's rule", copy.deepcopy(dict(product))),

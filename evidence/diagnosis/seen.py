@@ -30,7 +30,6 @@ from evidence.fingers.foreign import Array, Nominal, frame, noisy, quantised, rm
 from evidence.judge import SYNONYMS, UNKNOWN, Truth, judge
 from evidence.runner import parser, publish, run_cases, say, write
 from evidence.tables import NOTHING, Row, number, page, table, values_of, where
-from tendonfmu.diagnosis import residual_of
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import Held, prepare, read_recording
 from tendonfmu.statistics.intervals import share
@@ -218,7 +217,7 @@ def true_gain(models: Sequence[Mapping[str, Any]], case: Case) -> float:
     for unseen in case.gain_recordings:
         recording = prepare(finger, read_recording(unseen), case.kinematics, Held())
         for k, data in enumerate(models):
-            sums[k] += float(np.nansum(residual_of(data, recording)[1:] ** 2))
+            sums[k] += float(np.nansum(recording.run(data).residual ** 2))
     return 1.0 - math.sqrt(sums[1] / sums[0])
 
 

@@ -20,6 +20,7 @@ namespace nb = nanobind;
 
 using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // A new numpy array of zeros, and its values.
 template <typename Value>

@@ -5,7 +5,6 @@
 #include "tendonfmu_estimation.h"
 
 using group_row = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // group and scale have a number for each of the description. It is counted by the finger alone: an estimator without
 // them may refuse what they allow, such as a law of 0 whose scale is given.

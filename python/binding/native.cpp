@@ -96,10 +96,11 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
   }
   void restore_state(const nb::bytes& bytes) { expect(tendonfmu_restore_state(get(), bytes.data(), bytes.size())); }
 
-  // Name of each output to its rows.
+  // Name of each output to its rows; with `learns` of tendonfmu_run_guided(), and residual_variance too.
   nb::dict run(const number_row& time, const std::optional<number_rows>& force,
                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-               const std::optional<number_rows>& velocity, bool with_parts) {
+               const std::optional<number_rows>& velocity, bool with_parts, const std::optional<flag_row>& learns,
+               const std::optional<number_rows>& known_torque) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
         rows(force, samples, m, "tendon_force"), rows(position, samples, m, "tendon_position"),
@@ -113,11 +114,22 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
         set_array(outputs, row, data);
       }
     }
+    tendonfmu_guide guide = {nullptr, rows(known_torque, samples, n, "known_torque"), nullptr};
+    if (learns) {
+      if (learns->shape(0) != samples) {
+        throw nb::value_error(("learns: expected " + std::to_string(samples) + " flags").c_str());
+      }
+      void* variance = nullptr;
+      arrays["residual_variance"] = new_output(output_type::number, {samples, n}, &variance);
+      guide.learns = learns->data();
+      guide.variance = static_cast<double*>(variance);
+    }
     std::size_t done = 0;
     tendonfmu_status status;
     {
       nb::gil_scoped_release released;
-      status = tendonfmu_run(get(), samples, time.data(), &inputs, &outputs, &done);
+      status = learns ? tendonfmu_run_guided(get(), samples, time.data(), &inputs, &guide, &outputs, &done)
+                      : tendonfmu_run(get(), samples, time.data(), &inputs, &outputs, &done);
     }
     if (status != TENDONFMU_OK) {
       throw nb::value_error(("row " + std::to_string(done + 1) + ": " + tendonfmu_last_error(get())).c_str());
@@ -251,7 +263,7 @@ NB_MODULE(_native, m) {
       .def("restore_state", &bound_finger::restore_state)
       .def("run", &bound_finger::run, nb::arg("time"), nb::arg("tendon_force").none(),
            nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none(),
-           nb::arg("with_parts"))
+           nb::arg("with_parts"), nb::arg("learns").none(), nb::arg("known_torque").none())
       .def("step_outputs", &bound_finger::step_outputs)
       .def("step", &bound_finger::step, nb::arg("time"), nb::arg("tendon_force").none(),
            nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none())

@@ -42,6 +42,8 @@ class Finger:
         joint_position: NDArray[np.float64] | None,
         joint_velocity: NDArray[np.float64] | None,
         with_parts: bool,
+        learns: NDArray[np.uint8] | None,
+        known_torque: NDArray[np.float64] | None,
     ) -> dict[str, NDArray[Any]]: ...
     def step_outputs(self) -> dict[str, NDArray[Any]]: ...
     def step(

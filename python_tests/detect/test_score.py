@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from command import Answer, Call
 from repository_paths import ROOT
 from tendonfmu.cli import main
-from tendonfmu.detect.scoring import Scored, read_subject, residual_of, run_track, scaled_detection, score_recordings
+from tendonfmu.detect.scoring import Scored, read_subject, run_track, scaled_detection, score_recordings
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
@@ -130,12 +130,10 @@ def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
     track = run_track(subject, read_recording(path), 1, None)
     contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
     threshold = np.array(contact["threshold"]) + force[:, None] * np.array(contact["threshold_per_force"])
-    from_outputs = residual_of(subject.finger.data, track.recording, track.outputs, 1)  # as of an FMU
-    for residual in (track.residual, from_outputs):
-        known = ~np.isnan(residual)
-        assert known[1:].all() and not known[0].any()
-        above = np.abs(residual)[known] > threshold[known]
-        assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
+    known = ~np.isnan(track.residual)
+    assert known[1:].all() and not known[0].any()
+    above = np.abs(track.residual)[known] > threshold[known]
+    assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
 
 
 def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:

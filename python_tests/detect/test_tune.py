@@ -28,10 +28,9 @@ from tendonfmu.detect.noise import bias_noise, deviation, drift_variance, time_c
 from tendonfmu.detect.tuning import RELEASE, ContactTuning, TuneWarning
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.model import read_finger
+from tendonfmu.model import native, read_finger
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings import read_recording
-from tendonfmu.recordings.residuals import BiasSettings, track
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
@@ -216,10 +215,13 @@ def test_the_time_constant_of_the_bias(rate: float) -> None:
     drift = drift_variance(noise, noise_time, wished)
     assert time_constant(drift, noise, noise_time) == pytest.approx(wished)
     time = np.arange(round(8 * rate)) / rate
-    step = np.where(time < 5.0, 0.0, 1.0)[:, None]
-    settings = BiasSettings(drift, noise, 0.0, noise_time, None, None)
-    left = track(settings, time, np.full(len(time), 10.0), step, None, np.ones(len(time), bool), [slice(0, len(time))])
-    followed = time[np.flatnonzero(left.bias[:, 0] > 1 - math.exp(-1))[0]] - 5.0
+    bias = {"drift_variance": drift, "noise_std": noise, "noise_time": noise_time}
+    finger = {"format": "tendonfmu-finger-1", "name": "bare", "joints": [{"name": "j"}], "bias": bias}
+    finger |= {"tendons": [{"moment_arms": [1.0], "stiffness": 1e3}], "contact": {"threshold": [1e9]}}
+    signals = {"joint_position": np.zeros((len(time), 1)), "joint_velocity": np.zeros((len(time), 1))}
+    step = np.where(time < 5.0, 1.0, 2.0)[:, None]
+    left = native.run_recording(finger, {"time": time, "tendon_force": step, **signals}, 3)
+    followed = time[np.flatnonzero(left["bias_torque"][:, 0] > 2 - math.exp(-1))[0]] - 5.0
     assert followed == pytest.approx(wished, rel=0.03, abs=1.5 / rate)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fit_cases import small_finger
-from tendonfmu.diagnosis import cause_gains, gain
+from tendonfmu.diagnosis import cause_gains
 from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.cause import Cause, Where
@@ -21,10 +21,15 @@ from tendonfmu.statistics import Interval
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
 
 
+def recorded(at: int, **flags: Any) -> Any:
+    """A recording over which a model is its residuals [N, n] there."""
+    return SimpleNamespace(run=lambda data: SimpleNamespace(residual=data[at]), **flags)
+
+
 def bench(nominal: list[Any], tests: Any = (), only_sliding: bool = False) -> Any:
-    """A bench without a search. A model is here its residuals [N, n] over each of the recordings."""
+    """A bench without a search."""
     made = cause_gains._Bench.__new__(cause_gains._Bench)
-    made._training = cast("Any", [SimpleNamespace(at=k, held_out=held) for k, held in enumerate(HELD_OUT)])
+    made._training = cast("Any", [recorded(k, held_out=held) for k, held in enumerate(HELD_OUT)])
     made._tests, made.nominal = tests, cast("Any", SimpleNamespace(data=nominal))
     made._result = cast(
         "Any", SimpleNamespace(estimation=SimpleNamespace(online=lambda data: data), only_sliding=only_sliding)
@@ -51,22 +56,16 @@ def residuals(*held_out: float, elsewhere: float) -> list[Any]:
         (residuals(np.nan, 1.0, 1.5, elsewhere=1.0), False),
     ],
 )
-def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(
-    monkeypatch: pytest.MonkeyPatch, model: list[Any], holds: bool
-) -> None:
+def test_a_model_holds_if_it_is_no_worse_where_nothing_was_fitted(model: list[Any], holds: bool) -> None:
     """So a gain on held-out parts is never negative."""
-    monkeypatch.setattr(gain, "residual_of", lambda data, recording: data[recording.at])
     nominal = residuals(1.0, 1.0, 1.0, elsewhere=1.0)
     assert bench(nominal).holds(SimpleNamespace(data=model)) is holds
     assert bench(nominal, tests=("a recording",)).holds(SimpleNamespace(data=model))  # judged on that one
 
 
 @pytest.mark.parametrize(("worse", "holds"), [(0.0, True), (0.1, False)])
-def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(
-    monkeypatch: pytest.MonkeyPatch, worse: float, holds: bool
-) -> None:
-    monkeypatch.setattr(gain, "residual_of", lambda data, recording: data[recording.at])
-    tests = (SimpleNamespace(at=0, train=np.array([True, False])),)
+def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(worse: float, holds: bool) -> None:
+    tests = (recorded(0, train=np.array([True, False])),)
     made = bench([np.array([[1.0], [1.0]])], tests, only_sliding=True)
     assert made.holds(SimpleNamespace(data=[np.array([[1.0 + worse], [9.0]])])) is holds
 

@@ -24,7 +24,6 @@ from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.effects.shapes import is_spring, usual_time
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numbers
 from tendonfmu.diagnosis.gain import OnlineError
-from tendonfmu.diagnosis.gain import residual_of as online_residual
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
 from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
@@ -219,7 +218,7 @@ def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
 
 def test_the_online_error_sees_what_the_bias_filter_follows(hidden: FitRecording) -> None:
     """A spring is slow: r shows a part of what the means of 10 ms show."""
-    left = np.sum(np.nan_to_num(online_residual(finger(), hidden)) ** 2, axis=1)
+    left = np.sum(np.nan_to_num(hidden.run(finger()).residual) ** 2, axis=1)
     error = OnlineError(finger(), [hidden])
     assert error.square(finger()) == pytest.approx(left[hidden.train].sum(), rel=1e-9)
     found, better = error.by_stretch(finger()), error.by_stretch(with_cover())

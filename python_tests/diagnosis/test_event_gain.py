@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.diagnosis import contact_scan as module
 from tendonfmu.diagnosis.contact_scan import event_gain, unusual
 from tendonfmu.diagnosis.result import Event
 
@@ -19,15 +18,17 @@ PUSHES = tuple(Event("a.csv", start, start + 0.5, (1,), 0.05, "a push") for star
 
 
 @pytest.fixture
-def recording(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], Any]:
+def recording() -> Callable[[float], Any]:
     """White noise of 1 mN·m, and in the events so much more."""
 
     def make(push: float) -> Any:
         left = np.random.default_rng(3).normal(scale=1e-3, size=(len(TIME), 2))
         for event in PUSHES:
             left[(event.start <= TIME) & (event.end >= TIME)] += push
-        monkeypatch.setattr(module, "residual_of", lambda data, each: left)
-        return SimpleNamespace(path=Path("a.csv"), time=TIME, train=np.ones(len(TIME), dtype=bool))
+        model = SimpleNamespace(residual=left)
+        return SimpleNamespace(
+            path=Path("a.csv"), time=TIME, train=np.ones(len(TIME), dtype=bool), run=lambda data: model
+        )
 
     return make
 

@@ -26,6 +26,7 @@ from tendonfmu.diagnosis.experiments.menu import (
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.series import exact_model
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
@@ -61,7 +62,7 @@ def usual(seconds: float = 30.0, pretension: float = 10.0) -> Entry:
 def recording_of(data: dict[str, Any], entry: Entry, seed: int = 0, noise: float = NOISE) -> FitRecording:
     """What a finger that is exactly `data` records of an entry, with white noise on the torque."""
     found = expected_recording(data, perform(data, entry, RATE), 3)
-    torque = found.model.torque + np.cumsum(found.model.jump, axis=0)
+    torque = exact_model(data, found)
     target = torque + noise * np.random.default_rng(seed).standard_normal(torque.shape)
     load = found.recording.groups["tendon_force"] @ moment_arms(data) - target
     groups = {**found.recording.groups, "external_torque": load}

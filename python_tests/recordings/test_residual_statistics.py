@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tendonfmu.recordings.residuals import chi_square_tail, consistency, whiteness
-
-
-def test_chi_square_tail_is_that_of_scipy() -> None:
-    for value in (0.0, 1.0, 20.0, 55.5, 400.0, 5000.0):
-        assert chi_square_tail(value, 20) == pytest.approx(float(stats.chi2.sf(value, 20)), rel=1e-9, abs=1e-300)
+from tendonfmu.recordings.residuals import consistency, whiteness
 
 
 @pytest.mark.parametrize("count", [40, 1000, 100000])
 def test_the_interval_of_the_nis_is_that_of_chi_square(count: int) -> None:
     low, high = consistency([np.ones((count, 1))])["interval"]
     expected = stats.chi2.ppf([0.025, 0.975], count) / count
-    assert [low, high] == pytest.approx(list(expected), abs=2e-3 * (expected[1] - expected[0]))
+    assert [low, high] == pytest.approx(list(expected), rel=1e-9)
 
 
 def test_whiteness_tells_white_from_coloured() -> None:

@@ -53,6 +53,9 @@ class FingerOracle:
         self.travel: Array | None = None  # of the joints within the sample, rad, by the position filter
         self.absorbed = 0.0  # Λ
         self.last = Step()
+        # of a guided run (oracle_guided.py): N·m known from elsewhere, and whether the bias begins with this sample
+        self.known_torque: Array | float = 0.0
+        self.begins = False
 
     def _read_structure(self, description: Mapping[str, Any]) -> None:
         threshold = given(description, "velocity_threshold", {})
@@ -125,7 +128,7 @@ class FingerOracle:
         # 4. totals, eq. (10)
         T = self._total(F * f) + self._springs(q)
         db = self._total(self._increments(b * f))
-        tau = self.R.T @ f0
+        tau = self.R.T @ f0 - self.known_torque
         mean_force = float(np.mean(np.abs(f0))) if self.sensors is None else self.sensors.mean_force(f0)
         noise = (self.noise_std + self.noise_std_per_force * mean_force) ** 2
         if first:
@@ -134,7 +137,7 @@ class FingerOracle:
             self.detector.begin(time)
             self.branches["initial_torque" if self.initial_torque is not None else "initial_bias"] += 1
         else:
-            self.b_eff = np.where(self.watch.anew, tau - T, self.b_eff + db)
+            self.b_eff = np.where(np.array(self.watch.anew) | self.begins, tau - T, self.b_eff + db)
         T_eff = self.b_eff + T
         hold = functools.partial(self._at_joints, arms=np.abs(self.R))
         self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, out)

@@ -208,7 +208,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
   double** const joint_rows[] = {&s->angle,     &s->torque,         &s->friction,      &s->bias_step,
                                  &s->load,      &s->joint_friction, &s->load_friction, &s->joint_bias,
-                                 &s->load_bias, &s->stuck_friction, &s->uncertainty};
+                                 &s->load_bias, &s->stuck_friction, &s->uncertainty,   &s->residual_variance};
   double** const slot_rows[] = {&s->edge_kept, &s->pulley_kept, &s->edge_stuck, &s->pulley_stuck};
   double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {

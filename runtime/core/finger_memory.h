@@ -281,6 +281,7 @@ typedef struct finger_scratch {
   int start_remains;                                /* motion has not turned over all of the start */
   double* drift_share;                   /* [4] of u, p, s: the weight of e in them; with contact.drift only */
   double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
+  double* residual_variance;             /* [N] S, (N·m)²; of a guided sample only */
   double* part;                          /* as in the state */
   double* filter;                        /* as in the state, after this sample */
   double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
@@ -307,6 +308,14 @@ typedef struct finger_scratch {
 
 typedef struct step_kernel step_kernel;
 
+/* One sample of tendonfmu_run_guided(); all 0 in every other call. */
+typedef struct sample_guide {
+  int guides;                 /* the caller says what the bias learns from, contact does not */
+  int begins;                 /* it has not learned yet: it begins with this sample */
+  int learns;                 /* step 6 is taken */
+  const double* known_torque; /* [n] N·m, or NULL */
+} sample_guide;
+
 struct tendonfmu_finger {
   model_shape shape;
   size_t joints, tendons;           /* n, m */
@@ -321,6 +330,7 @@ struct tendonfmu_finger {
   derived_numbers derived;
   finger_state remembered;
   finger_scratch scratch;
+  sample_guide guide;
   void* allocation; /* of tendonfmu_create(), NULL in the caller's memory */
   char error[ERROR_BYTES];
 };

@@ -132,6 +132,24 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
                                const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done);
 
+/* What the caller of tendonfmu_run_guided() knows of a recording, and one more of its results. NULL arrays: learn from
+ * all samples, no torque known, not wanted. */
+typedef struct tendonfmu_guide {
+  const unsigned char* learns; /* [samples] 1 where the bias may learn */
+  const double* known_torque;  /* [samples × n] N·m, external torque as the tendons have to hold it */
+  double* variance;            /* [samples × n] (N·m)², receives S of the residual; NaN until the bias has begun */
+} tendonfmu_guide;
+
+/* What a finger leaves of a recording: tendonfmu_run() with a finger that has taken no sample, in which the caller says
+ * what the bias learns from. Neither contact nor a failing sensor is detected: a finger with sensor_fault is refused,
+ * and the outputs of the detection say nothing. joint_torque is τ less the known torque, and so is what follows from
+ * it. Where the bias may not learn it still jumps with stiction, and P grows by drift_variance. Without
+ * bias.initial_torque it begins with the first sample that it may learn from; residual means nothing before the sample
+ * after. */
+tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, const double* time,
+                                      const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
+                                      const tendonfmu_outputs* outputs, size_t* done);
+
 /* Copies the outputs of the sample last taken. */
 tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs);
 

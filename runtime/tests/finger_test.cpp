@@ -225,6 +225,48 @@ TEST(Finger, RefusedRowOfABatchIsNamedAndRowsBeforeItAreWritten) {
   EXPECT_TRUE(std::isnan(outputs.compensated[150 * joints]));
 }
 
+// the bias may learn from nothing before row 40, and a torque is known
+std::vector<double> run_guided(Finger& finger, tendonfmu_status expected = TENDONFMU_OK) {
+  std::vector<unsigned char> learns(300);
+  std::vector<double> known(300 * joints), variance(300 * joints);
+  for (std::size_t k = 0; k < 300; ++k) {
+    learns[k] = k > 40 && k % 50 > 10;
+    known[k * joints] = 1e-3 * static_cast<double>(k);
+  }
+  Outputs outputs(300);
+  const tendonfmu_outputs view = outputs.view();
+  const tendonfmu_inputs inputs = motion().row(0);
+  const tendonfmu_guide guide = {learns.data(), known.data(), variance.data()};
+  EXPECT_EQ(tendonfmu_run_guided(finger, 300, motion().time.data(), &inputs, &guide, &view, nullptr), expected);
+  outputs.bias.insert(outputs.bias.end(), variance.begin() + 60 * joints, variance.end());
+  return outputs.bias;
+}
+
+TEST(Finger, GuidedRunGivesTheSameBitsWithAllKernels) {
+  Finger plain;
+  ASSERT_EQ(tendonfmu_set_kernel(plain, "plain"), TENDONFMU_OK);
+  const std::vector<double> expected = run_guided(plain);
+  for (const char* kernel : {"sse2", "avx2"}) {
+    Finger other;
+    if (tendonfmu_set_kernel(other, kernel) == TENDONFMU_OK) {
+      EXPECT_EQ(run_guided(other), expected) << kernel;
+    }
+  }
+}
+
+TEST(Finger, GuidedRunBeginsAnewAndLeavesNoTrace) {
+  Finger finger, fresh;
+  run_guided(finger);
+  run_guided(finger, TENDONFMU_WRONG_ORDER);
+  ASSERT_EQ(tendonfmu_reset(finger), TENDONFMU_OK);
+  EXPECT_EQ(run(finger).bias, run(fresh).bias);
+  EXPECT_EQ(finger.saved(), fresh.saved());
+  Finger watching(test_finger::image(test_finger::watched_sensors()));
+  run_guided(watching, TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(tendonfmu_run_guided(fresh, 1, motion().time.data(), nullptr, nullptr, nullptr, nullptr),
+            TENDONFMU_BAD_ARGUMENT);
+}
+
 TEST(Finger, SameTimeAgainChangesNothing) {
   Finger finger;
   run(finger, 0, 300);

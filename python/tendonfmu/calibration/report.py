@@ -10,8 +10,8 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect import ContactTuning, Scored, contact_at_rest, tune_report
-from tendonfmu.diagnosis import Diagnosis, Event, residual_of
-from tendonfmu.estimate import residuals
+from tendonfmu.diagnosis import Diagnosis, Event
+from tendonfmu.model import without_friction
 from tendonfmu.recordings import FitRecording, flagged_stretches, rms
 from tendonfmu.report import MotionShown, cards_of, names_of
 
@@ -73,7 +73,7 @@ def errors_of(
     # With `data` None it is that without friction, with the bias of `settings`.
     residual, masks = [], []
     for recording in recordings:
-        left = residuals(settings or {}, recording, None).residual if data is None else residual_of(data, recording)
+        left = recording.run(without_friction(settings or {}) if data is None else data).residual
         residual.append(left)
         masks.append((recording.held_out if held_out else recording.tracked) & np.isfinite(left).all(axis=1))
     return list(rms(np.concatenate(residual), np.concatenate(masks)))
@@ -83,7 +83,7 @@ def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording]
     """Return a stretch, of those that nothing was fitted to, whose error with the second model is the median."""
     stretches: list[tuple[float, float, FitRecording, Flags, Numbers]] = []
     for recording in recordings:
-        left, time = residual_of(after, recording), recording.time
+        left, time = recording.run(after).residual, recording.time
         known = np.asarray(np.isfinite(left).all(axis=1))
         judged = known & (recording.held_out if held_out else recording.tracked)
         for first, end in flagged_stretches(time, judged if judged.any() else known):
@@ -95,7 +95,7 @@ def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording]
     least = 0.5 * max(stretch[0] for stretch in stretches)
     long = sorted((stretch for stretch in stretches if stretch[0] >= least), key=lambda stretch: stretch[1])
     _, _, recording, rows, left = long[len(long) // 2]
-    given = residual_of(before, recording)
+    given = recording.run(before).residual
     return MotionShown(recording.path.name, recording.time[rows], recording.target[rows], given[rows], left[rows])
 
 

@@ -14,7 +14,7 @@ from tendonfmu.detect.alarm_level import Cells, rows_of
 from tendonfmu.detect.bounds import Bound
 from tendonfmu.detect.free_motion import FreePart, FreeRun
 from tendonfmu.errors import InputError
-from tendonfmu.recordings import bias_settings
+from tendonfmu.model import Finger, number_of
 
 BINS = 8  # of mean force, divided among the pretensions
 _LEAST = 0.02  # of the residual's spread: least standard deviation at the recorded forces
@@ -49,21 +49,23 @@ def drift_variance(noise: float, noise_time: float, time: float) -> float:
     return noise**2 * noise_time / time**2
 
 
-def wanted_time(data: Data, parts: Sequence[FreePart], bias_time: float | None) -> float:
+def wanted_time(finger: Finger, parts: Sequence[FreePart], bias_time: float | None) -> float:
     """Return the time constant of the bias (s): as asked for, else that of the description at the mean force."""
     if bias_time is not None:
         return bias_time
-    given = bias_settings(data)
-    noise = given.noise + given.per_force * mean_force(parts)
-    if not given.drift > 0 or not noise > 0:
-        what = "drift_variance" if not given.drift > 0 else "noise_std"
-        raise InputError(f"bias.{what} = 0: the bias has no time constant to keep; expected --bias-time in s")
-    return time_constant(given.drift, noise, noise_time(data, parts))
+    drift, base, per_force = (
+        number_of(finger.data, f"bias.{key}") for key in ("drift_variance", "noise_std", "noise_std_per_force")
+    )
+    noise = base + per_force * mean_force(parts)
+    if not drift > 0 or not noise > 0:
+        what = "drift_variance" if not drift > 0 else "noise_std"
+        raise InputError(f"{finger.path}: bias.{what} = 0: no time constant to keep; expected --bias-time in s")
+    return time_constant(drift, noise, noise_time(finger.data, parts))
 
 
 def noise_time(data: Data, parts: Sequence[FreePart]) -> float:
     """Return bias.noise_time (s), or the median step if the noise counts per sample."""
-    given = bias_settings(data).noise_time
+    given: float | None = (data.get("bias") or {}).get("noise_time")
     return float(np.median([np.median(np.diff(part.time)) for part in parts])) if given is None else given
 
 

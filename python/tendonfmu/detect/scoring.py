@@ -40,7 +40,6 @@ from tendonfmu.recordings import (
     RecordingSource,
     gaps,
     listed_sources,
-    model_alone,
     read_recordings,
 )
 
@@ -283,18 +282,13 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     data = subject.finger.data
     joints, tendons = len(data["joints"]), len(data["tendons"])
     recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
-    if subject.packed:
-        outputs = outputs_of(run_fmu(subject.path, recording, kinematics_source=kinematics))
-    else:
-        outputs = _run(subject.finger.image, recording, kinematics)
+    core = _run(subject.finger.image, recording, kinematics)
+    packed = subject.packed and outputs_of(run_fmu(subject.path, recording, kinematics_source=kinematics))
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
-    if "residual" in outputs:  # `native.Instance.run` gives it, with 0 at the first sample
-        residual = outputs["residual"].copy()
-        residual[0] = np.nan
-    else:
-        residual = residual_of(data, recording, outputs, kinematics)
-    return Track(recording, label, outputs, residual, sensed)
+    residual = core["residual"].copy()  # no output of an FMU; 0 at the first sample
+    residual[0] = np.nan
+    return Track(recording, label, packed or core, residual, sensed)
 
 
 def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
@@ -302,42 +296,6 @@ def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArr
         return native.Instance(image, kinematics).run(recording.arrays())
     except native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
-
-
-def residual_of(data: Data, recording: Recording, outputs: Mapping[str, NDArray[Any]], kinematics: int) -> Numbers:
-    """Compute the residual [N, n] before the bias update (N·m), NaN for the first sample of an FMU's outputs."""
-    # The bias holds what the update took from the residual: r = compensated + (b − b before), wherever the bias did not
-    # jump by itself. Where it jumped, at the start and the end of stiction, r = compensated/(1 − K). The gain K is
-    # interpolated between the neighbouring samples; in contact it is that of the last sample before.
-    whole = slice(0, len(recording))
-    jumps = model_alone(data, [recording.arrays()], [whole], len(recording), kinematics).jump
-    jumped = (jumps != 0).any(axis=1)
-    left, moved = outputs["compensated_torque"], np.diff(outputs["bias_torque"], axis=0, prepend=np.nan)
-    residual = left + moved
-    power = np.sum(residual**2, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        gain = np.sum(residual * moved, axis=1) / power
-        gain[jumped] = np.nan
-        contact = np.asarray(outputs["contact"]).ravel().astype(bool)
-        near = np.where(contact, _last_known(gain, contact), _between_known(gain, ~contact))
-        residual[jumped] = (left / (1 - near[:, None]))[jumped]
-    residual[~np.isfinite(residual)] = np.nan
-    return np.asarray(residual)
-
-
-def _last_known(values: Numbers, chosen: Flags) -> Numbers:
-    """Return [N] the last finite value among the chosen samples so far; 0 before any."""
-    known = chosen & np.isfinite(values)
-    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    return np.where(index >= 0, values[index], 0.0)
-
-
-def _between_known(values: Numbers, chosen: Flags) -> Numbers:
-    """Return [N] values interpolated between the finite ones of the chosen samples; NaN without any."""
-    known = np.flatnonzero(chosen & np.isfinite(values))
-    if not len(known):
-        return np.full(len(values), np.nan)
-    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
 
 
 # --- other thresholds -------------------------------------------------------------------------------------------------

@@ -216,7 +216,7 @@ class ContactTuning(Configured):
         if self.method == "threshold":  # this method keeps the friction bound
             jump, stuck = float(given.get("jump_time") or jump), float(given.get("stuck_time") or 0.0)
         clock = Clock(self.options.innovation_time, jump, stuck)
-        time = wanted_time(self.start_.data, parts, self.options.bias_time)
+        time = wanted_time(self.start_, parts, self.options.bias_time)
         bias = self.start_.data.get("bias") or {}
         start = START_SHARE if bias.get("start_share") is None else bias["start_share"]
         data = {**self.start_.data, "bias": {**bias, "start_share": start}}

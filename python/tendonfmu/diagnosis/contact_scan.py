@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.gain import residual_of
 from tendonfmu.diagnosis.remainder_features import features, run_starts
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Event
@@ -277,7 +276,7 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
         return None
     within, samples, free, free_samples = 0.0, 0, [], []
     for recording in recordings:
-        squares = np.sum(residual_of(data, recording) ** 2, axis=1)
+        squares = np.sum(recording.run(data).residual ** 2, axis=1)
         judged = recording.train & np.isfinite(squares)
         inside = np.zeros(len(judged), dtype=bool)
         for event in events:

@@ -16,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Numbers
-from tendonfmu.model import moment_arms, native, number_of
+from tendonfmu.model import moment_arms, native, number_of, without_learning
 from tendonfmu.recordings import FitRecording, delayed_torque
 from tendonfmu.statistics import BlockSeries, SampleBlocks
 
 SHORTEST_STEP = 0.01  # s; shortest block
 MOST_BLOCKS = 12_000
-_NEVER = 1e9  # N·m; a contact threshold that is never passed
 _STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache
 
 
@@ -106,12 +105,8 @@ def sample_blocks(
 
 
 def _image(data: Mapping[str, Any]) -> Any:
-    """Return the image of a description with a bias that only jumps and with contact detection out of reach."""
-    kept = {key: value for key, value in (data.get("bias") or {}).items() if key in ("forget_rate", "entry_load")}
-    joints = len(data["joints"])
-    still = {**kept, "drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * joints}
-    alone = {**data, "bias": still, "contact": {"threshold": [_NEVER] * joints}, "sensor_fault": None}
-    return native.image_from_json(json.dumps(alone))
+    """Return the image of a description with a bias that only jumps and without contact detection."""
+    return native.image_from_json(json.dumps(without_learning(data, "forget_rate", "entry_load")))
 
 
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:

@@ -27,8 +27,8 @@ from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model, make_series, sample_blocks
 from tendonfmu.estimate import Estimator
-from tendonfmu.model import moment_arms, native
-from tendonfmu.recordings import FitRecording, bias_settings
+from tendonfmu.model import moment_arms, native, number_of
+from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import (
     KNOTS,
     TRENDS,
@@ -158,7 +158,7 @@ def residual_alone(data: Mapping[str, Any], series: Series) -> Numbers:
 
 def bias_of(data: Mapping[str, Any], series: Series, knots: float = KNOTS) -> Splines:
     """Return the columns of the bias [B, s]: splines, or constants if the description's bias does not drift."""
-    return bias_splines(series, knots) if bias_settings(data).drift > 0 else constant_bias(series)
+    return bias_splines(series, knots) if number_of(data, "bias.drift_variance") > 0 else constant_bias(series)
 
 
 # --- forces that a model predicts ------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import identifiability, verdicts
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
-    from .evaluation import evaluate, residuals
+    from .evaluation import evaluate
     from .files import (
         FIT_REPORT,
         check_given_once,

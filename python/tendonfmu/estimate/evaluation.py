@@ -8,16 +8,19 @@ and the correlation of the residuals ("sandwich" with clusters in time: Liang an
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.recordings import BiasSettings, FitRecording, Model, Residuals, bias_settings, model_alone, rms, track
+from tendonfmu.estimate.structure import Structure
+from tendonfmu.model import native, number_of, without_friction
+from tendonfmu.recordings import FitRecording, Model, rms
 
 BLOCKS = 80  # approximate number: few enough to be long, many enough for a sum of squares
 SHORTEST = 2.0  # s; several times the memory of the bias filter
@@ -31,31 +34,15 @@ class Evaluation:
     """A recording under the fitted finger."""
 
     recording: FitRecording  # prepared recording
-    model: Model  # T of the fitted finger
-    fit: Residuals  # residuals with the fitted numbers and with those of the start
-    start: Residuals
-    bias_only: Residuals  # residuals with the same bias filter and no friction at all
+    model: Model  # of the fitted finger, and of that of the start
+    start: Model
+    bias_only: Model  # with the same bias filter and no friction at all
     model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
-
-
-def model_over(data: Data, recording: FitRecording) -> Model:
-    """Compute T of a description over the parts of a recording."""
-    arrays = [recording.arrays(part) for part in recording.parts]
-    return model_alone(data, arrays, recording.parts, len(recording.time), recording.kinematics)
-
-
-def residuals(data: Data, recording: FitRecording, model: Model | None) -> Residuals:
-    """Compute the residuals of a recording with the bias filter of a description."""
-    mean_force = np.abs(recording.recording.groups["tendon_force"]).mean(axis=1)
-    remainder = recording.target if model is None else recording.target - model.torque
-    jump = None if model is None else model.jump
-    settings = bias_settings(data)
-    return track(settings, recording.time, mean_force, remainder, jump, recording.tracked, recording.parts)
 
 
 def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
     """Judge a fitted finger on a recording."""
-    model = model_over(fitted, recording)
+    model = recording.run(fitted)
     rest = recording.target - model.torque
     for part in recording.parts:
         chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
@@ -64,9 +51,8 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
     return Evaluation(
         recording=recording,
         model=model,
-        fit=residuals(fitted, recording, model),
-        start=residuals(start, recording, recording.model),
-        bias_only=residuals(fitted, recording, None),
+        start=recording.run(start),
+        bias_only=recording.run(without_friction(fitted)),
         model_only=rest,
     )
 
@@ -77,10 +63,10 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
     if not any(flags.any() for flags in chosen):
         return None
     flags = np.concatenate(chosen) & ~np.isnan(
-        np.concatenate([evaluation.fit.residual for evaluation in evaluations])
+        np.concatenate([evaluation.model.residual for evaluation in evaluations])
     ).any(axis=1)
     series = {
-        "rms": [evaluation.fit.residual for evaluation in evaluations],
+        "rms": [evaluation.model.residual for evaluation in evaluations],
         "start_rms": [evaluation.start.residual for evaluation in evaluations],
         "bias_only_rms": [evaluation.bias_only.residual for evaluation in evaluations],
         "model_only_rms": [evaluation.model_only for evaluation in evaluations],
@@ -93,7 +79,7 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
 
 
 def block_scores(
-    estimator: Estimator, z: Numbers, data: Data, training: Sequence[Evaluation], weights: Sequence[Numbers]
+    structure: Structure, z: Numbers, data: Data, training: Sequence[Evaluation], weights: Sequence[Numbers]
 ) -> tuple[Numbers, float]:
     """Compute the scores [blocks, u] at the estimate z [u], over the samples trained on, and the length of a block."""
     seconds = sum(evaluation.recording.duration for evaluation in training)
@@ -101,9 +87,9 @@ def block_scores(
     size = len(data["joints"]) * len(z)
     every = max(1, math.ceil(samples / min(_SAMPLES, max(_SIZE // size, _SAMPLES // 8))))
     length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
-    settings = _settings(data, every)
+    block_of = _Block(structure, every)
     blocks = [
-        _score(estimator, z, settings, evaluation, rows, weight)
+        block_of.score(z, evaluation, rows, weight)
         for evaluation, weight in zip(training, weights, strict=True)
         for rows in _blocks(evaluation, length, every)
     ]
@@ -111,13 +97,31 @@ def block_scores(
     return scores - scores.mean(axis=0) if len(blocks) else scores, length
 
 
-def _settings(data: Data, every: int) -> BiasSettings:
-    """Return the bias settings for every k-th sample: noise per sample is averaged, noise per time needs no change."""
-    settings = replace(bias_settings(data), initial_torque=None)
-    if settings.noise_time is not None:
-        return settings
-    root = math.sqrt(every)
-    return replace(settings, noise=settings.noise / root, per_force=settings.per_force / root)
+class _Block:
+    """The estimation over one block of every k-th sample, in which the bias starts anew."""
+
+    def __init__(self, structure: Structure, every: int) -> None:
+        start, initial = structure.start.data, "bias.initial_torque["
+        bias = {**(start.get("bias") or {}), "initial_torque": None}
+        if bias.get("noise_time") is None:  # noise per sample is averaged, noise per time needs no change
+            for key in ("noise_std", "noise_std_per_force"):
+                bias[key] = number_of(start, f"bias.{key}") / math.sqrt(every)
+        self._image = native.image_from_json(json.dumps({**start, "bias": bias}))
+        kept = [not path.startswith(initial) for path in structure.index]
+        self._group, self._scale = structure.group[kept], structure.scale[kept]
+        whole = Estimator(structure.start.image, structure.group, structure.scale)
+        self._lasts = np.array([not unknown.path.startswith(initial) for unknown in whole.unknowns], dtype=bool)
+
+    def score(self, z: Numbers, evaluation: Evaluation, rows: NDArray[np.intp], weights: Numbers) -> Numbers:
+        """Compute [u] the gradient of the block's cost; 0 by `bias.initial_torque`."""
+        recording, estimator = evaluation.recording, Estimator(self._image, self._group, self._scale)
+        external = None if recording.external is None else recording.external[rows]
+        given = sampled(evaluation, rows, recording.time[rows])
+        estimator.add_recording(given, 3, external, recording.train[rows])
+        estimator.set_weights(0, weights[rows[0]])
+        gradient = np.zeros(len(z))
+        gradient[self._lasts] = estimator.evaluate(z[self._lasts], threads=1)[1]
+        return gradient
 
 
 def _blocks(evaluation: Evaluation, length: float, every: int) -> Iterator[NDArray[np.intp]]:
@@ -129,30 +133,6 @@ def _blocks(evaluation: Evaluation, length: float, every: int) -> Iterator[NDArr
         for block in np.split(rows, np.flatnonzero(np.diff(number)) + 1):
             if recording.train[block].sum() >= _LEAST:
                 yield block
-
-
-def _score(
-    estimator: Estimator,
-    z: Numbers,
-    settings: BiasSettings,
-    evaluation: Evaluation,
-    rows: NDArray[np.intp],
-    weights: Numbers,
-) -> Numbers:
-    """Compute [u] the score of one block. The bias filter is linear, so it takes y − T and its derivatives alike."""
-    recording = evaluation.recording
-    time, learns = recording.time[rows], recording.train[rows]
-    number = estimator.add_recording(sampled(evaluation, rows, time), kinematics_source=3)
-    torque, jump, by_torque, by_jump = estimator.jacobian(number, z, 0, len(rows))
-    joints = torque.shape[1]
-    remainder = np.hstack([recording.target[rows] - torque, -by_torque.reshape(len(rows), -1)])
-    jumps = np.hstack([jump, by_jump.reshape(len(rows), -1)])
-    mean_force = np.abs(recording.recording.groups["tendon_force"][rows]).mean(axis=1)
-    left = track(settings, time, mean_force, remainder, jumps, learns, [slice(0, len(rows))])
-    chosen = learns & ~np.isnan(left.residual).any(axis=1)
-    residual = left.residual[chosen, :joints] / left.variance[chosen, None] * weights[rows][chosen]
-    slopes = left.residual[chosen, joints:].reshape(-1, joints, len(z))
-    return np.asarray(np.tensordot(residual, slopes, axes=((0, 1), (0, 1))))
 
 
 def sampled(evaluation: Evaluation, rows: NDArray[np.intp], time: Numbers) -> dict[str, Numbers]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.evaluation import Evaluation, evaluate, model_over, residuals
+from tendonfmu.estimate.evaluation import Evaluation, evaluate
 from tendonfmu.estimate.files import (
     PreviousFit,
     Unfinished,
@@ -42,14 +42,13 @@ from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers
-from tendonfmu.model import Finger, FingerSource, description_text, read_finger
+from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
     FitRecording,
     Held,
     RecordingSource,
     admit,
-    bias_settings,
     listed_sources,
     motion_of,
     prepare,
@@ -213,7 +212,7 @@ class FrictionFit(Configured):
             passes=options.passes or passes,
             effective=options.effective_samples,
             previous=previous,
-            noise=bias_settings(self.start_.data).noise,
+            noise=number_of(self.start_.data, "bias.noise_std"),
         )
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         try:
@@ -289,7 +288,7 @@ class FrictionFit(Configured):
     def _judged(self, learned: Learned) -> tuple[list[Fitted], Numbers]:
         data = self.description_.data
         coverage = with_laws_of(data, self.coverage_)
-        return judge_numbers(self.structure_, learned, self.description_, coverage, bias_settings(data).noise)
+        return judge_numbers(self.structure_, learned, self.description_, coverage, number_of(data, "bias.noise_std"))
 
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 
@@ -315,8 +314,7 @@ class FrictionFit(Configured):
     def _left(self, source: RecordingSource) -> tuple[FitRecording, Numbers]:
         self._require_fitted()
         prepared = self._prepared(source, Held())
-        data = self.description_.data
-        return prepared, residuals(data, prepared, model_over(data, prepared)).residual
+        return prepared, prepared.run(self.description_.data).residual
 
     def _require_fitted(self) -> None:
         if not getattr(self, "finished_", False):
@@ -376,7 +374,7 @@ def _reported(options: FitOptions) -> dict[str, Any]:
 
 def _trained(evaluation: Evaluation) -> Numbers:
     """Return [N, n] standardised innovations of the samples trained on, NaN elsewhere."""
-    return np.where(evaluation.recording.train[:, None], evaluation.fit.standardised, np.nan)
+    return np.where(evaluation.recording.train[:, None], evaluation.model.standardised, np.nan)
 
 
 def _series(evaluation: Evaluation, role: Any) -> FitSeries:
@@ -388,7 +386,7 @@ def _series(evaluation: Evaluation, role: Any) -> FitSeries:
         mean_force=recording.mean_force,
         time=recording.time,
         torque=recording.target,
-        residual=evaluation.fit.residual,
+        residual=model.residual,
         model_torque=model.torque,
         joint_angle=model.joint_angle,
         joint_speed=model.joint_speed,

@@ -71,7 +71,7 @@ def parameter_uncertainty(
     """Compute the uncertainty of the friction torque: by joint up to four lists of m + 3 numbers, and the report."""
     known = known_of(learned.covariance, learned.information)
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
-    scores, block_time = block_scores(estimator, learned.z, data, training, learned.weights)
+    scores, block_time = block_scores(structure, learned.z, data, training, learned.weights)
     scores = scores @ known.factor
     motion = Motion(estimator, learned.z, data, known)
     trained, held = ([np.flatnonzero(getattr(each.recording, which)) for each in training] for which in ROLES)

@@ -51,7 +51,9 @@ def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     base = np.asarray(estimator.values(z))
     columns = []
     for k, unknown in enumerate(estimator.unknowns):
-        step = _INSIDE * max(abs(float(z[k])), 1e-3 * unknown.scale)
+        # a step of a small drop must change static = coulomb + drop, however large coulomb is
+        whole = float(np.abs(base[list(unknown.parameters)]).max()) if unknown.role == "drop" else 0.0
+        step = _INSIDE * max(abs(float(z[k])), 1e-3 * unknown.scale, whole)
         step = -step if z[k] + step > unknown.upper else step
         moved = z.copy()
         moved[k] += step

@@ -202,8 +202,8 @@ def _own(hand: Hand, result: PartResult, values: Sequence[float]) -> float:
     return together(values[hand.shared_joints(result.part) :])
 
 
-def _mnm(value: float) -> str:
-    return rounded(1e3 * value)
+def _mnm(value: float | None) -> str:
+    return "–" if value is None else rounded(1e3 * value)
 
 
 def _place(result: PartResult, cause: Mapping[str, Any]) -> str:

@@ -52,6 +52,8 @@ if TYPE_CHECKING:
         tendon_positions,
         velocity_threshold,
         without_detection,
+        without_friction,
+        without_learning,
         working_point_weights,
     )
     from .native import Instance, NativeError

@@ -130,18 +130,33 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
     return shares / mean if mean > 1e-9 else np.zeros(len(arms))
 
 
-def without_detection(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
+def without_detection(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a description without contact detection."""
+    return {**data, "contact": {"threshold": [NEVER] * len(data["joints"])}, "sensor_fault": None}
+
+
+def without_learning(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
     """Return a description without contact detection, whose bias keeps some settings and is moved only by jumps."""
     bias: dict[str, Any] = {"drift_variance": 0.0, "initial_variance": 0.0}
     bias["initial_torque"] = [0.0] * len(data["joints"])
     given = data.get("bias") or {}
     bias |= {key: given[key] for key in kept if given.get(key) is not None}
-    return {**data, "bias": bias, "contact": {"threshold": [NEVER] * len(data["joints"])}, "sensor_fault": None}
+    return {**without_detection(data), "bias": bias}
+
+
+def without_friction(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
+    """Return a description without friction and covers, but for some keys of its joints and tendons."""
+    gone = {"friction", "load_friction", "cover", "pulley_friction", "edge_friction"} - set(kept)
+    bare = {
+        part: [{key: value for key, value in each.items() if key not in gone} for each in data[part]]
+        for part in ("joints", "tendons")
+    }
+    return {**data, **bare, "extensions": []}
 
 
 def friction_probe(data: Mapping[str, Any]) -> native.Instance:
     """Make a finger that computes the friction model only."""
-    probe = without_detection(data, "noise_std", "noise_std_per_force", "forget_rate", "noise_time")
+    probe = without_learning(data, "noise_std", "noise_std_per_force", "forget_rate", "noise_time")
     return native.Instance.from_description(probe, 3)
 
 

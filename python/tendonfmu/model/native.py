@@ -158,13 +158,26 @@ class Instance:
     def run(self, recording: Mapping[str, Array], parts: bool = False) -> dict[str, Array]:
         """Take all samples of a recording in one call, and return all outputs of the FMU."""
         # recording: [N] (s); parts: [N, n, m + 3] (N·m); returns [N, n] [N, m] (N·m)
+        return self._run(recording, parts, None, None)
+
+    def run_guided(self, recording: Mapping[str, Array], learns: Array, known_torque: Array | None) -> dict[str, Array]:
+        """Return the same and `residual_variance`, S, with a bias that learns from some samples, not by contact."""
+        # learns: [N]; known_torque: [N, n] (N·m), taken from τ; returns also [N, n] ((N·m)²), NaN until the bias begins
+        known = None if known_torque is None else np.ascontiguousarray(known_torque, dtype=np.float64)
+        return self._run(recording, False, np.ascontiguousarray(learns, dtype=np.uint8), known)
+
+    def _run(
+        self, recording: Mapping[str, Array], parts: bool, learns: Array | None, known: Array | None
+    ) -> dict[str, Array]:
         inputs = [
             None if recording.get(name) is None else np.ascontiguousarray(recording[name], dtype=np.float64)
             for name in INPUTS
         ]
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
-            outputs: dict[str, Array] = self._finger.run(time, inputs[0], inputs[1], inputs[2], inputs[3], parts)
+            outputs: dict[str, Array] = self._finger.run(
+                time, inputs[0], inputs[1], inputs[2], inputs[3], parts, learns, known
+            )
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)
         return outputs | {name: outputs[name].view(bool) for name in flags}
 

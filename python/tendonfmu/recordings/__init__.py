@@ -39,18 +39,7 @@ if TYPE_CHECKING:
         read_recording,
         read_recordings,
     )
-    from .residuals import (
-        BiasSettings,
-        Model,
-        Residuals,
-        bias_settings,
-        consistency,
-        delayed_torque,
-        model_alone,
-        rms,
-        track,
-        whiteness,
-    )
+    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness
     from .routing import learn_routing, require_routing, routed
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import Signals, smoothing_of, zero_phase

@@ -23,7 +23,7 @@ from tendonfmu.recordings.faults import (
     stuck_sensors,
 )
 from tendonfmu.recordings.recording import Recording, check_numbers
-from tendonfmu.recordings.residuals import Model, model_alone
+from tendonfmu.recordings.residuals import Model, run_parts
 
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
 _LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
@@ -52,7 +52,7 @@ class FitRecording:
     contact_out: Flags
     faulty: Flags
     parts: list[slice]  # slices without a gap
-    model: Model  # T, angles and speeds of the given finger
+    model: Model  # what the given finger makes of it
     warnings: list[str]  # sentences about what was left out and what is poor
 
     @property
@@ -88,6 +88,10 @@ class FitRecording:
     def arrays(self, part: slice) -> dict[str, Numbers]:
         """Return the signals of one part."""
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
+
+    def run(self, data: Mapping[str, Any]) -> Model:
+        """Run a finger over the recording; its bias learns from the tracked samples."""
+        return run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
 
     def entry(self) -> dict[str, Any]:
         """Return what a report says about the recording."""
@@ -129,8 +133,6 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     usable = ~(faulty | contact)
     _refuse_too_little(recording, parts, usable, contact)
     held_out = _held_out(recording, parts, held) & usable
-    arrays = [{name: values[part] for name, values in recording.arrays().items()} for part in parts]
-    model = model_alone(finger.data, arrays, parts, len(recording), kinematics)
     if contact.any():
         out = int(contact.sum())
         warnings.append(f"{counted(out, 'sample')} labelled contact {are(out)} left out: no column external_torque")
@@ -143,7 +145,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
         contact_out=contact,
         faulty=faulty,
         parts=parts,
-        model=model,
+        model=run_parts(finger.data, recording.arrays(), parts, usable, kinematics),
         warnings=[*warnings, *sentences],
     )
 

@@ -266,6 +266,20 @@ HOT_INLINE quad kalman_gain(quad predicted, quad noise) {
   return quad_keep(known, quad_div(predicted, quad_select(known, total, quad_set(1.0))));
 }
 
+/* S of a guided sample, and P where the bias does not learn from it */
+COLD_STATIC void predict_residual(tendonfmu_finger* f, double step, double noise) {
+  const finger_state* s = &f->remembered;
+  const quad drift = quad_set(f->derived.settings.drift_variance * step);
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    const quad predicted = quad_add(quad_load(s->variance + j), drift);
+    quad_store(f->scratch.residual_variance + j, quad_add(with_unlearned(f, j, predicted), quad_set(noise)));
+    if (!f->guide.learns) {
+      quad_store(s->variance + j, predicted);
+      quad_store(s->gain + j, quad_set(0.0));
+    }
+  }
+}
+
 /* one Kalman step per joint on the residual r = τ − T_eff; friction and bias take their share of it */
 HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;

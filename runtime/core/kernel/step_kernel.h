@@ -92,6 +92,13 @@ HOT_INLINE void measured_torques(tendonfmu_finger* f) {
   }
 }
 
+/* τ less the torque that a guided run knows */
+COLD_STATIC void take_known_torque(tendonfmu_finger* f) {
+  for (size_t j = 0; j < f->joints; ++j) {
+    f->scratch.torque[j] -= f->guide.known_torque[j];
+  }
+}
+
 /* mean |f0| over the tendons */
 HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   if (f->derived.settings.watches_sensors && f->scratch.unwell) {
@@ -207,29 +214,39 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   s->scalar[STATE_VELOCITY_GAIN] = velocity_gain;
 }
 
-/* the first sample: b_eff = τ − T unless it is given, nothing detected, nothing tracked */
-HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_force) {
+/* b_eff = τ − T unless it is given */
+HOT_INLINE void begin_bias(tendonfmu_finger* f, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
   const double variance =
       settings->initial_variance >= 0.0 ? settings->initial_variance : noise_variance(settings, mean_force, 1.0);
+  for (size_t j = 0; j < f->joints; ++j) {
+    s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
+    s->variance[j] = variance;
+    s->gain[j] = 0.0;
+  }
+  effective_friction(f, s->friction);
+  if (!settings->has_initial_torque) {
+    copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
+  }
+}
+
+/* the first sample: nothing detected, nothing tracked */
+HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const finger_settings* settings = &f->derived.settings;
   for (size_t slot = 0; slot < f->slots; ++slot) {
     s->event[slot] = 0.0;
     s->last_stuck[slot] = time;
     s->stuck_since[slot] = settings->forgets_by_absorption ? 0.0 : time;
   }
   for (size_t j = 0; j < f->joints; ++j) {
-    s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
-    s->variance[j] = variance;
-    s->gain[j] = s->joint_contact[j] = 0.0;
+    s->joint_contact[j] = 0.0;
   }
   if (settings->watches_rest) {
     begin_rest(f, time);
   }
-  effective_friction(f, s->friction);
-  if (!settings->has_initial_torque) {
-    copy_row(s->friction, s->torque, f->joint_lanes); /* to the last bit */
-  }
+  begin_bias(f, mean_force);
   s->scalar[STATE_STARTED_AT] = settings->watches_drift ? time : 0.0;
   s->scalar[STATE_START_OPEN] = settings->has_start_share ? 1.0 : 0.0;
   s->scalar[STATE_INITIALISED] = 1.0;
@@ -237,16 +254,52 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   s->scalar[STATE_CONTACT] = 0.0;
 }
 
+/* noise variance of step 6 */
+HOT_INLINE double noise_of_step(const tendonfmu_finger* f, double step, double mean_force) {
+  const finger_settings* settings = &f->derived.settings;
+  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
+  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
+  return noise_variance(settings, mean_force, scale);
+}
+
+HOT_INLINE void jump_bias(tendonfmu_finger* f) {
+  const finger_state* s = &f->remembered;
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
+  }
+}
+
+/* steps 4 and 6 of a guided sample: the caller knows what the bias learns from, and contact is not decided */
+COLD_STATIC void track_guided(tendonfmu_finger* f, double step, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const double noise = noise_of_step(f, step, mean_force);
+  jump_bias(f);
+  leave_residual(f, step);
+  if (start_is_open(f)) {
+    add_unlearned(f);
+  }
+  s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
+  predict_residual(f, step, noise);
+  if (f->guide.begins) {
+    begin_bias(f, mean_force);
+    for (size_t j = 0; start_is_open(f) && j < f->joints; ++j) {
+      s->unlearned[j] = 0.0;
+    }
+  } else if (f->guide.learns) {
+    track_bias(f, step, noise);
+  }
+  if (start_is_open(f)) {
+    close_start(f);
+  }
+  s->scalar[STATE_FIRST_SAMPLE] = 0.0;
+}
+
 /* steps 4 to 6 (docs/reference/semantics.md#order-of-the-steps) for every later sample */
 HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
   const int unwell = settings->watches_sensors && f->scratch.unwell;
-  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
-  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
-  }
+  jump_bias(f);
   if (unwell) {
     begin_bias_anew(f);
   }
@@ -268,7 +321,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
   if (bias_is_updated(f, contact, time)) {
-    const double noise = noise_variance(settings, mean_force, scale);
+    const double noise = noise_of_step(f, step, mean_force);
     if (settings->watches_drift) {
       follow_drift(f, contact, step, noise);
     }
@@ -281,7 +334,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
     }
   } else {
     restart_rest(f, time);
-    for (size_t j = 0; j < f->joint_lanes; ++j) {
+    for (size_t j = 0; j < f->joints; ++j) {
       s->gain[j] = 0.0;
     }
   }
@@ -328,6 +381,9 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   total_friction(f);
   add_extension_torques(f);
   measured_torques(f);
+  if (f->guide.known_torque) {
+    take_known_torque(f);
+  }
   const double mean_force = mean_tendon_force(f);
   bound_friction(f);
   if (f->derived.settings.has_start_share && (first || start_is_open(f))) {
@@ -347,6 +403,8 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   remember_sample(f, time, velocity_gain, transitions);
   if (first) {
     begin_tracking(f, time, mean_force);
+  } else if (f->guide.guides) {
+    track_guided(f, step, mean_force);
   } else {
     track_sample(f, time, step, mean_force);
   }

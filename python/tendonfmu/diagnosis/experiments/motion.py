@@ -15,7 +15,7 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.experiments.menu import Entry, Section, own_tension
 from tendonfmu.excite import Excitation, Plan, plan_excitation
 from tendonfmu.model import balanced_forces, moment_arms, tendon_positions
-from tendonfmu.recordings import FitRecording, Recording, model_alone
+from tendonfmu.recordings import FitRecording, Recording, run_parts
 from tendonfmu.statistics import quintic
 
 _SAMPLED = (
@@ -66,7 +66,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
         contact_out=none,
         faulty=none,
         parts=whole,
-        model=model_alone(data, [recording.arrays()], whole, samples, kinematics),
+        model=run_parts(data, recording.arrays(), whole, ~none, kinematics),
         warnings=[],
     )
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,8 @@ from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
-from tendonfmu.model import NativeError, moment_arms
-from tendonfmu.recordings import FitRecording, Model, Recording, bias_settings
+from tendonfmu.model import NativeError, moment_arms, number_of
+from tendonfmu.recordings import FitRecording, Model, Recording
 from tendonfmu.statistics import Span as SplineSpan
 from tendonfmu.statistics import regular_blocks, spline_basis
 
@@ -182,10 +182,9 @@ class _Laboratory:
     ) -> None:
         self.data, self.questions, self.span, self.seed = data, questions, span, seed
         self.kinematics = recordings[0].kinematics
-        settings = bias_settings(data)
-        given = [settings.noise] * len(data["joints"]) if noise is None else list(noise)
+        given = [number_of(data, "bias.noise_std")] * len(data["joints"]) if noise is None else list(noise)
         self.noise = np.maximum(np.array(given, dtype=float), 1e-9)
-        self.constant_bias = settings.drift == 0
+        self.constant_bias = number_of(data, "bias.drift_variance") == 0
         self.candidates = [_restricted(candidate, data, span) for candidate in _asked(questions)]
         self.columns: CandidateColumns | None = None
         self.old = sum(
@@ -345,10 +344,7 @@ def _shortened(recording: FitRecording) -> FitRecording:
     rows = np.arange(part.start, part.stop)[time - time[0] <= _OLD_SECONDS][::every]
     groups = {name: np.ascontiguousarray(values[rows]) for name, values in recording.recording.groups.items()}
     whole = [slice(0, len(rows))]
-    model = {
-        name: np.ascontiguousarray(getattr(recording.model, name)[rows])
-        for name in ("torque", "jump", "joint_angle", "joint_speed", "slack")
-    }
+    model = {each.name: np.ascontiguousarray(getattr(recording.model, each.name)[rows]) for each in fields(Model)}
     return replace(
         recording,
         recording=Recording(recording.path, np.ascontiguousarray(recording.time[rows]), groups),
