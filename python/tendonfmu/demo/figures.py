@@ -142,10 +142,10 @@ def _spaced(name: str) -> str:
 def calibration_sheet(report: Mapping[str, Any]) -> Sheet:
     """Draw the error before and after the calibration, by joint."""
     names = [*report["joints"], "all joints"]
-    models = ("bias_only", "as_given", "calibrated")
+    models = ("torque", "as_given", "calibrated")
     errors = [1e3 * np.array([*report["error"][model], together(report["error"][model])]) for model in models]
     panel = _error_panel("On a recording that it has not seen", "mN·m", names, *errors)
-    keys = (("floor", "no friction model"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
+    keys = (("floor", "nothing subtracted"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
     return Sheet("calibrate", "calibrate_error", "", keys, (panel,))
 
 

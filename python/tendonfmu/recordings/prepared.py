@@ -128,7 +128,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     faulty = (short | stuck) & ~contact
     usable = ~(faulty | contact)
     _refuse_too_little(recording, parts, usable, contact)
-    held_out = _held_out(recording, parts, held) & usable
+    held_out = held_out_blocks(recording, held) & usable
     arrays = [{name: values[part] for name, values in recording.arrays().items()} for part in parts]
     model = model_alone(finger.data, arrays, parts, len(recording), kinematics)
     if contact.any():
@@ -224,13 +224,13 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
 # --- hold-out ---------------------------------------------------------------------------------------------------------
 
 
-def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
+def held_out_blocks(recording: Recording, held: Held) -> Flags:
     """Return the samples [N] of evenly spread blocks of time. Blocks count from the start of each part."""
     out = np.zeros(len(recording), dtype=bool)
     if not held.share:
         return out
     blocks = 0
-    for part in parts:
+    for part in _parts(recording.time)[0]:
         time = recording.time[part] - recording.time[part.start]
         length = min(held.block, float(time[-1]) * held.share / 2)
         if held.strict and length < SHORTEST_BLOCK:
