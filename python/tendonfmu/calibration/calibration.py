@@ -67,6 +67,7 @@ FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
 HELD = Held(0.2, 10.0)  # part of the recordings that chooses nothing and is judged on if there are no tests
 BIAS_TIME = 2.0  # s: a fitted model needs no faster bias, and that learns pushes (docs/evidence/detection.md)
+TUNED = ("bias", "contact", "sensor_fault")  # what `tune` learns
 NOTHING_ASKED: dict[str, Any] = {
     "verdict": "not done: the structure is that of the earlier calibration",
     "causes": [],
@@ -276,7 +277,7 @@ class _Run:
         if case.pushes:
             files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
             pushed = self._step("pushes", "score", files, lambda step: self._score(tuned, error["calibrated"], step))
-            example = pushed.pop("example", None)  # earlier folders have none
+            example = pushed.pop("example")
             self.push = None if example is None else PushShown(**example)
         report = {
             "format": FORMAT,
@@ -347,34 +348,42 @@ class _Run:
         return structure_of(diagnosis)
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
-        """Fit the extended description to all recordings."""
+        """Fit the extended description to all recordings, and to four fifths of them."""
         case, options = self._case, self._options
-        fitted = fit_all(
-            described(case.finger, lacks["extended"]),
-            case.free,
-            Signals(**lacks["smoothing"]),
-            FitSettings(threads=options.jobs, path=case.finger.path),
-            given=case.finger.data,
-            seed=options.seed,
-            only_sliding=lacks.get("fits_sliding", False),  # earlier folders do not say
-        )
-        return {"finger": fitted.data, "warnings": [*fitted.warnings, *left_out(fitted.events)]}
+
+        def fitted(recordings: Sequence[FitRecording]) -> CalibratedFit:
+            return fit_all(
+                described(case.finger, lacks["extended"]),
+                recordings,
+                Signals(**lacks["smoothing"]),
+                FitSettings(threads=options.jobs, path=case.finger.path),
+                given=case.finger.data,
+                seed=options.seed,
+                only_sliding=lacks["fits_sliding"],
+            )
+
+        whole, most = fitted(case.free), fitted(self._most())
+        return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
 
     def _refit(self) -> dict[str, Any]:
         """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
-        case = self._case
-        inner = [prepare(case.finger, each.recording, each.kinematics, HELD) for each in case.free]
-        fitted = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
+        case, inner = self._case, self._most()
+        most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
         flags = [each.held_out for each in inner]
-        before, after = (squared_residual(data, inner, flags) for data in (case.finger.data, fitted.data))
+        before, after = (squared_residual(data, inner, flags) for data in (case.finger.data, most.data))
         if after <= before:
-            fitted = self._fitted_again([each.recording for each in case.free])
-            return {"finger": fitted.data, "warnings": list(fitted.warnings)}
+            whole = self._fitted_again([each.recording for each in case.free])
+            return {"finger": whole.data, "most": most.data, "warnings": list(whole.warnings)}
         kept = (
             f"fitted to four fifths of the motion, new numbers leave {percent((after / before) ** 0.5 - 1.0)} more of "
             "the last fifth than the earlier ones: the earlier ones are kept"
         )
-        return {"finger": case.finger.data, "warnings": [*fitted.warnings, kept]}
+        return {"finger": case.finger.data, "most": case.finger.data, "warnings": [*most.warnings, kept]}
+
+    def _most(self) -> list[FitRecording]:
+        """Return the motion to choose on with a fifth set apart, which shows what a fit leaves of other motion."""
+        finger, kinematics = self._case.finger, self._options.kinematics
+        return [prepare(finger, each.recording, kinematics, HELD) for each in self._case.free]
 
     def _fitted_again(self, recordings: Sequence[Recording]) -> CalibratedFit:
         case, options = self._case, self._options
@@ -382,9 +391,10 @@ class _Run:
         return fit_again(case.finger, case.previous, recordings, kinematics=options.kinematics, threads=options.jobs)
 
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
+        """Choose thresholds with the numbers of most motion, which does not fit the rest better than other motion."""
         case, options = self._case, self._options
         tuning = ContactTuning(
-            described(case.finger, fitted["finger"]),
+            described(case.finger, fitted["most"]),
             false_alarms_per_hour=options.false_alarms_per_hour,
             confidence=options.confidence,
             kinematics=options.kinematics,
@@ -394,7 +404,13 @@ class _Run:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TuneWarning)  # the report lists them
             tuning.tune([each.recording for each in case.free], checked=True)
-        return tuning_of(tuning)
+        report = tuning_of(tuning)
+        tuned = {key: report["finger"].get(key) for key in TUNED}
+        start = (fitted["finger"].get("bias") or {}).get("initial_torque")
+        if start is not None:
+            tuned["bias"] = {**tuned["bias"], "initial_torque": start}
+        kept = {key: value for key, value in fitted["finger"].items() if key not in TUNED}
+        return {**report, "finger": {**kept, **{key: value for key, value in tuned.items() if value is not None}}}
 
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
         file = self._folder / FOLDER / "tuned.json"

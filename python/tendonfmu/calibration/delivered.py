@@ -19,6 +19,7 @@ from tendonfmu.fmu import run_model
 from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import FitRecording, Held, Recording, at_rows, flagged_stretches, held_out_blocks, rms
 from tendonfmu.report import MotionShown
+from tendonfmu.statistics import intervals
 
 SHOWN = 20.0  # s
 
@@ -38,6 +39,11 @@ class Judged:
     def masks(self) -> list[Flags]:
         """Return the judged samples [N] of each recording."""
         return [each.held_out if self.held_out else each.tracked for each in self.recordings]
+
+    def minutes(self, chosen: Sequence[Flags]) -> float:
+        """Return the time of the chosen samples [N] of each recording (min)."""
+        seconds = (sample_seconds(each.time)[own] for each, own in zip(self.recordings, chosen, strict=True))
+        return sum(float(own.sum()) for own in seconds) / 60.0
 
 
 class Delivered:
@@ -65,27 +71,28 @@ class Delivered:
         return rms(np.concatenate(self.torque), np.concatenate(self._judged.masks()))
 
     def alarms(self, confidence: float) -> dict[str, Any]:
-        """Count the contacts that begin in judged motion, with the upper limit of their rate (1/h)."""
-        count, seconds = 0, 0.0
+        """Count the contacts that begin in judged motion; rates with 95 % interval and upper limit (1/h)."""
+        count = 0
         for each, contact, mask in zip(self._judged.recordings, self.contact, self._judged.masks(), strict=True):
             count += int(mask[stretches(each.time, contact)[:, 0]].sum())
-            seconds += float(sample_seconds(each.time)[mask].sum())
-        return {"alarms": count, "minutes": seconds / 60.0, "limit": rate_limit(count, seconds / 3600.0, confidence)}
+        minutes = self._judged.minutes(self._judged.masks())
+        rate = intervals.rate(count, minutes / 60.0)
+        limit = rate_limit(count, minutes / 60.0, confidence)
+        return {"alarms": count, "minutes": minutes, "interval": [rate.low, rate.high], "limit": limit}
 
 
 def compared(before: Delivered, after: Delivered, judged: Judged, name: str) -> dict[str, Any]:
     """Report the errors of the model before, which has a name, and of the calibrated one, also by pretension."""
-    masks, seconds = judged.masks(), [sample_seconds(each.time) for each in judged.recordings]
     return {
         "held_out": judged.held_out,
-        "minutes": sum(float(own[mask].sum()) for own, mask in zip(seconds, masks, strict=True)) / 60.0,
+        "minutes": judged.minutes(judged.masks()),
         "torque": after.torques(),
         name: before.errors(),
         "calibrated": after.errors(),
         "pretensions": [
             {
                 "mean_force": force,
-                "minutes": sum(float(own[mask].sum()) for own, mask in zip(seconds, chosen, strict=True)) / 60.0,
+                "minutes": judged.minutes(chosen),
                 name: before.errors(chosen),
                 "calibrated": after.errors(chosen),
             }

@@ -38,10 +38,8 @@ _WHAT = {
 }
 _DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how it was found"}
 MODELS = {
-    "torque": "nothing subtracted: the torque of the tendons",
     "as_given": "the description as given",
     "previous": "the earlier calibration",
-    "calibrated": "calibrated, as delivered",
 }
 WORSE = 1.05  # times the error before, from which on the error at a joint counts as larger
 
@@ -91,14 +89,15 @@ def verdict(report: Report) -> tuple[str, str]:
 
 def alarms(report: Report) -> str:
     """Say how many false alarms there were in unseen motion, and what so much motion says of their rate."""
-    found = report["alarms"]
-    counted_as = "no" if found["alarms"] == 0 else str(found["alarms"])
-    seen = (
-        f"{capital(counted_as)} false alarm{'s' * (found['alarms'] != 1)} in {_long(found['minutes'])} of that motion"
-    )
+    found, detection = report["alarms"], report["detection"]
+    many = "No false alarm" if found["alarms"] == 0 else capital(counted(found["alarms"], "false alarm"))
+    seen = f"{many} in {_long(found['minutes'])} of that motion"
     if found["limit"] is None:
         return f"{seen}."
-    return f"{seen}; so much motion cannot say more than: fewer than {found['limit']:.3g} an hour."
+    seen += f": with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+    if found["interval"][0] > detection["tuned_for_per_hour"]:
+        return f"{seen}, but more than the {detection['tuned_for_per_hour']:.3g} that the thresholds were chosen for."
+    return f"{seen}."
 
 
 def tuned_for(report: Report) -> str:
@@ -154,7 +153,7 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
 def error_headings(report: Report) -> Row:
     """Return the headings of `error_rows`: a column per pretension, and all of them."""
     forces = [f"at {each['mean_force']:.3g} N" for each in report["error"]["pretensions"]]
-    return ("error before → after, mN·m", *forces, *(["all motion"] if len(forces) != 1 else []))
+    return ("mN·m", *forces, *(["all motion"] if len(forces) != 1 else []))
 
 
 def error_rows(report: Report) -> list[Row]:
@@ -176,20 +175,10 @@ def error_caption(report: Report) -> str:
     error = report["error"]
     data = "a fifth of the recordings" if error["held_out"] else "the test recordings"
     return (
-        f"Error: rms of compensated_torque, what {FMU} feels although nothing touches the finger, in mN·m. Before is "
+        f"Error: rms of compensated_torque, what {FMU} feels although nothing touches the finger. Before is "
         f"{MODELS[_first(report)]}. Both run over {data}, {_long(error['minutes'])} that chose no number, no structure "
         "and no threshold."
     )
-
-
-def model_rows(report: Report) -> list[Row]:
-    """Return a row per model: rms by joint, and of all joints together (mN·m)."""
-    error = report["error"]
-    return [
-        (words, *(mnm(value) for value in error[name]), mnm(together(error[name])))
-        for name, words in MODELS.items()
-        if name in error
-    ]
 
 
 TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over seconds")
@@ -257,13 +246,12 @@ def push_sentence(report: Report) -> str:
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
     many = "no false alarm" if alarms == 0 else counted(alarms, "false alarm")
-    if after := pushes.get("false_alarms_after_events"):  # earlier folders do not say
+    if after := pushes["false_alarms_after_events"]:
         many += f" ({after} within 2 s after a push)"
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
-    late = pushes.get("found_at_release")  # earlier folders do not say
-    late = f", {late} of them only as they end," if late else ""
-    share = (pushes.get("free_alarm_share") or {}).get("value")
+    late = f", {pushes['found_at_release']} of them only as they end," if pushes["found_at_release"] else ""
+    share = pushes["free_alarm_share"]["value"]
     on = "" if share is None else f", of which {100 * share:.2g} % are in alarm, most of it after pushes"
     return (
         f"{pushes['found']} of {pushes['events']} labelled pushes are found{late} with {many} in "
@@ -366,9 +354,8 @@ def calibration_page(calibration: Calibration) -> str:
     sheets = [motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]
     if calibration.push is not None:
         sheets.append(push_sheet(calibration.push))
-    pushed = report["pushes"] or {}
-    if pushed.get("list"):  # earlier folders have none
-        sheets.append(pushes_sheet(pushed["list"], pushed["false_alarm_list"]))
+    if pushed := report["pushes"] and report["pushes"]["list"]:
+        sheets.append(pushes_sheet(pushed, report["pushes"]["false_alarm_list"]))
     return render(
         "calibration.html.jinja",
         drawn(sheets),
@@ -380,7 +367,6 @@ def calibration_page(calibration: Calibration) -> str:
         errors=error_rows(report),
         error_headings=list(error_headings(report)),
         error_caption=error_caption(report),
-        models=model_rows(report),
         causes=cause_rows(report),
         torques=torque_rows(report),
         torque_headings=list(TORQUE_HEADINGS),
