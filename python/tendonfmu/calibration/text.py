@@ -117,7 +117,9 @@ def mnm(value: float) -> str:
 
 
 def _long(minutes: float) -> str:
-    return f"{60 * minutes:.0f} s" if minutes < 1.0 else f"{minutes:.2g} min"
+    if minutes < 1.0:
+        return f"{60 * minutes:.0f} s"
+    return f"{minutes:.1f} min" if minutes < 10.0 else f"{minutes:.0f} min"
 
 
 def _fell(before: float, after: float) -> str:
