@@ -66,10 +66,6 @@ class Delivered:
         """Return [n] the rms of what is left at the chosen samples [N] of each recording, or at all judged ones."""
         return rms(np.concatenate(self.left), np.concatenate(chosen or self._judged.masks()))
 
-    def torques(self) -> list[float]:
-        """Return [n] the rms of the torque of the tendons."""
-        return rms(np.concatenate(self.torque), np.concatenate(self._judged.masks()))
-
     def alarms(self, confidence: float) -> dict[str, Any]:
         """Count the contacts that begin in judged motion; rates with 95 % interval and upper limit (1/h)."""
         count = 0
@@ -86,7 +82,6 @@ def compared(before: Delivered, after: Delivered, judged: Judged, name: str) -> 
     return {
         "held_out": judged.held_out,
         "minutes": judged.minutes(judged.masks()),
-        "torque": after.torques(),
         name: before.errors(),
         "calibrated": after.errors(),
         "pretensions": [
