@@ -19,16 +19,18 @@ from command import Call, DemoRun
 from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, Options, calibrate
 from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
-from tendonfmu.calibration.report import errors_of, left_out
+from tendonfmu.calibration.report import left_out
 from tendonfmu.calibration.text import calibration_page, size_rows, tiles, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.gain import squared_residual
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import Held, prepare
-from tendonfmu.recordings.recording import Recording, read_recording
+from tendonfmu.recordings.recording import Recording, at_rows, read_recording
 from tendonfmu.recordings.smoothing import Signals
 from tendonfmu.report.numbers import rounded, together
 from tendonfmu.tasks.steps import Steps
@@ -90,8 +92,122 @@ def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Ca
     report = calibrated[0].report
     assert report["structure"]["verdict"] == "explained"
     assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
-    rms = {name: together(report["error"][name]) for name in ("bias_only", "as_given", "fitted", "calibrated")}
-    assert rms["bias_only"] > rms["as_given"] > rms["fitted"] > 1.2 * rms["calibrated"]
+    assert together(report["error"]["as_given"]) > 1.4 * together(report["error"]["calibrated"])
+
+
+# --- the figures are those of the delivered FMU -----------------------------------------------------------------------
+
+
+def rms_by_run(call: Call, model: Path, recording: Path, output: Path, chosen: NDArray[np.bool_]) -> list[float]:
+    """What `tendonfmu run` leaves of the chosen samples [N], by joint (N·m)."""
+    answer = call("run", model, recording, "-o", output)
+    assert answer.status == 0, answer.err
+    with output.open(encoding="utf-8") as table:
+        names = table.readline().strip().split(",")
+    columns = dict(zip(names, np.loadtxt(output, delimiter=",", skiprows=1).T, strict=True))
+    joints = sum(name.startswith("compensated_torque[") for name in names)
+    left = np.column_stack([columns[f"compensated_torque[{j + 1}]"] for j in range(joints)])[chosen]
+    return [float(value) for value in np.sqrt(np.mean(left**2, axis=0))]
+
+
+def every_fifth(time: Numbers) -> NDArray[np.bool_]:
+    """[N] the blocks 4, 9, ... of a recording without a gap: of 10 s, of a short one a tenth of it."""
+    since = time - time[0]
+    return np.asarray(np.floor(since / min(10.0, 0.1 * since[-1])) % 5 == 4)
+
+
+def test_the_errors_on_a_test_are_those_of_the_fmu(
+    call: Call, calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path
+) -> None:
+    """Over the whole recording, and by pretension: the parts of it have the same sum of squares."""
+    error = calibrated[0].report["error"]
+    chosen = np.ones(len(read_recording(folder / UNSEEN)), dtype=bool)
+    for name, model in (("calibrated", calibrated[1] / "finger.fmu"), ("as_given", folder / FINGER)):
+        found = rms_by_run(call, model, folder / UNSEEN, tmp_path / f"{name}.csv", chosen)
+        assert found == pytest.approx(error[name], rel=1e-9)
+        parts = sum(each["minutes"] * np.square(each[name]) for each in error["pretensions"])
+        assert np.sqrt(parts / error["minutes"]) == pytest.approx(error[name], rel=1e-9)
+    assert error["minutes"] == pytest.approx(40.0 / 60.0, rel=1e-3) and not error["held_out"]
+    forces = [each["mean_force"] for each in error["pretensions"]]
+    assert len(forces) == 2 and forces[0] < 13.0 < 17.0 < forces[1], "as the motion was made"
+
+
+@pytest.fixture(scope="module")
+def short(folder: Path) -> Path:
+    """24 s of the free motion."""
+    read_recording(folder / FREE)[:24.0].write(folder / "short.parquet")
+    return folder / "short.parquet"
+
+
+@pytest.fixture(scope="module")
+def alone(folder: Path, short: Path) -> tuple[Calibration, Path]:
+    """The result without a test, and its folder."""
+    found = calibrate(folder / FINGER, [short], folder / "alone")
+    write_calibration(found, folder / "alone")
+    return found, folder / "alone"
+
+
+def test_the_errors_on_held_out_stretches_are_those_of_the_fmu(
+    call: Call, alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
+) -> None:
+    error = alone[0].report["error"]
+    chosen = every_fifth(read_recording(short).time)
+    for name, model in (("calibrated", alone[1] / "finger.fmu"), ("as_given", folder / FINGER)):
+        found = rms_by_run(call, model, short, tmp_path / f"{name}.csv", chosen)
+        assert found == pytest.approx(error[name], rel=1e-9)
+    assert error["held_out"] and error["minutes"] == pytest.approx(0.2 * 24.0 / 60.0, rel=0.01)
+
+
+def test_no_held_out_sample_chooses_anything(
+    alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
+) -> None:
+    """With other forces there, structure, numbers and bias are the same to the last bit, and only the figures change.
+
+    The least squares of `contact.uncertainty` end in a flat valley, so the same call gives it, and what follows from
+    it, only to some 1e-4.
+    """
+    recording = read_recording(short)
+    rows = np.flatnonzero(every_fifth(recording.time))
+    force = recording.groups["tendon_force"].copy()
+    force[rows] = 1.5 * force[np.random.default_rng(1).permutation(rows)]
+    replace(recording, groups={**recording.groups, "tendon_force": force}).write(tmp_path / "short.parquet")
+    other = calibrate(folder / FINGER, [tmp_path / "short.parquet"], tmp_path / "out")
+    found = alone[0]
+    assert {**other.data, "contact": None} == {**found.data, "contact": None}
+    assert listed(other.data["contact"]) == pytest.approx(listed(found.data["contact"]), rel=1e-3, abs=1e-5)
+    assert other.report["structure"] == found.report["structure"] and other.report["next"] == found.report["next"]
+    assert listed(other.report["detection"]) == pytest.approx(listed(found.report["detection"]), rel=1e-3, abs=1e-5)
+    assert min(other.report["error"]["calibrated"]) > 2.0 * max(found.report["error"]["calibrated"])
+
+
+def listed(content: Any) -> list[float]:
+    """All numbers of JSON, in order."""
+    if isinstance(content, dict | list):
+        return [
+            number for each in (content.values() if isinstance(content, dict) else content) for number in listed(each)
+        ]
+    return [float(content)] if isinstance(content, int | float) else []
+
+
+def test_a_test_chooses_nothing(calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path) -> None:
+    """Of the numbers; the diagnosis and the thresholds are told by what they are given."""
+    columns, _ = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
+    columns = {name: 1.2 * values if "force" in name else values for name, values in columns.items()}
+    kept = {name: values for name, values in columns.items() if name.startswith(("time", "tendon"))}
+    write_table(tmp_path / "loaded.parquet", kept)
+    shutil.copytree(calibrated[1] / ".steps", tmp_path / "out" / ".steps")
+    shutil.copytree(calibrated[1] / "diagnosis", tmp_path / "out" / "diagnosis")
+    other = calibrate(folder / FINGER, [folder / FREE], tmp_path / "out", tests=[tmp_path / "loaded.parquet"])
+    assert other.report["steps"]["repeated"] == ["diagnosis", "fit", "tune"], "no step knows the test"
+    assert other.data == calibrated[0].data
+    assert min(other.report["error"]["calibrated"]) > 1.5 * max(calibrated[0].report["error"]["calibrated"])
+
+
+def test_false_alarms_are_counted_on_the_same_motion(calibrated: tuple[Calibration, Path], folder: Path) -> None:
+    recording = read_recording(folder / UNSEEN)
+    contact = Instance(read_finger(calibrated[1] / "finger.json").image).run(recording.arrays())["contact"].ravel()
+    starts = recording.time[1:][np.diff(contact.astype(int)) == 1]
+    assert calibrated[0].report["alarms"]["alarms"] == 1 + int((np.diff(starts) > 0.2).sum()) > 0
 
 
 def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Path], folder: Path) -> None:
@@ -103,14 +219,16 @@ def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Pat
     start = described(read_finger(calibrated[1] / "finger.json"), data)
     free = [prepare(start, read_recording(folder / FREE), 1, Held())]
     found = fit_all(start, free, Signals(30.0, 1), FitSettings(), given=data, seed=0)
-    wrong, right = (together(errors_of(each, free, False)) for each in (data, found.data))
-    assert right < 0.9 * wrong and "uncertainty" in found.data["contact"]
+    wrong, right = (squared_residual(each, free) for each in (data, found.data))
+    assert right < 0.8 * wrong and "uncertainty" in found.data["contact"]
 
 
 def test_pushes_are_found(calibrated: tuple[Calibration, Path], folder: Path) -> None:
+    """With no more false alarms than in the same motion without them."""
     pushes = calibrated[0].report["pushes"]
     _, count = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
-    assert pushes["events"] == count and pushes["found"] >= 0.9 * count and pushes["false_alarms"] == 0
+    assert pushes["events"] == count and pushes["found"] >= 0.9 * count
+    assert pushes["false_alarms"] <= calibrated[0].report["alarms"]["alarms"]
     assert sum(each["events"] for each in pushes["sizes"]) == count
     assert sum(each["found"] for each in pushes["sizes"]) == pushes["found"]
     assert pushes["sizes"][-1]["from"] == 6.0, "they are large"
@@ -212,7 +330,7 @@ def test_an_earlier_calibration_is_the_prior_of_little_data(
     )
     write_calibration(again, tmp_path / "again")
     error = again.report["error"]
-    assert together(error["calibrated"]) <= together(error["previous"]) < together(error["bias_only"])
+    assert together(error["calibrated"]) <= 1.01 * together(error["previous"]) < 0.005
     assert "gravity" in json.dumps(again.data["extensions"]) and again.report["structure"]["causes"] == []
     page = (tmp_path / "again" / "calibration.html").read_text(encoding="utf-8")
     assert "the earlier calibration" in page and "diagnosis.html" not in page
@@ -326,44 +444,66 @@ def test_the_shown_push_is_a_found_one(calibrated: tuple[Calibration, Path]) -> 
 
 
 def test_long_recordings_are_diagnosed_in_part_and_judged_on_another() -> None:
-    free = [motion(500.0), motion(1000.0, "b.parquet")]
-    seen, judged = stretches_for_diagnosis(free, [])
-    assert sum(each.time[-1] - each.time[0] for each in seen) == pytest.approx(DIAGNOSED, abs=1.0)
-    assert sum(each.time[-1] - each.time[0] for each in judged) == pytest.approx(JUDGED, abs=16.0)
+    """A gap does not count: so much motion is in the stretches."""
+    gap = motion(1100.0, "b.parquet")
+    gap = at_rows(gap, (gap.time < 20.0) | (gap.time >= 120.0))
+    seen, judged = stretches_for_diagnosis([motion(500.0), gap])
+    assert sum(0.1 * len(each) for each in seen) == pytest.approx(DIAGNOSED, abs=1.0)
+    assert sum(0.1 * len(each) for each in judged) == pytest.approx(JUDGED, abs=16.0)
     for one, other in zip(seen, judged, strict=False):
         assert not set(one.time) & set(other.time) or one.path.stem[0] != other.path.stem[0]
-    assert seen[0].path.name == "a, 0 to 30 s.parquet"
+    assert [each.path.name for each in seen] == ["a, 0 to 30 s.parquet", "b, 0 to 160 s.parquet"]
 
 
 def test_short_recordings_are_diagnosed_whole() -> None:
     free = [motion(100.0)]
-    assert stretches_for_diagnosis(free, []) == (free, [])
-    seen, judged = stretches_for_diagnosis(free, [motion(30.0, "t.parquet")])
-    assert len(judged[0].time) == 300 and seen[0].time[-1] == pytest.approx(DIAGNOSED, abs=0.2)
+    assert stretches_for_diagnosis(free) == (free, [])
 
 
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
-def report(given: float, calibrated: float, causes: int, limit: float | None) -> dict[str, Any]:
+def report(given: float, calibrated: float, causes: int, limit: float | None, alarms: int = 0) -> dict[str, Any]:
+    pretension = {"mean_force": 10.0, "as_given": [given, given], "calibrated": [0.5 * calibrated, calibrated]}
     return {
-        "error": {"as_given": [given, given], "calibrated": [calibrated, calibrated]},
+        "joints": ["mcp", "pip"],
+        "error": {
+            "as_given": [given, given],
+            "calibrated": [calibrated, calibrated],
+            "pretensions": [
+                pretension,
+                pretension | {"mean_force": 20.0, "calibrated": [calibrated, 1.5 * calibrated]},
+            ],
+        },
         "structure": {"causes": [{}] * causes},
-        "detection": {"held_out": {"limit": limit, "alarms": 0, "minutes": 27.0}},
+        "alarms": {"limit": limit, "alarms": alarms, "minutes": 27.0, "interval": [2.0 * alarms, 9.0]},
+        "detection": {
+            "minutes": 100.0,
+            "tuned_for_per_hour": 6.0,
+            "confidence": 0.9,
+            "smallest_torque": {"median": [0.01, 0.02]},
+        },
+        "pushes": None,
     }
 
 
 def test_the_verdict_is_one_sentence_with_the_figures() -> None:
     tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
     assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence
-    assert "No false alarms in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
-    unknown = report(0.0142, 0.00614, 3, None)
-    unknown["detection"] |= {"confidence": 0.9, "smallest_torque": {"median": [0.01]}}
-    assert verdict(unknown)[1].endswith("27 min of free motion.")
-    values = list(tiles(unknown | {"pushes": None, "error": unknown["error"] | {"held_out": True}}))
-    assert values[1] == ("0", "in 27 min", "false alarms in free motion")
+    assert "No false alarm in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
+    assert verdict(report(0.0142, 0.00614, 3, None))[1].endswith("27 min of that motion.")
+    assert "more than the 6 that the thresholds were chosen for" in verdict(report(0.0142, 0.00614, 3, 22.0, 4))[1]
     tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
     assert tone == "bad" and "no better" in sentence
+    tone, sentence = verdict(report(0.0065, 0.006, 0, 5.33))
+    assert tone == "" and "larger at pip at 20 N: 6.50 before, 9.00 now" in sentence
+
+
+def test_tiles_show_the_worst_joint() -> None:
+    values = list(tiles(report(0.0142, 0.00614, 3, None)))
+    assert values[0][0] == "14.2 → 6.14" and values[1][0] == "14.2 → 9.21" and "pip at 20 N" in values[1][2]
+    assert values[2][:2] == ("0", "in 27 min") and "tuned for 6 an hour on 100 min of other motion" in values[2][2]
+    assert values[3][0] == "20.0" and "at pip" in values[3][2]
 
 
 def test_pushes_are_told_by_size() -> None:

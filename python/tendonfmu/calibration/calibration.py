@@ -1,5 +1,8 @@
 """From recordings of free motion to a tuned finger: structure, numbers, thresholds, and their errors.
 
+All three are chosen on the same motion. The tests, or else every fifth stretch of 10 s, are cut out before anything
+else and choose nothing: on them the finished finger runs as it is delivered.
+
 Its steps are those of `diagnose`, of a fit to all recordings, of `tune` and of `score`, in this order. Their results
 stay in the folder, so that a repeated call continues where the previous one ended.
 
@@ -21,31 +24,31 @@ from time import perf_counter
 from typing import Any
 
 from tendonfmu.arrays import Data
+from tendonfmu.calibration.delivered import Delivered, Judged, compared, typical_motion, without_held_out
 from tendonfmu.calibration.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.report import (
     OF_PUSH,
     OF_SCORE,
-    errors_of,
     left_out,
     record_next,
     recording_of,
     structure_of,
     tuning_of,
-    typical_motion,
     typical_push,
 )
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
-from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose
+from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose, squared_residual
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once, check_unseen, described
-from tendonfmu.files import finite, write_text
+from tendonfmu.files import finite, percent, write_text
 from tendonfmu.model import Finger, description_text, read_finger
 from tendonfmu.options import CalibrateOptions, ScoreOptions
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
     Held,
+    Recording,
     Signals,
     admit,
     learn_routing,
@@ -55,15 +58,16 @@ from tendonfmu.recordings import (
     routed,
     routing_entry,
 )
-from tendonfmu.report import MotionShown, PushShown, diagnosis_page, together, write_diagnosis
+from tendonfmu.report import MotionShown, PushShown, diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
 Options = CalibrateOptions  # its name in earlier versions
 USUAL = CalibrateOptions()
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
-HELD = Held(0.2, 10.0)  # part of the recordings to measure the errors on if there are no tests
+HELD = Held(0.2, 10.0)  # part of the recordings that chooses nothing and is judged on if there are no tests
 BIAS_TIME = 2.0  # s: a fitted model needs no faster bias, and that learns pushes (docs/evidence/detection.md)
+TUNED = ("bias", "contact", "sensor_fault")  # what `tune` learns
 NOTHING_ASKED: dict[str, Any] = {
     "verdict": "not done: the structure is that of the earlier calibration",
     "causes": [],
@@ -92,6 +96,7 @@ class Calibration:
     diagnosis: Diagnosis | None
     shown: MotionShown  # what it leaves of a typical stretch of unseen motion
     push: PushShown | None  # a typical push of those that it finds
+    folder: Path  # of its steps and the diagnosis
 
 
 def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
@@ -126,8 +131,8 @@ def calibrate(
     folder
         Folder for the results of the steps and the page of the diagnosis.
     tests
-        Free motion to measure the errors on. Without it, that is every fifth stretch of 10 s of `free`, which no number
-        is fitted to.
+        Free motion to measure the errors on. Without it, that is every fifth stretch of 10 s of `free`, which is then
+        used for nothing else.
     pushes
         Recordings with labelled contact, to count what is found.
     previous
@@ -147,6 +152,8 @@ def calibrate(
     ------
     InputError
         A file or an option does not allow a calibration.
+    KeyboardInterrupt
+        Says which steps are done and kept in the folder.
     """
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
@@ -156,10 +163,10 @@ def calibrate(
             Path(finger), earlier, [[Path(file) for file in files] for files in (free, tests, pushes)], options
         )
     run = _Run(case, Path(folder), options, phases)
-    report, data = run.report()
+    report, data, shown = run.report()
     report["seconds"] = perf_counter() - begun
-    shown = typical_motion(case.finger.data, data, case.judged, not case.tests)
-    return Calibration(data, {key: finite(value) for key, value in report.items()}, run.diagnosed, shown, run.push)
+    report = {key: finite(value) for key, value in report.items()}
+    return Calibration(data, report, run.diagnosed, shown, run.push, Path(folder))
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
@@ -171,32 +178,29 @@ class _Case:
 
     finger: Finger
     previous: Path | None
-    free: list[FitRecording]
-    tests: list[FitRecording]
+    free: list[FitRecording]  # what numbers, structure and thresholds are chosen on
+    whole: list[FitRecording]  # the same recordings with what is held out of them
+    judged: Judged
     pushes: list[Path]
     sentences: list[str]
     routing: dict[str, Any] | None  # what was learned of it; None if it is as described
 
     @property
-    def judged(self) -> list[FitRecording]:
-        return self.tests or self.free
+    def tests(self) -> Sequence[FitRecording]:
+        return () if self.judged.held_out else self.judged.recordings
 
     @property
     def made_from(self) -> dict[str, Any]:
         from tendonfmu import __version__
 
-        files = [recording.path for recording in (*self.free, *self.tests)]
+        files = [recording.path for recording in self.free]
         return {
             "version": __version__,
             "finger": digest_of({"data": self.finger.data}),
             "previous": None if self.previous is None else digest_of_file(self.previous),
             "recordings": [(file.name, digest_of_file(file)) for file in files],
-            "tests": len(self.tests),
+            "held_out": [HELD.share, HELD.block] if self.judged.held_out else None,
         }
-
-    def errors(self, data: Data | None) -> list[float]:
-        """Return [n] the error of a description on unseen motion (N·m); that of the bias alone if None."""
-        return errors_of(data, self.judged, not self.tests, self.finger.data if data is None else None)
 
 
 def _finger(file: Path, previous: Path | None) -> Finger:
@@ -215,25 +219,30 @@ def _finger(file: Path, previous: Path | None) -> Finger:
 
 
 def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], options: CalibrateOptions) -> _Case:
-    free, tests, pushes = recordings
+    given_free, tests, pushes = recordings
     finger = _finger(file, previous)
-    if not free:
+    if not given_free:
         raise InputError("no recording; expected at least one of free motion")
-    check_given_once(free, tests, "a test")
-    check_given_once(free, pushes, "one with pushes")
-    read, others, touched = ([read_recording(path) for path in group] for group in (free, tests, pushes))
+    check_given_once(given_free, tests, "a test")
+    check_given_once(given_free, pushes, "one with pushes")
+    read, others, touched = ([read_recording(path) for path in group] for group in recordings)
     for recording in (*read, *others):
         require_no_contact(recording)
-    given, learned = finger, learn_routing(finger, [*read, *others])
+    held = None if tests else HELD
+    used = read if held is None else [without_held_out(recording, held) for recording in read]
+    given, learned = finger, learn_routing(finger, used)
     finger, moved = routed(given, learned)
     routing = routing_entry(given, learned) if moved or any(each.varying for each in learned) else None
     sentences = admit(finger, [*read, *others, *touched], unfit=UNFIT_FOR_SEARCH)
-    held = Held() if tests else HELD
-    seen = [prepare(finger, recording, options.kinematics, held) for recording in read]
-    unseen = [prepare(finger, recording, options.kinematics, Held()) for recording in others]
-    require_noise(finger, seen)
+
+    def prepared(listed: Sequence[Recording], apart: Held | None = None) -> list[FitRecording]:
+        return [prepare(finger, recording, options.kinematics, apart or Held()) for recording in listed]
+
+    free, whole = prepared(used), prepared(read, held)
+    judged = Judged(whole, True) if held else Judged(prepared(others), False)
+    require_noise(finger, free)
     check_unseen(read, others)
-    return _Case(finger, previous, seen, unseen, pushes, sentences, routing)
+    return _Case(finger, previous, free, whole, judged, pushes, sentences, routing)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -249,8 +258,8 @@ class _Run:
         self.diagnosed: Diagnosis | None = None
         self.push: PushShown | None = None
 
-    def report(self) -> tuple[dict[str, Any], Data]:
-        """Return the report, and the calibrated description."""
+    def report(self) -> tuple[dict[str, Any], Data, MotionShown]:
+        """Return the report, the calibrated description, and what it leaves of a typical stretch."""
         case, steps = self._case, self._steps
         if case.previous is None:
             page = self._folder / DIAGNOSIS / diagnosis_page.PAGE
@@ -262,29 +271,30 @@ class _Run:
         tuned = self._step(
             "thresholds of contact", "tune", _of_alarms(self._options), lambda step: self._tune(fitted, step)
         )
+        before, after = (Delivered(data, case.judged) for data in (case.finger.data, tuned["finger"]))
+        error = compared(before, after, case.judged, "previous" if case.previous else "as_given")
         pushed = None
         if case.pushes:
             files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
-            pushed = self._step(
-                "pushes", "score", files, lambda step: self._score(tuned, fitted["error"]["calibrated"], step)
-            )
-            example = pushed.pop("example", None)  # earlier folders have none
+            pushed = self._step("pushes", "score", files, lambda step: self._score(tuned, error["calibrated"], step))
+            example = pushed.pop("example")
             self.push = None if example is None else PushShown(**example)
         report = {
             "format": FORMAT,
             "finger": case.finger.name,
             "joints": case.finger.joint_names,
-            "recordings": [recording_of(recording) for recording in case.free],
+            "recordings": [recording_of(recording) for recording in case.whole],
             "tests": [recording_of(recording) for recording in case.tests],
             "routing": case.routing,
-            "error": fitted["error"],
+            "error": error,
+            "alarms": after.alarms(self._options.confidence),
             "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
             "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
             "pushes": pushed,
             "next": list(record_next(lacks, tuned)),
             "warnings": [
                 *case.sentences,
-                *(f"{each.path.name}: {text}" for each in (*case.free, *case.tests) for text in each.warnings),
+                *(f"{each.path.name}: {text}" for each in (*case.whole, *case.tests) for text in each.warnings),
                 *lacks["warnings"],
                 *fitted["warnings"],
                 *tuned["warnings"],
@@ -293,7 +303,7 @@ class _Run:
             "options": {**_of_all(self._options), **_of_alarms(self._options)},
             "steps": {"seconds": self._seconds, "repeated": steps.repeated},
         }
-        return report, tuned["finger"]
+        return report, tuned["finger"], typical_motion(before, after, case.judged)
 
     def _step(
         self,
@@ -305,15 +315,19 @@ class _Run:
     ) -> dict[str, Any]:
         begun = perf_counter()
         with self._phases.start(words, 100) as step:
-            result = self._steps.result(name, made_from, lambda: compute(lambda share: step(int(100 * share))), page)
+            try:
+                result = self._steps.result(
+                    name, made_from, lambda: compute(lambda share: step(int(100 * share))), page
+                )
+            except KeyboardInterrupt:
+                done = f"{', '.join(self._seconds)} done" if self._seconds else "no step done yet"
+                raise KeyboardInterrupt(f"{done}; the same call goes on from there, with {self._folder}") from None
         self._seconds[name] = perf_counter() - begun
         return result
 
     def _diagnosis(self, step: Callable[[float], None]) -> dict[str, Any]:
         case, options = self._case, self._options
-        seen, judged = stretches_for_diagnosis(
-            [each.recording for each in case.free], [each.recording for each in case.tests]
-        )
+        seen, judged = stretches_for_diagnosis([each.recording for each in case.free])
 
         def show(state: PhaseState) -> None:
             part = state.done / state.total if state.total else 0.0
@@ -334,63 +348,53 @@ class _Run:
         return structure_of(diagnosis)
 
     def _fit(self, lacks: dict[str, Any]) -> dict[str, Any]:
-        case = self._case
-        smoothed = Signals(**lacks["smoothing"])
-        extended = self._fitted(lacks, "extended", smoothed)
-        # without presliding, raw signals often serve the given structure better: it gets the better ones
-        nominal = [case.errors(self._fitted(lacks, "nominal", signals).data) for signals in {smoothed, Signals()}]
-        error = {
-            "held_out": not case.tests,
-            "bias_only": case.errors(None),
-            "as_given": case.errors(case.finger.data),
-            "fitted": min(nominal, key=together),
-            "calibrated": case.errors(extended.data),
-        }
-        return {"finger": extended.data, "error": error, "warnings": [*extended.warnings, *left_out(extended.events)]}
+        """Fit the extended description to all recordings, and to four fifths of them."""
+        case, options = self._case, self._options
+
+        def fitted(recordings: Sequence[FitRecording]) -> CalibratedFit:
+            return fit_all(
+                described(case.finger, lacks["extended"]),
+                recordings,
+                Signals(**lacks["smoothing"]),
+                FitSettings(threads=options.jobs, path=case.finger.path),
+                given=case.finger.data,
+                seed=options.seed,
+                only_sliding=lacks["fits_sliding"],
+            )
+
+        whole, most = fitted(case.free), fitted(self._most())
+        return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
 
     def _refit(self) -> dict[str, Any]:
-        """Fit with the previous numbers as the prior; keep those if the new ones are no better on unseen motion."""
-        case, options = self._case, self._options
-        fitted = fit_again(
-            case.finger,
-            case.previous or Path(),
-            case.free,
-            share=0.0 if case.tests else HELD.share,
-            kinematics=options.kinematics,
-            threads=options.jobs,
-        )
-        before, after = case.errors(case.finger.data), case.errors(fitted.data)
-        error = {"held_out": not case.tests, "bias_only": case.errors(None), "previous": before, "calibrated": after}
-        if sum(value**2 for value in after) <= sum(value**2 for value in before):
-            return {"finger": fitted.data, "error": error, "warnings": list(fitted.warnings)}
+        """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
+        case, inner = self._case, self._most()
+        most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
+        flags = [each.held_out for each in inner]
+        before, after = (squared_residual(data, inner, flags) for data in (case.finger.data, most.data))
+        if after <= before:
+            whole = self._fitted_again([each.recording for each in case.free])
+            return {"finger": whole.data, "most": most.data, "warnings": list(whole.warnings)}
         kept = (
-            f"the new numbers leave an error of {1e3 * together(after):.3g} mN·m on unseen motion, "
-            f"the earlier ones {1e3 * together(before):.3g}: the earlier ones are kept"
+            f"fitted to four fifths of the motion, new numbers leave {percent((after / before) ** 0.5 - 1.0)} more of "
+            "the last fifth than the earlier ones: the earlier ones are kept"
         )
-        return {
-            "finger": case.finger.data,
-            "error": {**error, "calibrated": before},
-            "warnings": [*fitted.warnings, kept],
-        }
+        return {"finger": case.finger.data, "most": case.finger.data, "warnings": [*most.warnings, kept]}
 
-    def _fitted(self, lacks: dict[str, Any], name: str, signals: Signals) -> CalibratedFit:
-        """Fit the nominal or the extended description to all recordings."""
+    def _most(self) -> list[FitRecording]:
+        """Return the motion to choose on with a fifth set apart, which shows what a fit leaves of other motion."""
+        finger, kinematics = self._case.finger, self._options.kinematics
+        return [prepare(finger, each.recording, kinematics, HELD) for each in self._case.free]
+
+    def _fitted_again(self, recordings: Sequence[Recording]) -> CalibratedFit:
         case, options = self._case, self._options
-        return fit_all(
-            described(case.finger, lacks[name]),
-            case.free,
-            signals,
-            FitSettings(threads=options.jobs, path=case.finger.path),
-            given=case.finger.data,
-            seed=options.seed,
-            uncertainty=name == "extended",
-            only_sliding=name == "extended" and lacks.get("fits_sliding", False),  # earlier folders do not say
-        )
+        assert case.previous is not None
+        return fit_again(case.finger, case.previous, recordings, kinematics=options.kinematics, threads=options.jobs)
 
     def _tune(self, fitted: dict[str, Any], step: Callable[[float], None]) -> dict[str, Any]:
+        """Choose thresholds with the numbers of most motion, which does not fit the rest better than other motion."""
         case, options = self._case, self._options
         tuning = ContactTuning(
-            described(case.finger, fitted["finger"]),
+            described(case.finger, fitted["most"]),
             false_alarms_per_hour=options.false_alarms_per_hour,
             confidence=options.confidence,
             kinematics=options.kinematics,
@@ -399,8 +403,14 @@ class _Run:
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TuneWarning)  # the report lists them
-            tuning.tune([each.recording for each in (*case.free, *case.tests)], checked=True)
-        return tuning_of(tuning)
+            tuning.tune([each.recording for each in case.free], checked=True)
+        report = tuning_of(tuning)
+        tuned = {key: report["finger"].get(key) for key in TUNED}
+        start = (fitted["finger"].get("bias") or {}).get("initial_torque")
+        if start is not None:
+            tuned["bias"] = {**tuned["bias"], "initial_torque": start}
+        kept = {key: value for key, value in fitted["finger"].items() if key not in TUNED}
+        return {**report, "finger": {**kept, **{key: value for key, value in tuned.items() if value is not None}}}
 
     def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
         file = self._folder / FOLDER / "tuned.json"

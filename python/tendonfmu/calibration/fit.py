@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tendonfmu.arrays import Data
+from tendonfmu.detect import sample_seconds
 from tendonfmu.diagnosis import (
     Event,
     FitSettings,
@@ -42,7 +43,7 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
-from tendonfmu.recordings import FitRecording, Recording, Signals
+from tendonfmu.recordings import FitRecording, Recording, Signals, at_rows
 
 DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
 JUDGED = 45.0  # s, in all, to judge it on
@@ -67,7 +68,6 @@ def fit_all(
     *,
     given: Data,
     seed: int,
-    uncertainty: bool = True,
     only_sliding: bool = False,
 ) -> CalibratedFit:
     """Fit a diagnosed finger to all recordings of free motion, or only where everything slides if that is better.
@@ -88,7 +88,7 @@ def fit_all(
         structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
         result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
         online = replace(result, data=signals.restored(result.data, finger.data))
-        if uncertainty and np.isfinite(learned.covariance).all():
+        if np.isfinite(learned.covariance).all():
             judged = [evaluate(data, result.data, recording) for recording in kept]
             directions, _ = parameter_uncertainty(structure, learned, result.data, judged)
             level = (finger.data["contact"] or {}).get("uncertainty_level")
@@ -115,40 +115,34 @@ def earlier_finger(given: Finger, previous: Path) -> Finger:
 
 
 def fit_again(
-    finger: Finger, previous: Path, recordings: Sequence[FitRecording], *, share: float, kinematics: int, threads: int
+    finger: Finger, previous: Path, recordings: Sequence[Recording], *, kinematics: int, threads: int
 ) -> CalibratedFit:
     """Fit an earlier calibration to new motion; its values and their uncertainty are the prior. Raises InputError."""
-    fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, holdout=share, threads=threads)
+    fitting = FrictionFit(finger, previous=previous, kinematics=kinematics, threads=threads)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # the report lists them
-        fitting.fit([recording.recording for recording in recordings], checked=True)
+        fitting.fit(list(recordings), checked=True)
     return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))
 
 
 # --- the stretches that a diagnosis uses ------------------------------------------------------------------------------
 
 
-def stretches_for_diagnosis(
-    free: Sequence[Recording], tests: Sequence[Recording]
-) -> tuple[list[Recording], list[Recording]]:
-    """Choose stretches of the recordings to find the structure in, and stretches to judge it on."""
+def stretches_for_diagnosis(free: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
+    """Choose stretches of the recordings to find the structure in, and others to judge it on, if there is enough."""
     whole = sum(map(_seconds, free))
-    if tests:
-        total = sum(map(_seconds, tests))
-        return _cut(free, 0.0, DIAGNOSED / whole), _cut(tests, 0.0, JUDGED / total)
     if whole < 2.0 * (DIAGNOSED + JUDGED):
         return list(free), []
     return _cut(free, 0.0, DIAGNOSED / whole), _cut(free, 0.5, JUDGED / whole)
 
 
 def _seconds(recording: Recording) -> float:
-    return float(recording.time[-1] - recording.time[0])
+    """Return the time that the samples stand for (s); gaps do not count."""
+    return float(sample_seconds(recording.time).sum())
 
 
 def _cut(recordings: Sequence[Recording], begin: float, share: float) -> list[Recording]:
-    """Cut a share of the time of each recording, from a share on; the whole recording if the share is 1 or more."""
-    if share >= 1.0:
-        return list(recordings)
+    """Cut a share of the time of each recording, from a share on."""
     stretches = [_stretch(each, begin, share) for each in recordings if share * _seconds(each) >= SHORTEST]
     if stretches:
         return stretches
@@ -157,15 +151,9 @@ def _cut(recordings: Sequence[Recording], begin: float, share: float) -> list[Re
 
 
 def _stretch(recording: Recording, begin: float, share: float) -> Recording:
-    first = recording.time[0] + begin * _seconds(recording)
-    last = first + share * _seconds(recording)
-    rows = slice(*(int(row) for row in np.searchsorted(recording.time, (first, last))))
-    beside = f"{recording.path.stem}, {first - recording.time[0]:.0f} to {last - recording.time[0]:.0f} s"
-    return replace(
-        recording,
-        path=Path(recording.path.with_name(beside + recording.path.suffix)),
-        time=recording.time[rows],
-        groups={name: values[rows] for name, values in recording.groups.items()},
-        contact=None if recording.contact is None else recording.contact[rows],
-        others={name: values[rows] for name, values in recording.others.items()},
-    )
+    seconds = np.cumsum(sample_seconds(recording.time))
+    rows = slice(*(int(row) for row in np.searchsorted(seconds, seconds[-1] * np.array([begin, begin + share]))))
+    stretch = at_rows(recording, rows)
+    first, last = stretch.time[[0, -1]] - recording.time[0]
+    beside = f"{recording.path.stem}, {first:.0f} to {last:.0f} s"
+    return replace(stretch, path=recording.path.with_name(beside + recording.path.suffix))

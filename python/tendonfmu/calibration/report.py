@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect import ContactTuning, Scored, contact_at_rest, tune_report
 from tendonfmu.diagnosis import Diagnosis, Event
-from tendonfmu.model import without_friction
-from tendonfmu.recordings import FitRecording, flagged_stretches, rms
-from tendonfmu.report import MotionShown, cards_of, names_of
+from tendonfmu.recordings import FitRecording
+from tendonfmu.report import cards_of, names_of
 
-SHOWN = 20.0  # s
 MOST_SAID = 2  # stretches that are named one by one
 BEFORE, AFTER, POINTS = 0.5, 1.0, 1000  # s around a push that is shown, and samples of it at most
 OF_TUNING = (
@@ -64,39 +61,6 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
         "extended": found.extended_data,
         "warnings": list(found.warnings),
     }
-
-
-def errors_of(
-    data: Data | None, recordings: Sequence[FitRecording], held_out: bool, settings: Data | None = None
-) -> list[float]:
-    """Compute [n] the rms of r on the samples that nothing was fitted to (N·m)."""
-    # With `data` None it is that without friction, with the bias of `settings`.
-    residual, masks = [], []
-    for recording in recordings:
-        left = recording.run(without_friction(settings or {}) if data is None else data).residual
-        residual.append(left)
-        masks.append((recording.held_out if held_out else recording.tracked) & np.isfinite(left).all(axis=1))
-    return list(rms(np.concatenate(residual), np.concatenate(masks)))
-
-
-def typical_motion(before: Data, after: Data, recordings: Sequence[FitRecording], held_out: bool) -> MotionShown:
-    """Return a stretch, of those that nothing was fitted to, whose error with the second model is the median."""
-    stretches: list[tuple[float, float, FitRecording, Flags, Numbers]] = []
-    for recording in recordings:
-        left, time = recording.run(after).residual, recording.time
-        known = np.asarray(np.isfinite(left).all(axis=1))
-        judged = known & (recording.held_out if held_out else recording.tracked)
-        for first, end in flagged_stretches(time, judged if judged.any() else known):
-            for begin in np.arange(first, end, SHOWN):
-                rows = (time >= begin) & (time <= min(end, begin + SHOWN))
-                stretches.append(
-                    (min(end - begin, SHOWN), float(np.mean(left[rows & known] ** 2)), recording, rows, left)
-                )
-    least = 0.5 * max(stretch[0] for stretch in stretches)
-    long = sorted((stretch for stretch in stretches if stretch[0] >= least), key=lambda stretch: stretch[1])
-    _, _, recording, rows, left = long[len(long) // 2]
-    given = recording.run(before).residual
-    return MotionShown(recording.path.name, recording.time[rows], recording.target[rows], given[rows], left[rows])
 
 
 def typical_push(scored: Scored) -> dict[str, Any] | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
-from tendonfmu.files import check_output, check_output_folder, counted, write_text
+from tendonfmu.files import check_output, check_output_folder, counted, whole_file, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
 from tendonfmu.report import (
@@ -23,6 +24,7 @@ from tendonfmu.report import (
     render,
     rounded,
     together,
+    write_diagnosis,
 )
 
 Report = Mapping[str, Any]
@@ -36,39 +38,72 @@ _WHAT = {
 }
 _DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how it was found"}
 MODELS = {
-    "bias_only": "no friction model, the bias alone",
     "as_given": "the description as given",
     "previous": "the earlier calibration",
-    "fitted": "its numbers fitted",
-    "calibrated": "calibrated",
 }
+WORSE = 1.05  # times the error before, from which on the error at a joint counts as larger
+
+
+class Place(NamedTuple):
+    """The errors of a joint at a pretension."""
+
+    joint: str
+    force: float  # mean force of the tendons, N
+    before: float  # N·m
+    after: float
+
+    @property
+    def words(self) -> str:
+        return f"{self.joint} at {self.force:.3g} N"
+
+
+def places(report: Report) -> list[Place]:
+    """Return the errors by pretension and joint."""
+    first = _first(report)
+    return [
+        Place(joint, each["mean_force"], before, after)
+        for each in report["error"]["pretensions"]
+        for joint, before, after in zip(report["joints"], each[first], each["calibrated"], strict=True)
+    ]
 
 
 def verdict(report: Report) -> tuple[str, str]:
-    """Judge a calibration."""
+    """Judge a calibration by what the delivered FMU leaves of motion that nothing was chosen on."""
     before, after = (together(report["error"][name]) for name in (_first(report), "calibrated"))
     less = 1.0 - after / before if before > 0 else 0.0
-    error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m"
     causes = len(report["structure"]["causes"])
     built = f", with {counted(causes, 'cause')} built into the model" if causes else ""
     if less < 0:
         return (
             "bad",
-            f"The calibrated model is no better than {MODELS[_first(report)]}: {mnm(before)} mN·m before, {mnm(after)} "
-            f"now. {alarms(report)}",
+            f"The calibrated finger is no better than {MODELS[_first(report)]} on unseen motion: {mnm(before)} mN·m "
+            f"before, {mnm(after)} now. {alarms(report)}",
         )
-    return "good" if less > 0.1 else "", f"{error}{built}. {alarms(report)}"
+    error = f"The error on unseen motion fell from {mnm(before)} to {mnm(after)} mN·m{built}."
+    worse = [place for place in places(report) if place.after > WORSE * place.before]
+    if worse:
+        most = max(worse, key=lambda place: place.after / place.before)
+        error += f" It is larger at {most.words}: {mnm(most.before)} before, {mnm(most.after)} now."
+    return "good" if less > 0.1 and not worse else "", f"{error} {alarms(report)}"
 
 
 def alarms(report: Report) -> str:
-    """Say how many false alarms there were in free motion, and what so much motion says of their rate."""
-    found = report["detection"]["held_out"]
-    counted_as = "no" if found["alarms"] == 0 else str(found["alarms"])
-    minutes = found["minutes"]
-    seen = f"{capital(counted_as)} false alarm{'s' * (found['alarms'] != 1)} in {minutes:.2g} min of free motion"
+    """Say how many false alarms there were in unseen motion, and what so much motion says of their rate."""
+    found, detection = report["alarms"], report["detection"]
+    many = "No false alarm" if found["alarms"] == 0 else capital(counted(found["alarms"], "false alarm"))
+    seen = f"{many} in {_long(found['minutes'])} of that motion"
     if found["limit"] is None:
         return f"{seen}."
-    return f"{seen}; so much motion cannot say more than: fewer than {found['limit']:.3g} an hour."
+    seen += f": with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+    if found["interval"][0] > detection["tuned_for_per_hour"]:
+        return f"{seen}, but more than the {detection['tuned_for_per_hour']:.3g} that the thresholds were chosen for."
+    return f"{seen}."
+
+
+def tuned_for(report: Report) -> str:
+    """Say for which rate of false alarms the thresholds were chosen, and on how much motion."""
+    detection = report["detection"]
+    return f"tuned for {detection['tuned_for_per_hour']:.3g} an hour on {_long(detection['minutes'])} of other motion"
 
 
 def _first(report: Report) -> str:
@@ -81,19 +116,35 @@ def mnm(value: float) -> str:
     return rounded(1e3 * value)
 
 
+def _long(minutes: float) -> str:
+    if minutes < 1.0:
+        return f"{60 * minutes:.0f} s"
+    return f"{minutes:.1f} min" if minutes < 10.0 else f"{minutes:.0f} min"
+
+
+def _fell(before: float, after: float) -> str:
+    return f"{mnm(before)} → {mnm(after)}"
+
+
 def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
-    """Yield (value, unit, meaning), the most important first."""
-    error, detection = report["error"], report["detection"]
-    found = detection["held_out"]
-    before, after = (mnm(together(error[name])) for name in (_first(report), "calibrated"))
-    data = "held-out parts" if error["held_out"] else "test recordings"
-    yield f"{before} → {after}", "mN·m", f"error on {data}, all joints: {MODELS[_first(report)]}, and calibrated"
-    meaning = "false alarms in free motion"
+    """Yield (value, unit, meaning), the most important first; of joints, the worst."""
+    error, detection, found = report["error"], report["detection"], report["alarms"]
+    first = _first(report)
+    whole = _fell(*(together(error[name]) for name in (first, "calibrated")))
+    yield whole, "mN·m", f"error of all joints: {MODELS[first]}, and calibrated"
+    if len(places(report)) > 1:
+        worst = max(places(report), key=lambda place: place.after)
+        yield _fell(worst.before, worst.after), "mN·m", f"the same where it is worst: {worst.words}"
+    meaning = "false alarms in the same motion"
     if found["limit"] is not None:
         meaning += f"; with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
-    yield str(found["alarms"]), f"in {found['minutes']:.2g} min", meaning
-    least = min(detection["smallest_torque"]["median"])
-    yield mnm(least), "mN·m", "smallest sudden change of a joint torque that is reported, half of the time"
+    yield str(found["alarms"]), f"in {_long(found['minutes'])}", f"{meaning}; {tuned_for(report)}"
+    least, joint = max(zip(detection["smallest_torque"]["median"], report["joints"], strict=True))
+    yield (
+        mnm(least),
+        "mN·m",
+        f"smallest sudden change of torque that is reported, half of the time, at {joint}, the worst",
+    )
     pushes = report["pushes"]
     if pushes is not None and pushes["events"]:
         delay = pushes["median_delay_s"]
@@ -101,14 +152,35 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
         yield f"{pushes['found']} of {pushes['events']}", "", f"labelled pushes found{late}"
 
 
+def error_headings(report: Report) -> Row:
+    """Return the headings of `error_rows`: a column per pretension, and all of them."""
+    forces = [f"at {each['mean_force']:.3g} N" for each in report["error"]["pretensions"]]
+    return ("mN·m", *forces, *(["all motion"] if len(forces) != 1 else []))
+
+
 def error_rows(report: Report) -> list[Row]:
-    """Return a row per model: rms by joint, and of all joints together (mN·m)."""
-    error = report["error"]
-    return [
-        (words, *(mnm(value) for value in error[name]), mnm(together(error[name])))
-        for name, words in MODELS.items()
-        if name in error
+    """Return a row per joint, and of all joints together: the error before and calibrated (mN·m), by pretension."""
+    error, first = report["error"], _first(report)
+    columns = error["pretensions"] if len(error["pretensions"]) == 1 else [*error["pretensions"], error]
+    rows = [
+        (joint, *(_fell(each[first][j], each["calibrated"][j]) for each in columns))
+        for j, joint in enumerate(report["joints"])
     ]
+    return [
+        *rows,
+        ("all joints", *(_fell(*(together(each[name]) for name in (first, "calibrated"))) for each in columns)),
+    ]
+
+
+def error_caption(report: Report) -> str:
+    """Say what the error is, and on which motion."""
+    error = report["error"]
+    data = "a fifth of the recordings" if error["held_out"] else "the test recordings"
+    return (
+        f"Error: rms of compensated_torque, what {FMU} feels although nothing touches the finger. Before is "
+        f"{MODELS[_first(report)]}. Both run over {data}, {_long(error['minutes'])} that chose no number, no structure "
+        "and no threshold."
+    )
 
 
 TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over seconds")
@@ -176,13 +248,12 @@ def push_sentence(report: Report) -> str:
     pushes = report["pushes"]
     alarms = pushes["false_alarms"]
     many = "no false alarm" if alarms == 0 else counted(alarms, "false alarm")
-    if after := pushes.get("false_alarms_after_events"):  # earlier folders do not say
+    if after := pushes["false_alarms_after_events"]:
         many += f" ({after} within 2 s after a push)"
     if not pushes["events"]:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
-    late = pushes.get("found_at_release")  # earlier folders do not say
-    late = f", {late} of them only as they end," if late else ""
-    share = (pushes.get("free_alarm_share") or {}).get("value")
+    late = f", {pushes['found_at_release']} of them only as they end," if pushes["found_at_release"] else ""
+    share = pushes["free_alarm_share"]["value"]
     on = "" if share is None else f", of which {100 * share:.2g} % are in alarm, most of it after pushes"
     return (
         f"{pushes['found']} of {pushes['events']} labelled pushes are found{late} with {many} in "
@@ -208,6 +279,7 @@ def push_rows(report: Report) -> list[Row]:
 def lines(report: Report) -> Iterator[str]:
     """Yield the lines for the terminal."""
     yield verdict(report)[1]
+    yield error_caption(report)
     yield from (report.get("routing") or {}).get("sentences", ())
     if report["pushes"] is not None:
         yield push_sentence(report)
@@ -217,7 +289,7 @@ def lines(report: Report) -> Iterator[str]:
 
 def tables(report: Report) -> Iterator[Table]:
     """Yield the tables."""
-    yield "error, rms in mN·m", ("model", *report["joints"], "all"), error_rows(report)
+    yield "error, before → calibrated, in mN·m", error_headings(report), error_rows(report)
     if report["structure"]["causes"]:
         yield (
             "built into the model",
@@ -256,10 +328,25 @@ def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]
     build_fmu(folder / FINGER, folder / FMU)
     write_text(folder / PAGE, calibration_page(calibration))
     written = files_of(calibration.report)
+    _write_diagnosis(calibration, folder / DIAGNOSIS)
     report = {**calibration.report, "files": list(written)}
     text = ",\n".join(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in report.items())
     write_text(folder / REPORT, f"{{\n{text}\n}}\n")
     return {folder / name: what for name, what in written.items()}
+
+
+def _write_diagnosis(calibration: Calibration, folder: Path) -> None:
+    """Write the diagnosis where the steps have not; that of an earlier call is copied."""
+    made = calibration.folder / DIAGNOSIS
+    if not calibration.report["structure"]["recordings"] or folder.absolute() == made.absolute():
+        return
+    if calibration.diagnosis is not None:
+        write_diagnosis(calibration.diagnosis, folder)
+        return
+    folder.mkdir(exist_ok=True)
+    for file in filter(Path.is_file, made.iterdir()):
+        with whole_file(folder / file.name) as copy:
+            shutil.copyfile(file, copy)
 
 
 def calibration_page(calibration: Calibration) -> str:
@@ -269,9 +356,8 @@ def calibration_page(calibration: Calibration) -> str:
     sheets = [motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]
     if calibration.push is not None:
         sheets.append(push_sheet(calibration.push))
-    pushed = report["pushes"] or {}
-    if pushed.get("list"):  # earlier folders have none
-        sheets.append(pushes_sheet(pushed["list"], pushed["false_alarm_list"]))
+    if pushed := report["pushes"] and report["pushes"]["list"]:
+        sheets.append(pushes_sheet(pushed, report["pushes"]["false_alarm_list"]))
     return render(
         "calibration.html.jinja",
         drawn(sheets),
@@ -281,10 +367,13 @@ def calibration_page(calibration: Calibration) -> str:
         verdict=sentence,
         headline_numbers=list(tiles(report)),
         errors=error_rows(report),
+        error_headings=list(error_headings(report)),
+        error_caption=error_caption(report),
         causes=cause_rows(report),
         torques=torque_rows(report),
         torque_headings=list(TORQUE_HEADINGS),
         sensors=sensor_sentence(report),
+        tuned=tuned_for(report),
         push=push_sentence(report) if report["pushes"] is not None else "",
         sizes=size_rows(report),
         every_push=push_rows(report),

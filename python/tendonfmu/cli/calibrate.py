@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeAtPretensions, Progress, command
-from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, say, say_files
+from tendonfmu.cli.console import INTERRUPTED, PhaseDisplay, fail, print_json, print_results, say, say_files
 from tendonfmu.cli.hand import show_outcome
 from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions
@@ -23,7 +24,7 @@ def calibrate(
     test: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FREE", help="free motion to measure the errors on; may be repeated [default: parts of FREE]"
+            metavar="FREE", help="free motion that only judges the result; may be repeated [default: parts of FREE]"
         ),
     ] = None,
     pushes: Annotated[
@@ -71,19 +72,25 @@ def calibrate(
     if scheduler is not None:
         raise InputError("--scheduler: given with a finger; expected a hand, whose fingers it computes")
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
-    with PhaseDisplay(progress) as display:
-        calibration = run(
-            finger,
-            recordings,
-            output,
-            tests=tests,
-            pushes=labelled,
-            previous=previous,
-            options=options,
-            progress=display,
-        )
-        display.note("writing the files")
-        written = write_calibration(calibration, output)
+    try:
+        with PhaseDisplay(progress) as display:
+            calibration = run(
+                finger,
+                recordings,
+                output,
+                tests=tests,
+                pushes=labelled,
+                previous=previous,
+                options=options,
+                progress=display,
+            )
+            display.note("writing the files")
+            written = write_calibration(calibration, output)
+    except KeyboardInterrupt as stopped:
+        if not stopped.args:  # while nothing was computed yet
+            raise
+        fail(f"interrupted; {stopped}")
+        sys.exit(INTERRUPTED)
     report = calibration.report
     if report["steps"]["repeated"]:
         say(f"unchanged since the last call, not repeated: {', '.join(report['steps']['repeated'])}")

@@ -4,8 +4,8 @@ Five chapters:
 
 - calibrate: a two-joint finger is calibrated on a minute of motion;
 - detect: pushes on an index finger are detected, which was calibrated on 27 min of motion;
-- diagnose: what the model of the two-joint finger lacked, which is unknown to the demo, and the gain on an unseen
-  recording;
+- diagnose: what the model of the two-joint finger lacked, which is unknown to the demo, and the gain on parts of the
+  recording that were not used for fitting;
 - fit: the numbers of the two-joint finger alone;
 - run: the FMU of the index finger runs over free motion.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
+from tendonfmu.calibration import text as calibration_text
 from tendonfmu.demo.run import ABDUCTION, FLEXION, FREE, FREE_X4, PUSHES, Curves, IndexFinger
 from tendonfmu.drawing import Bars, Curve, Dots, Interval, Panel, Sheet, line_of
 from tendonfmu.estimate import FitPicture
@@ -140,12 +141,15 @@ def _spaced(name: str) -> str:
 
 
 def calibration_sheet(report: Mapping[str, Any]) -> Sheet:
-    """Draw the error before and after the calibration, by joint."""
-    names = [*report["joints"], "all joints"]
-    models = ("bias_only", "as_given", "calibrated")
-    errors = [1e3 * np.array([*report["error"][model], together(report["error"][model])]) for model in models]
+    """Draw the error before and after the calibration, by pretension and joint, and of all joints."""
+    places, error = calibration_text.places(report), report["error"]
+    names = [*(place.words for place in places), "all"]
+    errors = [
+        1e3 * np.array([*(getattr(place, key) for place in places), together(error[model])])
+        for key, model in (("before", "as_given"), ("after", "calibrated"))
+    ]
     panel = _error_panel("On a recording that it has not seen", "mN·m", names, *errors)
-    keys = (("floor", "no friction model"), ("before_dots", "the description as given"), ("after_dots", "calibrated"))
+    keys = (("before_dots", "the description as given"), ("after_dots", "calibrated"))
     return Sheet("calibrate", "calibrate_error", "", keys, (panel,))
 
 
@@ -155,7 +159,7 @@ def fit_sheets(picture: FitPicture) -> Iterator[Sheet]:
     titles = ("On the training recording", "On a recording that it has not seen")
     for table, title in zip(residual_tables(picture), titles, strict=True):
         rows = table.rows[:-1]
-        errors = [np.array(column([getattr(row, key) for row in rows])) for key in ("bias_only", "start", "fitted")]
+        errors = [np.array(column([getattr(row, key) for row in rows])) for key in ("start", "fitted", "bias_only")]
         panels.append(_error_panel(title, table.unit, [row.name for row in rows], *errors))
     keys = (("floor", "no friction model"), ("before_dots", "before the fit"), ("after_dots", "fitted"))
     yield Sheet("fit", "fit_error", "", keys, panels)
@@ -165,21 +169,19 @@ def fit_sheets(picture: FitPicture) -> Iterator[Sheet]:
     yield Sheet("fit", "fit_laws", "", joints.keys, joints.panels)
 
 
-def _error_panel(title: str, unit: str, names: Sequence[str], none: Numbers, before: Numbers, after: Numbers) -> Panel:
-    """Draw the rms of each joint [k]: without a friction model, before, and after."""
+def _error_panel(title: str, unit: str, names: Sequence[str], before: Numbers, after: Numbers, *none: Numbers) -> Panel:
+    """Draw the rms of each joint [k]: before and after, and without a friction model if that is known."""
     places = np.arange(len(names), dtype=float)
+    styles = ("before_dots", "after_dots", "floor")
+    dots = [Dots(style, values, places) for style, values in zip(styles, (before, after, *none), strict=False)]
     return Panel(
         title=title,
-        alt=f"{title}: error by joint without a friction model, before, and after",
+        alt=f"{title}: error by joint before and after{', and without a friction model' if none else ''}",
         x_label=f"rms ({unit})",
         y_label="",
         bars=(Bars("data", places, np.minimum(before, after), np.maximum(before, after), lying=True),),
-        dots=(
-            Dots("floor", none, places),
-            Dots("before_dots", before, places),
-            Dots("after_dots", after, places),
-        ),
+        dots=tuple(reversed(dots)),
         rows=tuple(map(_spaced, names)),
-        x_limits=(0.0, 1.08 * float(np.nanmax([*before, *after, *none]))),
+        x_limits=(0.0, 1.08 * float(np.nanmax([before, after, *none]))),
         height=110 + 30 * len(names),
     )

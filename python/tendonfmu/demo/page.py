@@ -138,9 +138,9 @@ def _tile(story: Story, chapter: str) -> Tile:
     factor, unit = unit_of(diagnosis)
     before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
     if not diagnosis.causes:
-        return Tile(before, unit, "error on an unseen recording; no cause was found")
+        return Tile(before, unit, "error on held-out parts; no cause was found")
     cause = at_place(diagnosis.causes[0].title, diagnosis.causes[0].where, names_of(diagnosis))
-    meaning = f"error on an unseen recording: {percent(diagnosis.gain.value)} less with {cause}, found and built in"
+    meaning = f"error on held-out parts: {percent(diagnosis.gain.value)} less with {cause}, found and built in"
     return Tile(f"{before} → {after}", unit, meaning)
 
 

@@ -10,10 +10,10 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import contact_at_rest, score_report, tune_report
-    from .alarm_level import NotEnough, least_hours, rate_limit
+    from .alarm_level import NotEnough, least_hours, pretension_of, rate_limit
     from .bounds import tail_levels
     from .contact_bound import residual_and_bound
-    from .counting import GRACE, DetectionScore, Event, pooled, score_detection
+    from .counting import GRACE, DetectionScore, Event, pooled, sample_seconds, score_detection, stretches
     from .free_motion import SETTLING, FreeRun, free_parts
     from .reference_sensor import require_no_contact
     from .scoring import Scored, Subject, Track, run_track, score_recordings

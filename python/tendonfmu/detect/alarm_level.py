@@ -103,8 +103,8 @@ def cells_of(parts: Sequence[FreePart]) -> Cells:
     first = np.flatnonzero(np.diff(order, prepend=-1))
     size = np.diff(np.append(first, len(order)))
     mean_force = np.add.reduceat(force, first) / size
-    window = np.floor(time[first] / WINDOW).astype(np.int64) + _FAR * owner[first]
-    group, hours = _groups(mean_force, window), np.add.reduceat(seconds, first) / 3600.0
+    group = pretension_of(mean_force, time[first], owner[first])
+    hours = np.add.reduceat(seconds, first) / 3600.0
     fold = _recordings_by_turns(parts, owner[first], mean_force, group, hours)
     if fold is None:
         fold = np.floor(time[first] / _blocks(parts)[owner[first]]).astype(np.int64) % 2
@@ -144,9 +144,10 @@ def rows_of(values: Sequence[Signal], cells: Cells) -> Signal:
     return np.concatenate([signal[rows].T for signal, rows in zip(values, cells.rows, strict=True)], axis=1)
 
 
-def _groups(force: Numbers, window: Index) -> Index:
-    """Return [c] the pretension of each cell, in rising order: similar mean forces over `WINDOW` form one."""
-    _, inverse = np.unique(window, return_inverse=True)
+def pretension_of(force: Numbers, time: Numbers, owner: Index) -> Index:
+    """Return [c] the pretension of each force, in rising order: similar means over a `WINDOW` of an owner are one."""
+    # force: (N); time: (s); owner: recording, or part of one
+    _, inverse = np.unique(np.floor(time / WINDOW).astype(np.int64) + _FAR * owner, return_inverse=True)
     mean = np.maximum(np.bincount(inverse, force) / np.bincount(inverse), 1e-9)
     ordered = np.sort(mean)
     bounds = [ordered[0], *ordered[1:][ordered[1:] > SAME * ordered[:-1]], np.inf]

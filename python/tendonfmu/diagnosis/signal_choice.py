@@ -30,7 +30,16 @@ from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import View, bias_of, look, nominal_scale, predicted_of, series_of
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
-from tendonfmu.recordings import FitRecording, Held, Signals, joint_position_noise, prepare, smoothing_of, zero_phase
+from tendonfmu.recordings import (
+    FitRecording,
+    Held,
+    Signals,
+    at_rows,
+    joint_position_noise,
+    prepare,
+    smoothing_of,
+    zero_phase,
+)
 from tendonfmu.statistics import Grams, Products, make_folds
 
 NOISIEST = 1000.0  # rad; the largest noise that `position_filter` accepts
@@ -117,14 +126,7 @@ def part_of(given: Finger, recordings: Sequence[FitRecording]) -> Sequence[FitRe
         end = int(np.searchsorted(recording.time, recording.time[0] + share * (recording.time[-1] - recording.time[0])))
         if end < FEWEST_SAMPLES or not recording.train[:end].any():
             continue
-        whole = recording.recording
-        part = replace(
-            whole,
-            time=whole.time[:end],
-            groups={name: values[:end] for name, values in whole.groups.items()},
-            contact=None if whole.contact is None else whole.contact[:end],
-        )
-        own = prepare(given, part, recording.kinematics, Held())
+        own = prepare(given, at_rows(recording.recording, slice(end)), recording.kinematics, Held())
         parts.append(replace(own, train=own.train & recording.train[:end]))
     return parts or recordings
 

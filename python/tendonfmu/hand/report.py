@@ -60,7 +60,7 @@ def calibration_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]
         poor = calibration_text.verdict(report)[0] == "bad"
         tone = "bad" if poor else "doubt" if left > FAR * errors[len(errors) // 2] else "fine"
         before = error(result, report, "previous" if "previous" in report["error"] else "as_given")
-        alarms, pushes = report["detection"]["held_out"], report["pushes"]
+        alarms, pushes = report["alarms"], report["pushes"]
         cells = (
             f"{_mnm(before)} → {_mnm(left)} mN·m",
             ", ".join(cause["title"] for cause in report["structure"]["causes"]) or "nothing",

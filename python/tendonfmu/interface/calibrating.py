@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.calibration import DIAGNOSIS, Calibration, calibration_page, write_calibration
+from tendonfmu.calibration import Calibration, calibration_page, write_calibration
 from tendonfmu.calibration import calibrate as run
 from tendonfmu.files import write_text
 from tendonfmu.model import Finger, FingerSource, description_text, finger_from_data, read_finger
 from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings import RecordingSource, listed_sources, read_recordings
-from tendonfmu.report import together, write_diagnosis
+from tendonfmu.report import together
 from tendonfmu.tasks import PhaseState
 
 
@@ -57,9 +57,7 @@ class CalibrateResult:
         return list(self.report["warnings"])
 
     def write(self, folder: str | os.PathLike[str]) -> dict[Path, str]:
-        """Write page, description, FMU and report, as `tendonfmu calibrate -o`; returns what each file contains."""
-        if self.calibration.diagnosis is not None:
-            write_diagnosis(self.calibration.diagnosis, Path(folder) / DIAGNOSIS)
+        """Write the files of `tendonfmu calibrate -o`, the diagnosis with them; returns what each contains."""
         return write_calibration(self.calibration, Path(folder))
 
     def _repr_html_(self) -> str:
@@ -90,7 +88,7 @@ def calibrate(
     finger
         A finger, its description, or the file of it.
     free, test, pushes
-        Recordings, DataFrames or files: free motion; free motion to measure the errors on (None: parts of `free`); and
+        Recordings, DataFrames or files: free motion; free motion that only judges (None: parts of `free`); and
         recordings with labelled contact. One alone needs no list.
     previous
         Description or fit report of an earlier calibration, as the prior (`--from`), for little data.

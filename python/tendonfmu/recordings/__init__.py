@@ -27,12 +27,22 @@ if TYPE_CHECKING:
     from .faults import gaps, tendon_angles
     from .match import UNFIT_FOR_SEARCH, admit, belongs
     from .match_text import check_report, recording_report, refusal_report, routing_entry
-    from .prepared import FitRecording, Held, motion_of, prepare, refuse_stillness, require_noise, slack_sentences
+    from .prepared import (
+        FitRecording,
+        Held,
+        held_out_blocks,
+        motion_of,
+        prepare,
+        refuse_stillness,
+        require_noise,
+        slack_sentences,
+    )
     from .recording import (
         GROUP_PER,
         LABEL,
         Recording,
         RecordingSource,
+        at_rows,
         flagged_rows,
         flagged_stretches,
         listed_sources,

@@ -132,7 +132,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     faulty = (short | stuck) & ~contact
     usable = ~(faulty | contact)
     _refuse_too_little(recording, parts, usable, contact)
-    held_out = _held_out(recording, parts, held) & usable
+    held_out = held_out_blocks(recording, held) & usable
     if contact.any():
         out = int(contact.sum())
         warnings.append(f"{counted(out, 'sample')} labelled contact {are(out)} left out: no column external_torque")
@@ -226,13 +226,13 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
 # --- hold-out ---------------------------------------------------------------------------------------------------------
 
 
-def _held_out(recording: Recording, parts: list[slice], held: Held) -> Flags:
+def held_out_blocks(recording: Recording, held: Held) -> Flags:
     """Return the samples [N] of evenly spread blocks of time. Blocks count from the start of each part."""
     out = np.zeros(len(recording), dtype=bool)
     if not held.share:
         return out
     blocks = 0
-    for part in parts:
+    for part in _parts(recording.time)[0]:
         time = recording.time[part] - recording.time[part.start]
         length = min(held.block, float(time[-1]) * held.share / 2)
         if held.strict and length < SHORTEST_BLOCK:

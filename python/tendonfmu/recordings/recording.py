@@ -95,13 +95,7 @@ class Recording:
         rows = slice(int(first), int(last))
         if first >= last:
             raise InputError(f"{self.path}: no sample in {ends[0]:g} to {ends[1]:g} s; expected times of the recording")
-        return replace(
-            self,
-            time=self.time[rows],
-            groups={name: values[rows] for name, values in self.groups.items()},
-            contact=None if self.contact is None else self.contact[rows],
-            others={name: values[rows] for name, values in self.others.items()},
-        )
+        return at_rows(self, rows)
 
     @classmethod
     def from_frame(
@@ -370,6 +364,17 @@ def listed_sources(sources: RecordingSource | Sequence[RecordingSource]) -> list
         return [sources] if alone else list(sources)  # type: ignore[list-item, arg-type]
     except TypeError:
         raise InputError(f"recordings: {type(sources).__name__}; expected paths, DataFrames or Recordings") from None
+
+
+def at_rows(recording: Recording, rows: slice | NDArray[np.bool_]) -> Recording:
+    """Return some rows of a recording."""
+    return replace(
+        recording,
+        time=recording.time[rows],
+        groups={name: values[rows] for name, values in recording.groups.items()},
+        contact=None if recording.contact is None else recording.contact[rows],
+        others={name: values[rows] for name, values in recording.others.items()},
+    )
 
 
 def flagged_stretches(time: NDArray[np.float64], flags: NDArray[Any]) -> list[tuple[float, float]]:

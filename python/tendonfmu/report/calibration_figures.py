@@ -17,13 +17,13 @@ VISIBLE = 0.003  # of the longest recording: shorter alarms are drawn so long
 
 @dataclass(frozen=True)
 class MotionShown:
-    """A stretch of a recording that no number was fitted to."""
+    """A stretch of a recording that nothing was chosen on, as both models run over it."""
 
     recording: str
     time: Numbers  # s [N]
     torque: Numbers  # of the tendons, less a known load, N·m [N, n]
-    before: Numbers  # what the model that was given leaves of it, before the bias sees the sample, N·m [N, n]
-    after: Numbers  # what the calibrated model leaves, N·m [N, n]
+    before: Numbers  # what the model that was given leaves of it, N·m [N, n]
+    after: Numbers  # what the calibrated model leaves of it, N·m [N, n]
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
             ("after", "left of it, calibrated"),
         ),
         panels=panels,
-        caption="A stretch with a typical error, which no number was fitted to. What is left is what the finger would "
-        "feel although nothing touches it.",
+        caption="A stretch with a typical error, which nothing was chosen on. What is left is what the finger feels "
+        "although nothing touches it.",
     )
 
 
