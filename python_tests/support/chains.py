@@ -143,7 +143,7 @@ VARIATIONS: dict[str, tuple[Callable[[Columns], Columns], ...]] = {
 
 
 def columns_of(file: Path) -> Columns:
-    return {name: np.asarray(values) for name, values in pd.read_parquet(file).items()}
+    return {str(name): np.asarray(values) for name, values in pd.read_parquet(file).items()}
 
 
 def varied(source: Path, variation: str, target: Path) -> Path:
@@ -180,12 +180,12 @@ MODEL = f"""<mujoco model="small">
 
 @dataclass(frozen=True)
 class Writer:
-    """recordings: their kind. commands: with the file that is written last; {first}, {second}: files of the kind."""
+    """recordings: their kind. commands: of two of them. file: the description that they write."""
 
     recordings: str
     commands: Callable[[Path, Path], list[Command]]
     file: str
-    after: str = ""  # the writer of "before.json"
+    after: str = ""  # whose description is before.json
 
 
 def _described(joints: list[str], arms: list[list[float]], names: list[str]) -> Command:
@@ -227,7 +227,7 @@ LATER: dict[str, Writer] = {
         "describe finger",
     ),
     "calibrate": Writer(
-        "made", lambda a, b: [["calibrate", "before.json", a, b, "-o", "out"]], "out/finger.json", "given"
+        "made", lambda a, b: [["calibrate", "before.json", a, "-o", "out"]], "out/finger.json", "given"
     ),
     "calibrate --from": Writer(
         "made",
@@ -237,7 +237,7 @@ LATER: dict[str, Writer] = {
     ),
     "tune": Writer("made", lambda a, b: [["tune", "before.json", a, b, "-o", "out.json"]], "out.json", "fit"),
     "diagnose, extended": Writer(
-        "made", lambda a, b: [["diagnose", "before.json", a, b, "-o", "out"]], "out/extended.json", "given"
+        "made", lambda a, b: [["diagnose", "before.json", a, "-o", "out"]], "out/extended.json", "given"
     ),
     "diagnose, nominal": Writer(
         "servo",
@@ -252,9 +252,6 @@ LATER: dict[str, Writer] = {
         "calibrate",
     ),
     "hand": Writer("made", _hand_calibrated, "out/index/finger.json", "given"),
-    "calibrate, simulated": Writer(
-        "simulated", lambda a, b: [["calibrate", "before.json", a, b, "-o", "out"]], "out/finger.json", "simulate"
-    ),
 }
 WRITERS = FIRST | LATER
 
