@@ -8,6 +8,7 @@ each reader is once runs in `./test`; `./test --all python_tests/cli/test_chains
 from __future__ import annotations
 
 import itertools
+import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -103,6 +104,12 @@ def test_what_one_command_writes_the_other_takes(
 ) -> None:
     found = list(faults_of(pair, description(pair[0]), recordings, tmp_path / "taken"))
     assert not found, "\n".join(found)
+
+
+def test_an_extended_description_has_more_keys_than_a_given_one(description: Callable[[str], Path]) -> None:
+    extended, tuned = (json.loads(description(name).read_text()) for name in ("diagnose, extended", "calibrate"))
+    assert extended["extensions"]
+    assert tuned["bias"]["start_share"] and tuned["contact"]["method"] == "innovation"
 
 
 def test_the_sample_has_every_writer_and_every_reader() -> None:

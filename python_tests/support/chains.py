@@ -53,11 +53,11 @@ def inside(folder: Path) -> Iterator[None]:
 
 def hidden_finger() -> dict[str, Any]:
     """What the recordings of the first finger are made of: its description lacks the weight."""
-    return lasting_finger() | {"extensions": [{"effect": "gravity", "joint": 2, "sine": 0.04, "cosine": 0.02}]}
+    return lasting_finger() | {"extensions": [{"effect": "gravity", "joint": 2, "sine": 0.15, "cosine": 0.1}]}
 
 
-def made(seed: int) -> Columns:
-    recording = recorded(hidden_finger(), seed, SECONDS, RATE, noise_in_forces=True)
+def made(seed: int, seconds: float = SECONDS, rate: float = RATE) -> Columns:
+    recording = recorded(hidden_finger(), seed, seconds, rate, noise_in_forces=True)
     columns: Columns = {"time": recording.pop("time")}
     for name, values in recording.items():
         columns |= {f"{name}[{k + 1}]": values[:, k] for k in range(values.shape[1])}
@@ -98,6 +98,7 @@ def write_recordings(folder: Path) -> None:
     """KIND_SEED.parquet of every kind: made by numpy, `convert table` and `simulate`."""
     with inside(folder):
         Path("map.json").write_text(json.dumps(SERVO_MAP))
+        write_table(Path("made_long.parquet"), made(1, 20.0, 100.0))
         for seed in (1, 2):
             write_table(Path(f"made_{seed}.parquet"), made(seed))
             write_table(Path(f"log_{seed}.csv"), servo_log(seed))
@@ -143,7 +144,7 @@ VARIATIONS: dict[str, tuple[Callable[[Columns], Columns], ...]] = {
 
 
 def columns_of(file: Path) -> Columns:
-    return {name: np.asarray(values) for name, values in pd.read_parquet(file).items()}
+    return {str(name): np.asarray(values) for name, values in pd.read_parquet(file).items()}
 
 
 def varied(source: Path, variation: str, target: Path) -> Path:
@@ -180,12 +181,12 @@ MODEL = f"""<mujoco model="small">
 
 @dataclass(frozen=True)
 class Writer:
-    """recordings: their kind. commands: with the file that is written last; {first}, {second}: files of the kind."""
+    """recordings: their kind. commands: of two of them. file: the description that they write."""
 
     recordings: str
     commands: Callable[[Path, Path], list[Command]]
     file: str
-    after: str = ""  # the writer of "before.json"
+    after: str = ""  # whose description is before.json
 
 
 def _described(joints: list[str], arms: list[list[float]], names: list[str]) -> Command:
@@ -227,7 +228,7 @@ LATER: dict[str, Writer] = {
         "describe finger",
     ),
     "calibrate": Writer(
-        "made", lambda a, b: [["calibrate", "before.json", a, b, "-o", "out"]], "out/finger.json", "given"
+        "made", lambda a, b: [["calibrate", "before.json", a, "-o", "out"]], "out/finger.json", "given"
     ),
     "calibrate --from": Writer(
         "made",
@@ -237,7 +238,10 @@ LATER: dict[str, Writer] = {
     ),
     "tune": Writer("made", lambda a, b: [["tune", "before.json", a, b, "-o", "out.json"]], "out.json", "fit"),
     "diagnose, extended": Writer(
-        "made", lambda a, b: [["diagnose", "before.json", a, b, "-o", "out"]], "out/extended.json", "given"
+        "made",
+        lambda a, b: [["diagnose", "before.json", a.with_stem("made_long"), "-o", "out"]],
+        "out/extended.json",
+        "given",
     ),
     "diagnose, nominal": Writer(
         "servo",
@@ -252,9 +256,6 @@ LATER: dict[str, Writer] = {
         "calibrate",
     ),
     "hand": Writer("made", _hand_calibrated, "out/index/finger.json", "given"),
-    "calibrate, simulated": Writer(
-        "simulated", lambda a, b: [["calibrate", "before.json", a, b, "-o", "out"]], "out/finger.json", "simulate"
-    ),
 }
 WRITERS = FIRST | LATER
 
