@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import diagnosis_examples
 from command import Call, DemoRun
 from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, Options, calibrate
@@ -27,6 +28,7 @@ from tendonfmu.diagnosis.gain import squared_residual
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table
+from tendonfmu.interface.calibrating import CalibrateResult
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import Held, prepare
@@ -309,6 +311,41 @@ def test_what_is_unchanged_is_not_done_again(
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
     with pytest.raises(AssertionError, match="done again"):
         calibrate(folder / FINGER, [folder / UNSEEN], out)
+
+
+def test_another_folder_gets_the_diagnosis_too(calibrated: tuple[Calibration, Path], tmp_path: Path) -> None:
+    """Of a call that has made it, and of one that has found it."""
+    for name, diagnosis in (("found", None), ("made", diagnosis_examples.one_cause())):
+        result = CalibrateResult(replace(calibrated[0], diagnosis=diagnosis))
+        written = result.write(tmp_path / name)
+        assert tmp_path / name / "diagnosis" / "diagnosis.html" in written and all(map(Path.is_file, written))
+        assert (tmp_path / name / "diagnosis" / "extended.fmu").is_file()
+    copied = (tmp_path / "found" / "diagnosis" / "diagnosis.json").read_bytes()
+    assert copied == (calibrated[1] / "diagnosis" / "diagnosis.json").read_bytes()
+
+
+def test_ctrl_c_says_what_is_kept_and_the_next_call_goes_on(
+    call: Call, alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path, monkeypatch: Any
+) -> None:
+    """In the last step, and in the first one."""
+
+    def stopped(*given: Any, **options: Any) -> Any:
+        raise KeyboardInterrupt
+
+    shutil.copytree(alone[1], tmp_path / "out")
+    (tmp_path / "out" / ".steps" / "tune.json").unlink()
+    with monkeypatch.context() as patched:
+        patched.setattr(calibration.ContactTuning, "tune", stopped)
+        answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "out")
+    kept = f"tendonfmu: interrupted; diagnosis, fit done; the same call goes on from there, with {tmp_path / 'out'}"
+    assert answer.status == 130 and answer.err.splitlines()[-1] == kept
+    with monkeypatch.context() as patched:
+        patched.setattr(calibration, "diagnose", stopped)
+        answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "new")
+    assert answer.status == 130 and "interrupted; no step done yet" in answer.err
+    answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "out")
+    report = json.loads((tmp_path / "out" / "calibration.json").read_text(encoding="utf-8"))
+    assert answer.status == 0 and report["steps"]["repeated"] == ["diagnosis", "fit"]
 
 
 def test_an_earlier_calibration_is_the_prior_of_little_data(

@@ -87,25 +87,32 @@ def finds_what_was_hidden(folder: Path, out: str) -> None:
     }
     assert math.hypot(*cause["parameters"].values()) == pytest.approx(hidden["magnitude"], rel=0.05)
     assert report["gain"]["interval"][0] > 0.1
-    the_pages_say(report)
+    the_pages_say(folder, report)
     assert "gravity at joint 2: " in out and "the link's weight, at joint 2" in out
 
 
-def the_pages_say(report: dict[str, Any]) -> None:
-    """Size and gain in the README, and the errors in that of the recordings, as they come out."""
+def the_pages_say(folder: Path, report: dict[str, Any]) -> None:
+    """Size and errors in the README, and the errors in that of the recordings, as they come out."""
     first = (ROOT / "README.md").read_text("utf-8")
-    pattern = r"([\d.]+) mN·m of weight at joint 2; hidden were ([\d.]+)\).*?(\d+) % less"
-    found, hidden, gain = re.findall(pattern, first, re.DOTALL)[0]
+    pattern = (
+        r"([\d.]+) mN·m of weight at joint 2; hidden were ([\d.]+)\).*?([\d.]+) mN·m of error are left of ([\d.]+\d)"
+    )
+    size, hidden, after, before = re.findall(pattern, first, re.DOTALL)[0]
     (cause,) = report["causes"]
-    assert float(found) == pytest.approx(1e3 * math.hypot(*cause["parameters"].values()), rel=0.01)
+    assert float(size) == pytest.approx(1e3 * math.hypot(*cause["parameters"].values()), rel=0.01)
     assert float(hidden) == pytest.approx(1e3 * json.loads(HIDDEN.read_text("utf-8"))["magnitude"], rel=0.01)
-    assert float(gain) == pytest.approx(100 * report["gain"]["value"], abs=1.5)
+    error = json.loads((folder / "calibration" / "calibration.json").read_text("utf-8"))["error"]
+    assert float(before) == pytest.approx(together(error["as_given"]), rel=0.01)
+    assert float(after) == pytest.approx(together(error["calibrated"]), rel=0.02)
     own = (HIDDEN.parent / "README.md").read_text("utf-8")
     before, after = re.findall(r"falls from ([\d.]+) to ([\d.]+) mN·m rms", own)[0]
     for told, model in ((before, "nominal"), (after, "extended")):
-        rms = report[model]["test_rms"]
-        together = 1e3 * math.sqrt(sum(value**2 for value in rms) / len(rms))
-        assert float(told) == pytest.approx(together, rel=0.03)
+        assert float(told) == pytest.approx(together(report[model]["test_rms"]), rel=0.03)
+
+
+def together(rms: list[float]) -> float:
+    """Of all joints, mN·m."""
+    return 1e3 * math.sqrt(sum(value**2 for value in rms) / len(rms))
 
 
 def is_self_contained(folder: Path, page: str) -> None:
