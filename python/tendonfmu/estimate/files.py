@@ -14,6 +14,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.estimates import known_errors, unknown_errors
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
 from tendonfmu.model import Finger, read_finger
@@ -168,13 +169,20 @@ def read_previous_fit(path: Path) -> PreviousFit:
     content = read_json(path, "a previous fit: its report, or the description that it wrote")
     if isinstance(content, dict) and content.get("format") == FIT_REPORT:
         return _of_report(path, content)
-    return estimated_numbers(read_finger(path))
+    finger = read_finger(path)
+    return estimated_numbers(finger) or _with_errors(finger, {number.path: 0.0 for number in estimable_numbers(finger.data)})
 
 
-def estimated_numbers(finger: Finger) -> PreviousFit:
-    """Return the numbers of a description that a fit wrote."""
-    values = {number.path: number.value for number in estimable_numbers(finger.data)}
-    return PreviousFit(finger.path, values, (), np.zeros((0, 0)), 1.0)
+def estimated_numbers(finger: Finger) -> PreviousFit | None:
+    """Return the numbers of a description that were estimated; None if none was."""
+    errors = known_errors(finger.data)
+    return _with_errors(finger, errors) if errors else None
+
+
+def _with_errors(finger: Finger, errors: Mapping[str, float]) -> PreviousFit:
+    values = {number.path: number.value for number in estimable_numbers(finger.data) if number.path in errors}
+    unknown = unknown_errors(finger.data, errors)
+    return PreviousFit(finger.path, values, list(unknown), np.diag(np.square(list(unknown.values()))), 1.0)
 
 
 def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:

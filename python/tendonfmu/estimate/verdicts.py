@@ -17,7 +17,13 @@ from tendonfmu.estimate.methods import Learned
 from tendonfmu.estimate.structure import Structure, values_of
 from tendonfmu.model import Finger
 
-CAUSES = {**CAUSES_OF_A_MOTION, "never_moves": "never slides at all", "side": "never slides to that side"}
+CAUSES = {
+    **CAUSES_OF_A_MOTION,
+    "never_moves": "never slides at all",
+    "side": "never slides to that side",
+    "kept": "kept from the earlier estimate",
+}
+NARROWED = 0.5  # of the prior's standard deviation: what data identify, they know at least so much better
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
 
@@ -41,8 +47,13 @@ class Fitted:
 
     @property
     def identified(self) -> bool:
-        """Whether the standard error is at most `identifiability.LIMIT` of the value."""
+        """Whether the data know it: standard error at most LIMIT of the value and NARROWED of the prior's."""
         return not self.cause
+
+    @property
+    def known(self) -> bool:
+        """Whether the standard error is at most `identifiability.LIMIT` of the value, by these data or from before."""
+        return self.cause in ("", "kept")
 
 
 def slopes(estimator: Estimator, z: Numbers) -> Numbers:
@@ -68,7 +79,7 @@ def judge_numbers(
     numbers = values_of(structure, finger)
     matrix = slopes(estimator, z)[[structure.index[number.path] for number in numbers]]
     covariance = matrix @ learned.covariance @ matrix.T
-    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    error, before = (np.sqrt(np.maximum(np.diag(each), 0.0)) for each in (covariance, matrix @ learned.prior @ matrix.T))
     size = np.array([_size(number, noise) for number in numbers])
     columns = _columns(structure, estimator)
     representatives = _representatives(numbers, columns, coverage)
@@ -86,19 +97,20 @@ def judge_numbers(
     )
     by_path = {cover.effect.path: cover for cover in coverage}
     judged = []
-    for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
+    for k, (number, given) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
         cover = by_path[number.effect.path] if number.effect is not None else None
-        cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else ""
+        kept = "kept" if error[k] > NARROWED * before[k] else ""
+        cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else kept
         judged.append(
             Fitted(
                 number=number,
-                start=before.value,
+                start=given.value,
                 standard_error=float(error[k]),
                 at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
-                reason=verdict.reason if cause else "",
-                advice=_advice(cause, verdict, cover, finger) if cause else "",
+                reason=CAUSES[kept] if cause == "kept" else verdict.reason if cause else "",
+                advice=_advice(cause, verdict, cover, finger) if cause not in ("", "kept") else "",
             )
         )
     return judged, covariance
