@@ -14,7 +14,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.estimates import known_errors, unknown_errors
+from tendonfmu.estimate.estimates import known_numbers, unknown_errors
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
 from tendonfmu.model import Finger, read_finger
@@ -170,12 +170,13 @@ def read_previous_fit(path: Path) -> PreviousFit:
     if isinstance(content, dict) and content.get("format") == FIT_REPORT:
         return _of_report(path, content)
     finger = read_finger(path)
-    return estimated_numbers(finger) or _with_errors(finger, {number.path: 0.0 for number in estimable_numbers(finger.data)})
+    every = {number.path: 0.0 for number in estimable_numbers(finger.data)}
+    return estimated_numbers(finger) or _with_errors(finger, every)
 
 
 def estimated_numbers(finger: Finger) -> PreviousFit | None:
     """Return the numbers of a description that were estimated; None if none was."""
-    errors = known_errors(finger.data)
+    errors = {path: error for path, (_, error) in known_numbers(finger.data).items()}
     return _with_errors(finger, errors) if errors else None
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.estimates import with_estimates
 from tendonfmu.estimate.evaluation import Evaluation, evaluate, model_over, residuals
 from tendonfmu.estimate.files import (
     PreviousFit,
@@ -26,7 +27,6 @@ from tendonfmu.estimate.files import (
     with_previous_values,
 )
 from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
-from tendonfmu.estimate.estimates import with_estimates
 from tendonfmu.estimate.given_numbers import is_worse, movement
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.methods import (
@@ -42,7 +42,7 @@ from tendonfmu.estimate.methods import (
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
-from tendonfmu.estimate.verdicts import Fitted, judge_numbers
+from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
@@ -257,7 +257,8 @@ class FrictionFit(Configured):
         self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
         is_known = self.options.uncertainty and bool(np.isfinite(learned.covariance).all())
         uncertainty = self._write_uncertainty(learned) if is_known else None
-        self.description_ = with_estimates(self.description_, self.numbers_)
+        numbers, noise = [each.number for each in self.numbers_], bias_settings(self.description_.data).noise
+        self.description_ = with_estimates(self.description_, numbers, self.covariance_, sizes_of(numbers, noise))
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *fit_sentences(learned, self.numbers_)]

@@ -11,7 +11,6 @@ import numpy as np
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted
-from tendonfmu.model import Finger
 
 FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
 
@@ -22,9 +21,7 @@ def is_worse(training: Sequence[Evaluation]) -> bool:
     return held is not None and float(np.sum(np.square(held["rms"]))) > float(np.sum(np.square(held["start_rms"])))
 
 
-def movement(
-    numbers: Sequence[Fitted], estimated: bool, kept: bool
-) -> dict[str, Any]:
+def movement(numbers: Sequence[Fitted], estimated: bool, kept: bool) -> dict[str, Any]:
     """Return how many numbers moved, which stayed, and why, for the report."""
     moved = [number for number in numbers if abs(number.value - number.start) > number.standard_error]
     stayed = [number for number in numbers if abs(number.value - number.start) <= number.standard_error]

@@ -4,8 +4,8 @@ Both first fit with each sample counting as one. If the residuals are then not w
 of an effective number of samples (`sample_weights`), by joint and stretch of a recording, and the fit is repeated
 with these weights: they shift the balance of data and prior, the estimates and their covariance.
 
-The prior is a Gaussian about the given numbers with covariance C + (s · size)²: C is that of an earlier fit, if any, and
-s, by how much the numbers are off, is the one under which the data are most likely (`_most_likely`). So numbers
+The prior is a Gaussian about the given numbers with covariance C + (s · size)²: C is that of an earlier fit, if any,
+and s, by how much the numbers are off, is the one under which the data are most likely (`_most_likely`). So numbers
 that the data do not contradict stay. What is reported as known does not rest on s: it counts numbers as known to within
 C and CHANGE if they were estimated before, else to within their size.
 
@@ -36,8 +36,10 @@ Start = Callable[[Sequence[str]], Numbers]
 
 _LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 in a previous fit leave it
 CHANGE = 0.02  # of a number that was estimated before: what wear, temperature and another instrument may have changed
+_MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 _GUESS = 1.0  # of a number that nobody has estimated
 _SPREADS = np.geomspace(1e-3, _GUESS, 31)
+_CLEARLY = 0.5  # by which the log likelihood must rise before numbers leave where they were
 
 
 @dataclass(frozen=True)
@@ -170,9 +172,19 @@ def _measured_weights(
     for number, (place, part) in enumerate(added):
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
         step = float(np.median(np.diff(recordings[place].time[part])))
-        measured = sample_weights(innovation / np.sqrt(variance)[:, None], step)
+        stroke = _stroke_time(recordings[place].model.joint_speed[part], step)
+        measured = sample_weights(innovation / np.sqrt(variance)[:, None], step, stroke)
         weights[place][part] = np.minimum(measured, most)
     return weights
+
+
+def _stroke_time(joint_speed: Numbers, step: float) -> float:
+    """Return the mean time (s) between reversals of any joint."""
+    reversals = 1
+    for speed in joint_speed.T:
+        moving = speed[np.abs(speed) > _MOVES * np.abs(speed).max(initial=0.0)]
+        reversals += np.count_nonzero(np.diff(np.sign(moving)))
+    return step * len(joint_speed) / reversals
 
 
 def learn_batch(
@@ -217,6 +229,31 @@ def learn_batch(
         weights=weights,
         innovations=[],
         warnings=[] if result.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
+    )
+
+
+def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Learned:
+    """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
+    estimator, settings = _estimator(structure), Settings(FrictionFitOptions(), passes=1)
+    added = _add_recordings(estimator, recordings)
+    weights = _measured_weights(estimator, estimator.start, recordings, added, settings)
+    for number, (place, part) in enumerate(added):
+        estimator.set_weights(number, weights[place][part.start])
+    cost, _, information = estimator.evaluate(estimator.start)
+    prior = _Prior.of(estimator, settings)
+    return Learned(
+        estimator=estimator,
+        z=estimator.start,
+        covariance=prior.posterior(information),
+        prior=prior.reported(None),
+        information=information,
+        cost=cost,
+        iterations=0,
+        passes=1,
+        converged=True,
+        weights=weights,
+        innovations=[],
+        warnings=[],
     )
 
 
@@ -280,7 +317,9 @@ def _most_likely(information: Numbers, pull: Numbers, prior: _Prior) -> Numbers:
         return 0.5 * float(pull @ scaled @ np.linalg.solve(both, pull) - np.linalg.slogdet(both)[1])
 
     shares = (0.0, 1.0) if prior.covariance.any() else (0.0,)
-    return max((prior.of_spread(spread, share) for share in shares for spread in _SPREADS), key=log_likelihood)
+    least, *others = (prior.of_spread(spread, share) for share in shares for spread in _SPREADS)
+    best = max(others, key=log_likelihood)
+    return best if log_likelihood(best) > log_likelihood(least) + _CLEARLY else least
 
 
 def _fitted(

@@ -21,9 +21,9 @@ WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), 
 _ROOM = 20  # rows for each coefficient, at least
 CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
 FEWEST = 20  # pairs of a lag; lags with fewer are not used
-# Noise is forgotten within LASTING. What lasts longer, or returns STROKE later, is an error of the model: it is the same
-# in every stroke under the same load, so that it counts as new only every RETURN (docs/evidence/recalibration.md).
-LASTING, STROKE, RETURN = 0.1, 1.0, 10.0  # s
+# Noise is forgotten within LASTING. What lasts longer is an error of the model, which counts as new with every stroke;
+# what returns LATER, with strokes that are alike, counts as new every RETURN (docs/evidence/recalibration.md).
+LASTING, LATER, RETURN = 0.1, 1.0, 10.0  # s
 
 
 @dataclass(frozen=True)
@@ -148,14 +148,14 @@ def _correlation(values: Numbers) -> tuple[float, Numbers, float]:
     return time, correlations, float(np.sqrt(time / count))
 
 
-def _lasting_share(correlations: Numbers, chance: float, step: float) -> float:
-    """Return the share of the variance that lasts for longer than noise does, or returns with later strokes."""
-    first, stroke = (max(round(time / step), 1) for time in (LASTING, STROKE))
+def _shares(correlations: Numbers, chance: float, step: float) -> tuple[float, float]:
+    """Return the shares of the variance that last for longer than noise does, and that return with later strokes."""
+    first, later = (max(round(time / step), 1) for time in (LASTING, LATER))
     if len(correlations) < first:
-        return 0.0
+        return 0.0, 0.0
     lasting = float(correlations[first - 1])
-    returning = float(np.abs(correlations[stroke - 1 : len(correlations) // 2]).max(initial=0.0))
-    return min(max(lasting if lasting > chance else 0.0, returning if returning > 4.0 * chance else 0.0), 1.0)
+    returning = float(np.abs(correlations[later - 1 : len(correlations) // 2]).max(initial=0.0))
+    return min(lasting, 1.0) * (lasting > chance), min(returning, 1.0) * (returning > 4.0 * chance)
 
 
 def _autocovariance(values: Numbers) -> Numbers:
@@ -165,15 +165,17 @@ def _autocovariance(values: Numbers) -> Numbers:
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(values)])
 
 
-def sample_weights(standardised: Numbers, step: float) -> Numbers:
+def sample_weights(standardised: Numbers, step: float, stroke: float) -> Numbers:
     """Return the share of an independent sample that each sample of a stretch counts for."""
-    # standardised: [N, n]; step: time of a sample (s); returns 1/τ of each joint [n]
+    # standardised: [N, n]; step, stroke: time of a sample and of a stroke (s); returns 1/τ of each joint [n]
     weights = []
     for column in standardised.T:
         time, correlations, chance = _correlation(column)
         if time > 1.0:
-            share = _lasting_share(correlations, chance, step)
-            time = max(time, (1.0 - share) * time + share * min(RETURN / step, float(np.sum(~np.isnan(column)))))
+            lasting, returning = _shares(correlations, chance, step)
+            share, new = (returning, RETURN) if returning > lasting else (lasting, stroke)
+            new = min(max(new / step, time), float(np.sum(~np.isnan(column))))
+            time = max(time, (1.0 - share) * time + share * new)
         weights.append(1.0 / time)
     return np.array(weights)
 
