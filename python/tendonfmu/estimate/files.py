@@ -159,7 +159,7 @@ class PreviousFit:
 
     path: Path  # file of the report or of the description
     values: Mapping[str, float]  # numbers of the description by path (SI)
-    names: Sequence[str]  # [k] unknowns with a known covariance; empty if the previous fit did not state it
+    names: Sequence[str]  # [k] unknowns that were estimated; empty if the previous fit did not state their covariance
     covariance: Numbers  # [k, k] of these unknowns
     share: float  # effective samples per sample of its residuals, the least of all joints; 1 if unknown
 
@@ -181,7 +181,7 @@ def estimated_numbers(finger: Finger) -> PreviousFit | None:
 
 
 def _with_errors(finger: Finger, errors: Mapping[str, float]) -> PreviousFit:
-    values = {number.path: number.value for number in estimable_numbers(finger.data) if number.path in errors}
+    values = {number.path: number.value for number in estimable_numbers(finger.data)}
     unknown = unknown_errors(finger.data, errors)
     return PreviousFit(finger.path, values, list(unknown), np.diag(np.square(list(unknown.values()))), 1.0)
 

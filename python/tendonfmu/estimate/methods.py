@@ -272,7 +272,8 @@ class _Prior:
         previous = settings.previous
         if previous is None:
             return cls(covariance, scale, estimated)
-        estimated = np.array([unknown.path in previous.values for unknown in estimator.unknowns], dtype=bool)
+        known = [unknown.path in previous.values for unknown in estimator.unknowns]
+        estimated = np.array([name in previous.names for name in names] if len(previous.names) else known, dtype=bool)
         size = np.where(estimated, np.maximum(np.abs(start), _LEAST * scale), scale)
         is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
         size[is_bias] = np.maximum(size[is_bias], settings.noise)

@@ -101,15 +101,14 @@ def friction_figure(data: Data) -> FingerFigure:
     drawing = finger_drawing(data)
     largest = sorted((place for place in places if place[0] > 0.0), key=lambda place: -place[0])[:MOST_PLACES]
     caption = [
-        "Coulomb friction: of a joint in mN·m, of a pulley or an edge in % of the tendon force. The base is on the left."
+        "Coulomb friction: of a joint in mN·m, of a pulley or an edge in % of the tendon force.",
+        "The base is on the left.",
     ]
     if len(places) > MOST_PLACES:
         caption.append("Only the largest are shown.")
     if unknown:
-        count = sum(unknown.values())
-        caption.append(
-            f"The recordings do not tell the friction of {counted(count, 'place')}, which {are(count)} left out."
-        )
+        left_out = counted(sum(unknown.values()), "place")
+        caption.append(f"Left out: {left_out} whose friction the recordings do not tell.")
     caption += [
         f"All places of tendon {drawing.tendons[tendon - 1].name} together: {_percent(known[path][0])}."
         for tendon in sorted(unknown)
