@@ -1,34 +1,41 @@
-"""The da Vinci jaw recalibrated on one recording of 20 s, judged on all others.
+"""Fingers fitted again on 20 s under one load or pretension, judged under the others.
 
-    python -m evidence.fit.recalibration [--change X ...]
+    python -m evidence.fit.recalibration
 
-Needs the recordings in ../shared/data or $TENDONFMU_DATA. Prints the tables of docs/evidence/recalibration.md.
+The da Vinci jaw needs the recordings in ../shared/data or $TENDONFMU_DATA. Prints the tables of
+docs/evidence/recalibration.md.
 """
 
 from __future__ import annotations
 
+import copy
 import json
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from evidence import tables
+from evidence.fingers import matched_rig
+from evidence.fingers.matched_physics import read_finger
 from evidence.runner import EXAMPLES, parser
 from evidence.tables import Row
 from tendonfmu.estimate import FitWarning, FrictionFit
-from tendonfmu.files import report_text, write_table
+from tendonfmu.files import write_table
 from tendonfmu.model.native import run_recording
-from tendonfmu.options import FitOptions
-from tendonfmu.recordings import Recording, convert_file, read_recording
+from tendonfmu.recordings import Recording, convert_file
+from tendonfmu.recordings import read_recording as read_file
 
 sys.path.insert(0, str(EXAMPLES / "davinci"))
 from jaw_recordings import FAST, FAULT, SLOW, data_folder, rms, torque_error
+
+Description = Mapping[str, Any]
 
 STRUCTURE = EXAMPLES / "davinci" / "jaw_extended.json"
 EVEN = ("00", "02", "04", "06", "08")
@@ -36,37 +43,22 @@ PLANTED = (1.0, 1.3, 0.7)  # times the joint's Coulomb friction
 COULOMB = "joints[1].friction.coulomb"
 PRETENSION = 13.0  # N; as in docs/evidence/davinci.md
 LIMIT = 1.05  # of the error before
-GROUPS: Mapping[str, Callable[[str], bool]] = {
-    "even": lambda run: run in EVEN,
-    "odd": lambda run: run[0] == "0" and run not in EVEN,
-    "0.5 Hz": lambda run: run[0] == "4",
-}
+HANDS = range(1, 13)
+STARTS = 4  # of each finger, its numbers off by up to OFF
+OFF, SECONDS = 0.3, 20.0
+LEVELS = (1.0, 2.0, 4.0)  # times the pretension
+SETTLED = 50  # samples; the bias begins with the first one
 
 
-@dataclass(frozen=True)
-class Way:
-    """A way to fit again."""
-
-    name: str
-    options: Mapping[str, Any]  # of `FrictionFit`
-    base: Mapping[str, Any]  # of the fit on the even loads, which it begins from
-    source: str | None = None  # what it is given of that: its description as the start; "report" or "description"
+def fitted(finger: Any, recordings: Sequence[Recording], kinematics: int = 1) -> dict[str, Any]:
+    """The description that a plain fit writes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        fit = FrictionFit(finger, uncertainty=False, kinematics=kinematics).fit(recordings)
+    return dict(json.loads(fit.description_text()))
 
 
-def ways(changes: Sequence[float]) -> list[Way]:
-    """From a guess, and from a previous fit with each of these allowances for change."""
-    plain = {"effective_samples": False}
-    without = [
-        Way("guessed, each sample counts", plain, plain),
-        Way("guessed", {"start_values": "guessed"}, {}),
-        Way("guessed, prior 0.1", {"start_values": "guessed", "prior": 0.1}, {}),
-    ]
-    previous = [
-        Way(f"from the {source}, change {change:g}", {"change": change}, {}, source)
-        for source in ("report", "description")
-        for change in changes
-    ]
-    return [*without, *previous]
+# --- the jaw ----------------------------------------------------------------------------------------------------------
 
 
 def read_runs(folder: Path) -> dict[str, Recording]:
@@ -75,109 +67,117 @@ def read_runs(folder: Path) -> dict[str, Recording]:
     for name in (*SLOW, *FAST):
         file = folder / f"{name}.parquet"
         write_table(file, convert_file("davinci", data_folder() / f"{name}.TXT", {"pretension": PRETENSION}))
-        whole = read_recording(file)
+        whole = read_file(file)
         end = int(np.searchsorted(whole.time, FAULT.get(name, np.inf), side="right"))
         groups = {group: np.ascontiguousarray(values[:end]) for group, values in whole.groups.items()}
         runs[name] = Recording(file, np.ascontiguousarray(whole.time[:end]), groups)
     return runs
 
 
-def judged(finger: Mapping[str, Any], runs: Mapping[str, Recording], left_out: str) -> float:
-    """Rms in N·m of compensated minus external torque over all samples of all runs but one."""
-    others = [recording for name, recording in runs.items() if name != left_out]
-    errors = [torque_error(recording, run_recording(finger, recording.arrays())) for recording in others]
-    return float(rms(np.concatenate(errors)))
-
-
-def fitted(finger: Any, recordings: Sequence[Recording], options: Mapping[str, Any]) -> FrictionFit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return FrictionFit(finger, uncertainty=False, **options).fit(recordings)
-
-
-def planted_in(fit: FrictionFit, factor: float) -> dict[str, dict[str, Any]]:
-    """Description and report of a fit with the joint's Coulomb friction changed."""
-    finger, report = json.loads(fit.description_text()), json.loads(report_text(fit.report_))
-    law = finger["joints"][0]["friction"]
+def planted(finger: Description, factor: float) -> dict[str, Any]:
+    """The description with another Coulomb friction of the joint, as well known as before."""
+    data = copy.deepcopy(dict(finger))
+    law = data["joints"][0]["friction"]
     law["static"], law["coulomb"] = factor * law["static"], factor * law["coulomb"]
-    for entry in report["parameters"]:
-        entry["value"] *= factor if entry["path"] == COULOMB else 1.0
-    return {"description": finger, "report": report}
+    for path, entry in (data.get("estimated") or {}).items():
+        entry[0] *= factor if path.startswith("joints[1].friction") else 1.0
+    return data
 
 
-def recalibrated(way: Way, before: Mapping[str, Any], recording: Recording, folder: Path) -> dict[str, Any]:
-    """The description fitted again on one recording."""
-    options = dict(way.options)
-    if way.source is not None:
-        options["previous"] = folder / f"{way.source}.json"
-        options["previous"].write_text(json.dumps(before[way.source]), encoding="utf-8")
-    return dict(json.loads(fitted(before["description"], [recording], options).description_text()))
-
-
-def campaign(
-    chosen: Sequence[Way], planted: Sequence[float] = PLANTED, only: Sequence[str] = (*SLOW, *FAST)
-) -> list[Row]:
-    """All ways, all planted factors, fitted again on each of these runs: rms in N·m on all other runs."""
+def jaw_rows(only: Sequence[str] = (*SLOW, *FAST), factors: Sequence[float] = PLANTED) -> list[Row]:
+    """Each start, each run: rms in N·m on each other run."""
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        runs = read_runs(folder)
-        bases = {}
-        for way in chosen:
-            key = json.dumps(way.base)
-            if key not in bases:
-                bases[key] = fitted(STRUCTURE, [runs[name] for name in EVEN], way.base)
-            for factor in planted:
-                known = planted_in(bases[key], factor)
+        runs = read_runs(Path(scratch))
+        guess = {key: value for key, value in json.loads(STRUCTURE.read_text()).items() if key != "estimated"}
+        known = fitted(guess, [runs[name] for name in EVEN])
+        for numbers, start in (("guessed", guess), ("estimated", known)):
+            for factor in factors:
+                finger = planted(start, factor)
+                before = _errors(finger, runs)
                 for run in only:
-                    before = judged(known["description"], runs, run)
-                    after = judged(recalibrated(way, known, runs[run], folder), runs, run)
-                    row = {"way": way.name, "planted": factor, "run": run, "before": before, "after": after}
-                    rows.append(row | {"ratio": after / before})
+                    after = _errors(fitted(finger, [runs[run]]), runs)
+                    rows += [
+                        {"numbers": numbers, "factor": f"× {factor:g}", "fitted": run, "judged": other}
+                        | {"before": before[other], "after": after[other], "ratio": after[other] / before[other]}
+                        for other in runs
+                        if other != run
+                    ]
     return rows
 
 
-def sample_counts() -> list[list[str]]:
-    """Samples of the joint that a fit was trained on, and how many independent ones they are worth."""
-    with tempfile.TemporaryDirectory() as scratch:
-        runs = read_runs(Path(scratch))
-        chosen = {"even loads together": EVEN} | {f"run {name} alone": (name,) for name in ("00", "05", "09")}
-        lines = []
-        for name, names in chosen.items():
-            fit = fitted(STRUCTURE, [runs[run] for run in names], {})
-            counts = json.loads(report_text(fit.report_))["innovations"]["effective"]
-            lines.append([name, f"{sum(counts['samples']):.0f}", f"{sum(counts['worth']):.0f}"])
-        return lines
+def _errors(finger: Description, runs: Mapping[str, Recording]) -> dict[str, float]:
+    return {name: rms(torque_error(run, run_recording(finger, run.arrays()))) for name, run in runs.items()}
 
 
-def report(rows: Sequence[Row]) -> str:
-    """A line for each way and planted factor; the ratio of each run without a planted change; samples."""
+# --- fingers whose truth is known -------------------------------------------------------------------------------------
 
-    def cells(group: Sequence[Row]) -> list[str]:
-        before, after = (1e3 * tables.column(group, name) for name in ("before", "after"))
-        worst = [max(row["ratio"] for row in group if belongs(row["run"])) for belongs in GROUPS.values()]
-        above = sum(row["ratio"] > LIMIT for row in group)
-        errors = [f"{value:.1f}" for value in (np.median(before), np.median(after), after.max())]
-        return [*errors, *(f"{value:.2f}" for value in worst), f"{above} of {len(group)}"]
 
-    unchanged = tables.where(rows, planted=1.0)
-    runs = tables.values_of(rows, "run")
-    by_run = tables.by(unchanged, ["way"], lambda group: [f"{row['ratio']:.2f}" for row in group])
-    lines = [[way, f"× {factor}", *rest] for way, factor, *rest in tables.by(rows, ["way", "planted"], cells)]
-    head = ["Fitted again", "Coulomb friction", "before, mN·m", "after, mN·m: median", "worst"]
-    ratios = ["worst after/before: even", "odd", "0.5 Hz", f"above {LIMIT}"]
-    sections = [
-        tables.table([*head, *ratios], lines),
-        tables.table(["Fitted again on", *runs], by_run),
-        tables.table(["", "samples", "worth"], sample_counts()),
-    ]
+def sibling_rows(seeds: Iterable[int] = HANDS, starts: int = STARTS) -> list[Row]:
+    """Each finger, each start: fitted to one pretension, or to one that varies, and judged at several."""
+    rows = []
+    for seed in seeds:
+        hand = matched_rig.random_hand(
+            seed, joints=2 + seed % 2, presliding=True, source=1 if seed % 3 else 2, rate=500.0, cutoff=20.0
+        )
+        hand = replace(hand, noise=replace(hand.noise, tendon_step=1e-7))
+        training = {"one": _recorded(hand, 100 + seed, 1.0), "varied": _recorded(hand, 500 + seed, None)}
+        judged = {f"× {level:g}": _recorded(hand, 200 + seed + 100 * k, level) for k, level in enumerate(LEVELS)}
+        for k in range(starts):
+            start = matched_rig.off_start(np.random.default_rng([seed, k, 9]), hand.truth, OFF)
+            before = {level: _left(start, recording, hand.source) for level, recording in judged.items()}
+            for pretension, recording in training.items():
+                finger = fitted(start, [recording], hand.source)
+                for level, other in judged.items():
+                    ratio = _left(finger, other, hand.source) / before[level]
+                    rows.append({"seed": seed, "pretension": pretension, "judged": level, "ratio": ratio})
+    return rows
+
+
+def _recorded(hand: Any, seed: int, level: float | None) -> Recording:
+    """20 s at a constant pretension; None: at one that varies from half to double."""
+    arms = read_finger(hand.truth).arms
+    time = np.arange(round(SECONDS * hand.rate)) / hand.rate
+    motion, force = (np.random.default_rng([seed, part]) for part in (61, 62))
+    encoders = np.column_stack([matched_rig.strokes(motion, time) for _ in range(arms.shape[1])])
+    if level is None:
+        pretension = matched_rig.pretension(force, time, arms, hand.level, hand.tension_time)
+    else:
+        pretension = np.tile(level * hand.level * matched_rig.pulling_null_vector(arms), (len(time), 1))
+    made = matched_rig.recorded(hand, time, encoders, pretension, 0.0, force, hand.noise)
+    return Recording.from_frame(pd.DataFrame(made.columns))
+
+
+def _left(finger: Description, recording: Recording, kinematics: int) -> float:
+    return rms(run_recording(finger, recording.arrays(), kinematics)["compensated_torque"][SETTLED:])
+
+
+# --- tables -----------------------------------------------------------------------------------------------------------
+
+
+def _ratios(rows: Sequence[Row]) -> list[str]:
+    ratio = tables.column(rows, "ratio")
+    values = [np.median(ratio), np.quantile(ratio, 0.9), ratio.max()]
+    return [*(f"{value:.2f}" for value in values), f"{np.sum(ratio > LIMIT)} of {len(ratio)}"]
+
+
+def report(jaw: Sequence[Row], siblings: Sequence[Row]) -> str:
+    """The jaw by numbers and planted factor, on runs of the half that constants were chosen on and of the other."""
+    head = ["after/before: median", "90 %", "worst", f"above {LIMIT}"]
+    halves = {"even": lambda run: run in EVEN, "odd, 0.5 Hz": lambda run: run not in EVEN}
+    sections = []
+    for rows, keys in ((jaw, ("numbers", "factor")), (siblings, ("pretension", "judged"))):
+        for row in rows:
+            of = row.get("fitted", row.get("seed"))
+            chosen = halves["even"](of) if isinstance(of, str) else of % 2 == 0
+            row["half"] = "chosen on" if chosen else "others"
+        sections.append(tables.table([*keys, "half", *head], tables.by(rows, [*keys, "half"], _ratios)))
     return "\n\n".join(sections)
 
 
 def main() -> None:
-    options = parser(__doc__, output=None)
-    options.add_argument("--change", type=float, nargs="*", default=[FitOptions().change])
-    print(report(campaign(ways(options.parse_args().change))))
+    parser(__doc__, output=None).parse_args()
+    print(report(jaw_rows(), sibling_rows()))
 
 
 if __name__ == "__main__":

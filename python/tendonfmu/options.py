@@ -344,7 +344,7 @@ class FitOptions(Options):
     prior: float | None = option(
         None,
         Number(1e-6, 1e6, optional=True),
-        "prior: standard deviation / expected magnitude [default: 1, wider if correlated samples count less]",
+        "by how much the given numbers are off / expected magnitude [default: learned from the data]",
         metavar="RATIO",
     )
     scale: Sequence[str] = option(
@@ -352,17 +352,6 @@ class FitOptions(Options):
     )
     previous: File | None = option(
         None, _PATH, "report or description of an earlier fit, as the prior", metavar="PREVIOUS.json", names=("--from",)
-    )
-    # docs/evidence/recalibration.md shows the effect of larger and smaller values
-    change: float = option(
-        0.02, Number(1e-6, 10.0), "of estimated numbers: expected relative change since", metavar="SHARE"
-    )
-    start_values: str = option(
-        "auto",
-        Choice(("auto", "guessed", "estimated")),
-        "whether the given numbers were estimated before, and are the prior",
-        metavar="auto|guessed|estimated",
-        names=("--start",),
     )
     effective_samples: bool = option(
         True,

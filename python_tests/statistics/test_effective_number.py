@@ -69,9 +69,25 @@ def test_a_constant_is_worth_one_sample_or_so() -> None:
 
 def test_each_joint_has_its_own_share() -> None:
     both = np.stack([np.random.default_rng(5).standard_normal(8000), coloured(6, 8000, 0.9)], axis=1)
-    weights = sample_weights(both)
+    weights = sample_weights(both, 1e-3, 1.0)
     assert weights[0] == 1.0 and weights[1] == pytest.approx(1 / 19, rel=0.3)
     both[:1000, 1] = np.nan
     samples, worth = effective_samples([both], [np.broadcast_to(weights, both.shape)])
     assert samples.tolist() == [8000.0, 7000.0]
     assert worth == pytest.approx([8000.0, 7000.0 * weights[1]])
+
+
+@pytest.mark.parametrize(("again", "most"), [(True, 4.0), (False, 1000.0)])
+def test_an_error_that_returns_with_every_stroke_is_worth_little(again: bool, most: float) -> None:
+    """20 strokes of 1 s: the same error in each, or another one."""
+    strokes = [coloured(8 if again else stroke, 1000, 0.9) for stroke in range(20)]
+    noise = 0.2 * np.random.default_rng(9).standard_normal(20_000)
+    worth = 20_000 * sample_weights((np.concatenate(strokes) + noise)[:, None], 1e-3, 1.0)[0]
+    assert 0.5 * most < worth < 2.0 * most
+
+
+@pytest.mark.parametrize(("memory", "least", "most"), [(0.02, 300.0, 700.0), (0.5, 8.0, 40.0)])
+def test_an_error_that_lasts_counts_as_new_with_every_stroke(memory: float, least: float, most: float) -> None:
+    """Noise is forgotten within 0.1 s; s, a stroke of 1 s, 20 s."""
+    series = coloured(11, 20_000, float(np.exp(-1e-3 / memory)))
+    assert least < 20_000 * sample_weights(series[:, None], 1e-3, 1.0)[0] < most

@@ -10,7 +10,7 @@ namespace tendonfmu {
 
 const std::vector<std::string>& keys_of(const std::string& object) {
   static const std::map<std::string, std::vector<std::string>> keys = {
-    {"", {"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault"}},
+    {"", {"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault", "estimated"}},
     {"joints", {"name", "cover", "friction", "load_friction"}},
     {"joints.cover", {"stiffness", "rest_angle"}},
     {"tendons", {"name", "stiffness", "moment_arms", "zero", "pulley_friction", "edge_friction", "bidirectional"}},

@@ -287,6 +287,22 @@ std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
   return MODEL_HAS_LINKS;
 }
 
+/* Metadata: no output depends on it. */
+void check_estimated(const json_node& estimated) {
+  if (estimated.absent()) {
+    return;
+  }
+  estimated.expect_object();
+  for (const auto& entry : estimated.value().items()) {
+    const json_node known = estimated.member(entry.key());
+    known.expect_list(2, 2, "numbers: the value and its standard error");
+    const json &value = known.value()[0], &error = known.value()[1];
+    if (!value.is_number() || !error.is_number() || !(error.get<double>() >= 0.0 && error.get<double>() <= 1e9)) {
+      known.refuse("a value and its standard error, 0 to 1e9");
+    }
+  }
+}
+
 void check_top(const json_node& document) {
   document.expect_keys(keys_of(""));
   const json_node format = document.member("format");
@@ -294,6 +310,7 @@ void check_top(const json_node& document) {
     format.refuse("\"" + std::string(format_name) + "\"");
   }
   check_name(document.member("name"));
+  check_estimated(document.member("estimated"));
   for (const std::string name : {"velocity_threshold", "bias"}) {
     document.member(name).expect_keys_if_present(keys_of(name));
   }

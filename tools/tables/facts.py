@@ -16,7 +16,7 @@ Row = Mapping[str, Any]
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FOLDER = ROOT / "runtime" / "description"
-KINDS = ("object", "list", "law", "laws", "edges", "flag", "word", "name", "format", "extensions")
+KINDS = ("object", "list", "law", "laws", "edges", "flag", "word", "name", "format", "extensions", "estimates")
 FIELDS = {
     *("path", "kind", "item", "unit", "words", "spoken_unit", "least", "above", "most", "default", "required"),
     *("absent", "fixed", "option", "keys", "text", "note", "why"),

@@ -133,6 +133,10 @@ def _of_key(facts: Facts, row: Row) -> Schema:
     if kind == "extensions":
         rows = {"oneOf": [{"$ref": f"#/$defs/{effect['name']}"} for effect in facts.effects["effects"]]}
         return described | {"type": ["array", "null"], "maxItems": limits["extensions"], "items": rows}
+    if kind == "estimates":
+        error = {"type": "number", "minimum": 0, "maximum": 1e9}
+        entry = {"type": "array", "prefixItems": [{"type": "number"}, error], "minItems": 2, "maxItems": 2}
+        return described | {"type": ["object", "null"], "additionalProperties": entry}
     if kind in ("laws", "edges"):
         name = "optional_law" if kind == "laws" else "edge"
         items = {"$ref": f"#/$defs/{name}"}

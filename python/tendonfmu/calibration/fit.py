@@ -26,6 +26,7 @@ from tendonfmu.diagnosis import (
     series_of,
     settled,
     squared_residual,
+    with_known,
     without_blocks,
     without_stuck,
 )
@@ -87,6 +88,7 @@ def fit_all(
         clean = predicted_of(data, kept, grid, series_of(data, kept, grid, out))
         structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
         result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
+        result = replace(result, data=with_known(result.data, clean, settings))
         online = replace(result, data=signals.restored(result.data, finger.data))
         if np.isfinite(learned.covariance).all():
             judged = [evaluate(data, result.data, recording) for recording in kept]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion
-    from .extension_fit import FitSettings, learn_numbers
+    from .extension_fit import FitSettings, learn_numbers, with_known
     from .gain import squared_residual
     from .history import History, Line, diagnose_history, share_of
     from .names import CONTACT, TITLES, UNKNOWN, Names, at_place, names_in, numbered, title_of

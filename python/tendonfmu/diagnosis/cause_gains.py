@@ -10,7 +10,14 @@ from typing import Any
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Term
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, cause_parameters, fit_extended, fit_numbers
+from tendonfmu.diagnosis.extension_fit import (
+    FitSettings,
+    FittedModel,
+    cause_parameters,
+    fit_extended,
+    fit_numbers,
+    with_known,
+)
 from tendonfmu.diagnosis.gain import Gain, OnlineError, measure_gain, squared_residual
 from tendonfmu.diagnosis.search import Search, terms_of
 from tendonfmu.diagnosis.selection import by_gain, confirmed, names_with
@@ -71,8 +78,8 @@ def verify(
         return [replace(cause, gain=gain) for cause, gain in zip(causes, gains, strict=True)], weak
 
     causes, dropped = confirmed(merged(result.causes), judge)
-    fit, nominal = bench.result(causes), bench.online(bench.nominal)
-    extended = bench.online(fit) if causes else nominal
+    fit, nominal = bench.result(causes), bench.written(bench.nominal)
+    extended = bench.written(fit) if causes else nominal
     ranked = by_gain(bench.with_places(fit, causes))
     between = [bench.online(bench.result(ranked[: k + 1])) for k in range(len(ranked) - 1)]
     return Verified(
@@ -289,3 +296,7 @@ class _Bench:
 
     def online(self, model: FittedModel) -> dict[str, Any]:
         return self._result.estimation.online(model.data)
+
+    def written(self, model: FittedModel) -> dict[str, Any]:
+        """Return the same with what is known of its numbers."""
+        return self._result.estimation.online(with_known(model.data, self._everything, self._settings))

@@ -18,7 +18,7 @@ from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
 from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
-from tendonfmu.diagnosis.extension_fit import fit_numbers
+from tendonfmu.diagnosis.extension_fit import fit_numbers, with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.pictures import Compared
@@ -173,6 +173,10 @@ class _Changes:
             data = fit_numbers(data, own, settings).data
         return self._chosen.online(data)
 
+    def _written(self, changes: Sequence[Cause]) -> Data:
+        """Return the same with what is known of its numbers."""
+        return with_known(self._online(changes), self._given.whole, self._asked.settings)
+
     # --- what is reported ---
 
     def _result(self, dropped: Sequence[Cause]) -> Diagnosis:
@@ -211,8 +215,8 @@ class _Changes:
             events=self._events,
             experiment=Experiment(self._next(causes)),
             detection=None,
-            nominal_data=models[0],
-            extended_data=self._online(search.causes) if causes else models[0],
+            nominal_data=self._written(()),
+            extended_data=self._written(search.causes),
             tested=search.tried,
             event_gain=event_gain(models[-1], given.whole, self._changed_events()),
             kind="change",

@@ -15,6 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.estimate import (
     Choice,
     Estimator,
@@ -29,9 +30,10 @@ from tendonfmu.estimate import (
     learn_batch,
     unknown_names,
     unknowns,
+    with_known_numbers,
     with_values,
 )
-from tendonfmu.model import finger_from_data, law_path, moment_arms, native, number_of
+from tendonfmu.model import effects, finger_from_data, law_path, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording
 
 MOST_SAMPLES = 20_000  # samples that a fit learns from, about
@@ -105,6 +107,12 @@ def learn_numbers(
 ) -> tuple[Structure, Learned]:
     """Fit the numbers of a description and return everything known about the fit."""
     return _learned(data, recordings, settings, given, None, _thinning(recordings, MOST_SAMPLES), TOLERANCE)
+
+
+def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
+    """Return a fitted description with what recordings tell of its numbers (`estimated`)."""
+    own = [_with_own_target(data, recording) for recording in recordings]
+    return with_known_numbers(finger_from_data(data, settings.path), own).data
 
 
 def _learned(
@@ -186,11 +194,10 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     """Return the causes without those that change a law which only a cause outside of the list would add."""
     kept = []
     for cause in causes:
-        try:
+        path = changed_law(cause)
+        if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)
-        except (KeyError, StopIteration, AttributeError):  # the law that the cause would change is missing
-            continue
-        kept.append(cause)
+            kept.append(cause)
     return kept
 
 

@@ -10,6 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
+    from .estimates import known_numbers
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate
     from .files import (
@@ -48,6 +49,6 @@ if TYPE_CHECKING:
         with_values,
     )
     from .uncertainty import parameter_uncertainty
-    from .verdicts import Fitted
+    from .verdicts import Fitted, with_known_numbers
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -14,6 +14,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.estimates import known_numbers, unknown_errors
 from tendonfmu.estimate.structure import described, estimable_numbers, own_copy, set_number
 from tendonfmu.files import check_output, check_output_folder, read_json, write_text
 from tendonfmu.model import Finger, read_finger
@@ -158,7 +159,7 @@ class PreviousFit:
 
     path: Path  # file of the report or of the description
     values: Mapping[str, float]  # numbers of the description by path (SI)
-    names: Sequence[str]  # [k] unknowns with a known covariance; empty if the previous fit did not state it
+    names: Sequence[str]  # [k] unknowns that were estimated; empty if the previous fit did not state their covariance
     covariance: Numbers  # [k, k] of these unknowns
     share: float  # effective samples per sample of its residuals, the least of all joints; 1 if unknown
 
@@ -168,13 +169,21 @@ def read_previous_fit(path: Path) -> PreviousFit:
     content = read_json(path, "a previous fit: its report, or the description that it wrote")
     if isinstance(content, dict) and content.get("format") == FIT_REPORT:
         return _of_report(path, content)
-    return estimated_numbers(read_finger(path))
+    finger = read_finger(path)
+    every = {number.path: 0.0 for number in estimable_numbers(finger.data)}
+    return estimated_numbers(finger) or _with_errors(finger, every)
 
 
-def estimated_numbers(finger: Finger) -> PreviousFit:
-    """Return the numbers of a description that a fit wrote."""
+def estimated_numbers(finger: Finger) -> PreviousFit | None:
+    """Return the numbers of a description that were estimated; None if none was."""
+    errors = {path: error for path, (_, error) in known_numbers(finger.data).items()}
+    return _with_errors(finger, errors) if errors else None
+
+
+def _with_errors(finger: Finger, errors: Mapping[str, float]) -> PreviousFit:
     values = {number.path: number.value for number in estimable_numbers(finger.data)}
-    return PreviousFit(finger.path, values, (), np.zeros((0, 0)), 1.0)
+    unknown = unknown_errors(finger.data, errors)
+    return PreviousFit(finger.path, values, list(unknown), np.diag(np.square(list(unknown.values()))), 1.0)
 
 
 def _of_report(path: Path, report: Mapping[str, Any]) -> PreviousFit:

@@ -15,6 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.estimates import with_estimates
 from tendonfmu.estimate.evaluation import Evaluation, evaluate
 from tendonfmu.estimate.files import (
     PreviousFit,
@@ -26,7 +27,7 @@ from tendonfmu.estimate.files import (
     with_previous_values,
 )
 from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
-from tendonfmu.estimate.given_numbers import is_worse, movement, one_load, were_estimated
+from tendonfmu.estimate.given_numbers import is_worse, movement
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.methods import (
     FrictionFitOptions,
@@ -41,7 +42,7 @@ from tendonfmu.estimate.methods import (
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
-from tendonfmu.estimate.verdicts import Fitted, judge_numbers
+from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
@@ -163,7 +164,7 @@ class FrictionFit(Configured):
         previous = None if options.previous is None else read_previous_fit(Path(options.previous))
         if previous is not None:
             finger = with_previous_values(finger, previous)
-        elif were_estimated(finger, options.start_values):
+        else:
             previous = estimated_numbers(finger)
         choice = Choice(_sides(options), options.only, options.fix, options.share, options.scale)
         self.structure_ = build_structure(finger, choice)
@@ -255,6 +256,8 @@ class FrictionFit(Configured):
         self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
         is_known = self.options.uncertainty and bool(np.isfinite(learned.covariance).all())
         uncertainty = self._write_uncertainty(learned) if is_known else None
+        numbers, noise = [each.number for each in self.numbers_], number_of(self.description_.data, "bias.noise_std")
+        self.description_ = with_estimates(self.description_, numbers, self.covariance_, sizes_of(numbers, noise))
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *fit_sentences(learned, self.numbers_)]
@@ -266,9 +269,7 @@ class FrictionFit(Configured):
             warnings=self.warnings_,
             numbers=self.numbers_,
             routing=self.routing_,
-            movement=movement(
-                self.numbers_, self.options.change if is_estimated else None, keeps, one_load(self.training_)
-            ),
+            movement=movement(self.numbers_, is_estimated, keeps),
             innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
             training=self.training_,
             comparisons=self.comparisons_,

@@ -1,8 +1,13 @@
 """The two methods of a fit, maximum likelihood and Kalman filter, over the estimator of `estimation.py`.
 
 Both first fit with each sample counting as one. If the residuals are then not white, each sample counts for its share
-of an effective number of samples (`effective_number`), by joint and stretch of a recording, and the fit is repeated
+of an effective number of samples (`sample_weights`), by joint and stretch of a recording, and the fit is repeated
 with these weights: they shift the balance of data and prior, the estimates and their covariance.
+
+The prior is a Gaussian about the given numbers with covariance C + (s · size)²: C is that of an earlier fit, if any,
+and s, by how much the numbers are off, is the one under which the data are most likely (`_most_likely`). So numbers
+that the data do not contradict stay. What is reported as known does not rest on s: it counts numbers as known to within
+C and CHANGE if they were estimated before, else to within their size.
 
 The residuals are measured once, at the first fit. A fit that the prior holds back has residuals of a wrong model, which
 are more strongly correlated.
@@ -16,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.files import PreviousFit
@@ -30,6 +35,11 @@ Start = Callable[[Sequence[str]], Numbers]
 
 
 _LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 in a previous fit leave it
+CHANGE = 0.02  # of a number that was estimated before: what wear, temperature and another instrument may have changed
+_MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
+_GUESS = 1.0  # of a number that nobody has estimated
+_SPREADS = np.geomspace(1e-3, _GUESS, 31)
+_CLEARLY = 0.5  # by which the log likelihood must rise before numbers leave where they were
 
 
 @dataclass(frozen=True)
@@ -48,15 +58,6 @@ class Settings:
     effective: bool = True  # whether samples count for their share of an effective number
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
-
-    @property
-    def prior(self) -> float:
-        """Return the prior's standard deviation / expected magnitude."""
-        return self.options.prior or 1.0
-
-    def prior_beside(self, share: float) -> float:
-        """Return the same where samples count for a share: a guess weighs no more because they weigh less."""
-        return self.prior / float(np.sqrt(share)) if self.options.prior is None else self.prior
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Learned:
     estimator: Estimator  # unknowns, and their conversion into numbers of the description
     z: Numbers  # [u] estimate
     covariance: Numbers  # [u, u] of z, prior included
+    prior: Numbers  # [u, u] covariance of what was known before
     information: Numbers  # [u, u] of the data alone
     cost: float  # negative log likelihood with the prior; NaN for the filter
     iterations: int  # number of steps, and of passes over the data
@@ -169,9 +171,20 @@ def _measured_weights(
     most = 1.0 if settings.previous is None else settings.previous.share
     for number, (place, part) in enumerate(added):
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
-        measured = sample_weights(innovation / np.sqrt(variance)[:, None])
+        step = float(np.median(np.diff(recordings[place].time[part])))
+        stroke = _stroke_time(recordings[place].model.joint_speed[part], step)
+        measured = sample_weights(innovation / np.sqrt(variance)[:, None], step, stroke)
         weights[place][part] = np.minimum(measured, most)
     return weights
+
+
+def _stroke_time(joint_speed: Numbers, step: float) -> float:
+    """Return the mean time (s) between reversals of any joint."""
+    reversals = 1
+    for speed in joint_speed.T:
+        moving = speed[np.abs(speed) > _MOVES * np.abs(speed).max(initial=0.0)]
+        reversals += np.count_nonzero(np.diff(np.sign(moving)))
+    return step * len(joint_speed) / reversals
 
 
 def learn_batch(
@@ -182,26 +195,32 @@ def learn_batch(
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
     added = _add_recordings(estimator, recordings)
-    prior = settings.prior
-    if settings.previous is not None:
-        estimator.set_known(_known_information(estimator, settings))
-        prior = np.inf  # the known information contains the prior
-    result = _fitted(estimator, begin, prior, settings, watch, "")
+    prior = _Prior.of(estimator, settings)
+    given = settings.options.prior
+    covariance = prior.of_spread(_GUESS if given is None else given)
+    result = _fitted(estimator, begin, covariance, settings, watch, "")
     steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
     if settings.effective:
         weights = _measured_weights(estimator, result.z, recordings, added, settings)
-    if any((each < 1).any() for each in weights):
+    is_coloured = any((each < 1).any() for each in weights)
+    if is_coloured:
         for number, (place, part) in enumerate(added):
             estimator.set_weights(number, weights[place][part.start])
-        if settings.previous is None:
-            prior = settings.prior_beside(np.mean(np.concatenate([weights[place][part] for place, part in added])))
-        result = _fitted(estimator, result.z, prior, settings, watch, ", with effective samples")
+    if is_coloured or given is None:
+        if given is None:
+            _, gradient, information = estimator.evaluate(result.z)
+            passes += 1
+            pull = information @ (result.z - estimator.start) - gradient
+            covariance = _most_likely(information, pull, prior)
+        what = ", with effective samples" if is_coloured else ""
+        result = _fitted(estimator, result.z, covariance, settings, watch, what)
         steps, passes = steps + result.steps, passes + result.passes
     return Learned(
         estimator=estimator,
         z=result.z,
-        covariance=result.covariance,
+        covariance=result.covariance if given is not None else prior.posterior(result.information),
+        prior=prior.reported(given),
         information=result.information,
         cost=result.cost,
         iterations=steps,
@@ -213,36 +232,108 @@ def learn_batch(
     )
 
 
-def _known_information(estimator: Estimator, settings: Settings) -> Numbers:
-    """Compute [u, u] the information of the prior about the previous values, which are the estimator's start."""
-    # The prior of an unknown is a Gaussian about its previous value with covariance C + D. C is that of the previous
-    # fit, if its report has it. D is diagonal, (change · size)², for the change by wear, temperature or another
-    # instrument of the type since then.
-    previous = settings.previous
-    assert previous is not None
-    start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
-    size = np.maximum(np.abs(start), _LEAST * scale)
-    is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
-    size[is_bias] = np.maximum(size[is_bias], settings.noise)
-    has = np.array([unknown.path in previous.values for unknown in estimator.unknowns], dtype=bool)
-    variance = np.where(has, settings.options.change * size, settings.prior * scale) ** 2
-    place = {name: k for k, name in enumerate(previous.names)}
-    both = [k for k, name in enumerate(names) if name in place and has[k]]
-    before = [place[names[k]] for k in both]
-    covariance = np.diag(variance)
-    covariance[np.ix_(both, both)] += previous.covariance[np.ix_(before, before)]
-    # its correlations are rounded: no direction counts as known better than by a relative 1e-6
+def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Learned:
+    """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
+    estimator, settings = _estimator(structure), Settings(FrictionFitOptions(), passes=1)
+    added = _add_recordings(estimator, recordings)
+    weights = _measured_weights(estimator, estimator.start, recordings, added, settings)
+    for number, (place, part) in enumerate(added):
+        estimator.set_weights(number, weights[place][part.start])
+    cost, _, information = estimator.evaluate(estimator.start)
+    prior = _Prior.of(estimator, settings)
+    return Learned(
+        estimator=estimator,
+        z=estimator.start,
+        covariance=prior.posterior(information),
+        prior=prior.reported(None),
+        information=information,
+        cost=cost,
+        iterations=0,
+        passes=1,
+        converged=True,
+        weights=weights,
+        innovations=[],
+        warnings=[],
+    )
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """What is known of the unknowns before the data: a Gaussian about the estimator's start."""
+
+    covariance: Numbers  # [u, u] C of an earlier fit; 0 where nothing is known
+    size: Numbers  # [u] expected magnitude
+    estimated: Flags  # [u] whether an earlier fit has estimated it
+
+    @classmethod
+    def of(cls, estimator: Estimator, settings: Settings) -> _Prior:
+        start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
+        covariance, estimated = np.zeros((len(names),) * 2), np.zeros(len(names), dtype=bool)
+        previous = settings.previous
+        if previous is None:
+            return cls(covariance, scale, estimated)
+        known = [unknown.path in previous.values for unknown in estimator.unknowns]
+        estimated = np.array([name in previous.names for name in names] if len(previous.names) else known, dtype=bool)
+        size = np.where(estimated, np.maximum(np.abs(start), _LEAST * scale), scale)
+        is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
+        size[is_bias] = np.maximum(size[is_bias], settings.noise)
+        place = {name: k for k, name in enumerate(previous.names)}
+        both = [k for k, name in enumerate(names) if name in place and estimated[k]]
+        before = [place[names[k]] for k in both]
+        covariance[np.ix_(both, both)] = previous.covariance[np.ix_(before, before)]
+        return cls(covariance, size, estimated)
+
+    def of_spread(self, spread: float | Numbers, share: float = 1.0) -> Numbers:
+        """Return the covariance [u, u] if numbers are off by `spread` of their size, beside a share of C."""
+        return share * self.covariance + np.diag((spread * self.size) ** 2)
+
+    def reported(self, given: float | None) -> Numbers:
+        """Return the covariance [u, u] that standard errors rest on."""
+        return self.of_spread(np.where(self.estimated, CHANGE, _GUESS) if given is None else given)
+
+    def posterior(self, information: Numbers) -> Numbers:
+        """Return the covariance [u, u] of the estimate by the information [u, u] of the data and what was known."""
+        return np.asarray(np.linalg.inv(information + _inverse(self.reported(None))), dtype=np.float64)
+
+
+def _inverse(covariance: Numbers) -> Numbers:
+    """Invert a covariance whose correlations are rounded: no direction counts as better known than by 1e-6."""
     root = np.sqrt(np.diag(covariance))
     value, turn = np.linalg.eigh(covariance / np.outer(root, root))
     turned = turn / root[:, None]
     return np.asarray((turned / np.maximum(value, 1e-6)) @ turned.T)
 
 
+def _most_likely(information: Numbers, pull: Numbers, prior: _Prior) -> Numbers:
+    """Return the prior's covariance [u, u] under which the data are most likely (empirical Bayes).
+
+    information [u, u] and pull [u] = information · (estimate by the data alone − start).
+    """
+    scale = prior.size
+    information, pull = information * np.outer(scale, scale), pull * scale
+
+    def log_likelihood(covariance: Numbers) -> float:
+        scaled = covariance / np.outer(scale, scale)
+        both = np.eye(len(scale)) + information @ scaled
+        return 0.5 * float(pull @ scaled @ np.linalg.solve(both, pull) - np.linalg.slogdet(both)[1])
+
+    shares = (0.0, 1.0) if prior.covariance.any() else (0.0,)
+    least, *others = (prior.of_spread(spread, share) for share in shares for spread in _SPREADS)
+    best = max(others, key=log_likelihood)
+    return best if log_likelihood(best) > log_likelihood(least) + _CLEARLY else least
+
+
 def _fitted(
-    estimator: Estimator, begin: Numbers, prior: float, settings: Settings, watch: Watch, what: str
+    estimator: Estimator,
+    begin: Numbers,
+    prior: Numbers,
+    settings: Settings,
+    watch: Watch,
+    what: str,
 ) -> BatchResult:
     """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
     best, best_cost = begin, float("nan")
+    estimator.set_known(_inverse(prior))  # [u, u]
 
     def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
         nonlocal best, best_cost
@@ -253,7 +344,7 @@ def _fitted(
     try:
         result = estimator.fit(
             begin,
-            prior_std=prior,
+            prior_std=np.inf,
             max_passes=settings.passes,
             tolerance=settings.options.tolerance,
             threads=settings.options.threads,
@@ -282,26 +373,29 @@ def learn_ekf(
             learner.begin_pass()
         innovations = _filter_once(learner, estimator, recordings, watch, number)
     z, covariance = learner.z, learner.covariance
-    plain = np.diag(1 / (settings.prior * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
+    prior, given = _Prior.of(estimator, settings), settings.options.prior
+    begun = _GUESS if given is None else given
+    plain = np.diag(1 / (begun * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
     if settings.effective and settings.options.drift == 0:
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
-    if share < 1 or settings.previous is not None:
+    if share < 1 or settings.previous is not None or (given is None and settings.options.drift == 0):
         # information of the data alone about the prior's mean; a resumed filter started elsewhere
         first = np.array([unknown.start for unknown in learner.unknowns])
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
-        own = (settings.prior / settings.prior_beside(share)) ** 2 * plain
-        known = own if settings.previous is None else _known_information(estimator, settings)
         information = share * information
-        covariance = np.asarray(np.linalg.inv(information + known), dtype=np.float64)
-        z = _within(estimator, mean + covariance @ pull)
+        about = _most_likely(information, pull, prior) if given is None else prior.of_spread(given)
+        found = np.asarray(np.linalg.inv(information + _inverse(about)), dtype=np.float64)
+        z = _within(estimator, mean + found @ pull)
+        covariance = prior.posterior(information) if given is None else found
     return Learned(
         estimator=estimator,
         z=z,
         covariance=covariance,
+        prior=prior.reported(given),
         information=information,
         cost=float("nan"),
         iterations=settings.passes,
@@ -362,6 +456,7 @@ def _learner(structure: Structure, estimator: Estimator, settings: Settings, sta
         scale = np.where(np.isnan(scale), own, scale)
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
     try:
-        return Learner(image, structure.group, scale, prior_std=settings.prior, parameter_drift=settings.options.drift)
+        prior = _GUESS if settings.options.prior is None else settings.options.prior
+        return Learner(image, structure.group, scale, prior_std=prior, parameter_drift=settings.options.drift)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

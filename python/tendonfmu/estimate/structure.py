@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,8 @@ class Structure:
     group: NDArray[np.int32]
     scale: NDArray[np.float64]  # [p] expected magnitudes; NaN: that of the start
     index: Mapping[str, int]  # path -> index among the p parameters
-    sensor_fault: Mapping[str, Any] | None = None  # `sensor_fault` of the description, which `start` lacks
+    # `sensor_fault` and `estimated` of the description, which `start` lacks
+    beside: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
             group[index[number.with_path]] = owner
     return Structure(
         start=start,
-        sensor_fault=finger.data.get("sensor_fault"),
+        beside={key: finger.data[key] for key in ("sensor_fault", "estimated") if finger.data.get(key) is not None},
         numbers=_numbered(start, chosen),
         group=group,
         scale=_scales(paths, chosen, choice.scale),
@@ -82,9 +83,8 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
 
 
 def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Remove `contact.uncertainty*` and `sensor_fault`."""
-    if data.get("sensor_fault") is not None:
-        data = {key: value for key, value in data.items() if key != "sensor_fault"}
+    """Remove `contact.uncertainty*`, `sensor_fault` and `estimated`."""
+    data = {key: value for key, value in data.items() if key not in ("sensor_fault", "estimated")}
     contact = data.get("contact") or {}
     if contact.get("uncertainty") is None:
         return data
@@ -150,8 +150,7 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
             and get_number(data, f"{law}.static") < get_number(data, number.path)
         ):
             set_number(data, number.path, get_number(data, f"{law}.static"))
-    if structure.sensor_fault is not None:
-        data["sensor_fault"] = dict(structure.sensor_fault)
+    data |= structure.beside
     with own_fault("the fitted description"):  # a fit keeps within every bound
         return finger_from_data(data, structure.start.path)
 

@@ -8,16 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from tendonfmu.arrays import Numbers
+from tendonfmu.estimate.estimates import with_estimates
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.estimation import Unknown as FittedUnknown
-from tendonfmu.estimate.fisher_information import Unknown
+from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
-from tendonfmu.estimate.methods import Learned
-from tendonfmu.estimate.structure import Structure, values_of
+from tendonfmu.estimate.methods import Learned, learned_at
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, values_of
 from tendonfmu.model import Finger
+from tendonfmu.recordings import FitRecording, bias_settings
 
-CAUSES = {**CAUSES_OF_A_MOTION, "never_moves": "never slides at all", "side": "never slides to that side"}
+CAUSES = {
+    **CAUSES_OF_A_MOTION,
+    "never_moves": "never slides at all",
+    "side": "never slides to that side",
+    "kept": "kept from the earlier estimate",
+}
+NARROWED = 0.5  # of the prior's standard deviation: what data identify, they know at least so much better
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown
 _AT_BOUND = 1e-6
 
@@ -41,7 +49,7 @@ class Fitted:
 
     @property
     def identified(self) -> bool:
-        """Whether the standard error is at most `identifiability.LIMIT` of the value."""
+        """Whether the data know it: standard error at most LIMIT of the value and NARROWED of the prior's."""
         return not self.cause
 
 
@@ -67,11 +75,12 @@ def judge_numbers(
     """Judge every number of a fitted finger by what the motion covers; return the covariance [p, p] of the values."""
     # noise: of the torque (N·m); a bias.initial_torque counts as at least that large
     estimator, z = learned.estimator, learned.z
-    numbers = values_of(structure, finger)
-    matrix = slopes(estimator, z)[[structure.index[number.path] for number in numbers]]
+    numbers, matrix = number_slopes(structure, learned, finger)
     covariance = matrix @ learned.covariance @ matrix.T
-    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    size = np.array([_size(number, noise) for number in numbers])
+    error, before = (
+        np.sqrt(np.maximum(np.diag(each), 0.0)) for each in (covariance, matrix @ learned.prior @ matrix.T)
+    )
+    size = sizes_of(numbers, noise)
     columns = _columns(structure, estimator)
     representatives = _representatives(numbers, columns, coverage)
     # `error` from all numbers, `error_alone` with all others known
@@ -88,27 +97,46 @@ def judge_numbers(
     )
     by_path = {cover.effect.path: cover for cover in coverage}
     judged = []
-    for k, (number, before) in enumerate(zip(numbers, structure.numbers, strict=True)):
+    for k, (number, given) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
         cover = by_path[number.effect.path] if number.effect is not None else None
-        cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else ""
+        kept = "kept" if error[k] > NARROWED * before[k] else ""
+        cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else kept
         judged.append(
             Fitted(
                 number=number,
-                start=before.value,
+                start=given.value,
                 standard_error=float(error[k]),
                 at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
-                reason=verdict.reason if cause else "",
-                advice=_advice(cause, verdict, cover, finger) if cause else "",
+                reason=CAUSES[kept] if cause == "kept" else verdict.reason if cause else "",
+                advice=_advice(cause, verdict, cover, finger) if cause not in ("", "kept") else "",
             )
         )
     return judged, covariance
 
 
-def _size(number: Unknown, noise: float) -> float:
-    """Return the size that a standard error is relative to: the value, or for a bias at least the noise."""
-    return max(abs(number.value), noise if number.path.startswith("bias.") else 1e-300)
+def number_slopes(structure: Structure, learned: Learned, finger: Finger) -> tuple[list[Unknown], Numbers]:
+    """Return the estimated numbers of a fitted finger, and [p, u] their derivatives by the unknowns."""
+    numbers = values_of(structure, finger)
+    matrix = slopes(learned.estimator, learned.z)
+    return numbers, matrix[[structure.index[number.path] for number in numbers]]
+
+
+def sizes_of(numbers: Sequence[Unknown], noise: float) -> Numbers:
+    """Return [p] what a standard error is relative to: the value, or for a bias at least the noise."""
+    return np.array([max(abs(each.value), noise if each.path.startswith("bias.") else 1e-300) for each in numbers])
+
+
+def with_known_numbers(finger: Finger, recordings: Sequence[FitRecording]) -> Finger:
+    """Return a fitted finger with `estimated`: what these recordings tell of its numbers."""
+    if not unknowns(finger.data):
+        return finger
+    structure = build_structure(finger, Choice())
+    learned = learned_at(structure, recordings)
+    numbers, matrix = number_slopes(structure, learned, finger)
+    noise = bias_settings(finger.data).noise
+    return with_estimates(finger, numbers, matrix @ learned.covariance @ matrix.T, sizes_of(numbers, noise))
 
 
 def _bound(unknown: FittedUnknown, value: float) -> str | None:

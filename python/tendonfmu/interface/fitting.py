@@ -158,8 +158,6 @@ def fit(
     prior: float | None = None,
     scale: str | Sequence[str] = (),
     previous: str | os.PathLike[str] | None = None,
-    change: float = 0.02,
-    start_values: str = "auto",
     effective_samples: bool = True,
     passes: int | None = None,
     tolerance: float = 0.3,
@@ -192,13 +190,10 @@ def fit(
     asymmetric
         Whether the sides of every law are fitted apart (True), as one (False), or as the description has them (None).
     prior, scale
-        Standard deviation of the prior / expected magnitude, and "PATTERN=VALUE": expected magnitudes in place of
-        those of the description.
-    previous, change
-        Report or description of an earlier fit, as the prior (`--from`), and the expected relative change since.
-    start_values
-        Whether the given numbers were "estimated" before, and are the prior, or "guessed"; "auto": estimated if the
-        description says how uncertain its friction is.
+        By how much the given numbers are off / expected magnitude (None: learned from the data), and "PATTERN=VALUE":
+        expected magnitudes in place of those of the description.
+    previous
+        Report or description of an earlier fit, as the prior (`--from`).
     effective_samples
         Whether correlated residuals count as fewer samples.
     passes, tolerance

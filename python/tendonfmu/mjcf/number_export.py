@@ -154,7 +154,11 @@ def _unsure(report: Path) -> dict[str, str]:
     if not isinstance(rows, list):
         raise InputError(f"{report}: expected a report of tendonfmu fit --report")
     why = {True: "at a bound of the fit", False: "not identified by the fit"}
-    return {row["path"]: why[row["at_bound"]] for row in rows if row["at_bound"] or not row["identified"]}
+    return {
+        row["path"]: why[row["at_bound"]]
+        for row in rows
+        if row["at_bound"] or not (row["identified"] or row["reason"] == "kept")
+    }
 
 
 def _is_sound(change: Change, unsure: Mapping[str, str], left_out: list[str]) -> bool:

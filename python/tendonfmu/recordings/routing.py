@@ -32,6 +32,7 @@ SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
 CERTAIN = 1.5  # halves of an interval; many numbers are compared
 SEEN_APART = 0.05  # of a stiffness that only other tendons show: its interval, and what differs
+NORMAL = 1.96  # standard deviations of half an interval
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
@@ -190,6 +191,8 @@ def routed(finger: Finger, learned: Sequence[TendonRouting]) -> tuple[Finger, li
         tendon["moment_arms"] = arms
         tendon |= {"stiffness": _rounded(each.stiffness)} if each.stiffness.differs else {}
         tendon |= {"zero": _rounded(each.zero)} if each.zero.differs else {}
+    errors = {number.path: [_rounded(number), float(f"{number.half / NORMAL:.4g}")] for number in moved}
+    data["estimated"] = {**(data.get("estimated") or {}), **errors}
     return finger_from_data(data, finger.path), moved
 
 

@@ -67,9 +67,17 @@ def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str]
         first += [("slow", "at v_min"), ("slow_limit", "its 95 %")]
     if any(asymmetric(effect) for effect in points):
         first += [("negative", "negative direction")]
+    if not all(is_known(effect, picture) for effect in drawn):
+        first += [("unknown", "not identified")]
     still = any(not effect.angles and velocity_threshold(picture.fitted.data, effect) for effect in drawn)
     rest = [("standstill", "below v_min: no friction acts, the bias takes its part")] if still else []
     return (*first, *_LAW_KEYS, *rest)
+
+
+def is_known(effect: Effect, picture: FitPicture) -> bool:
+    """Say whether the Coulomb friction of a law is known at a working point at least, or was not estimated."""
+    entries = [each for each in numbers_of(effect, picture.report) if each["path"].endswith(".coulomb")]
+    return not entries or any(each["identified"] or each["reason"] == "kept" for each in entries)
 
 
 class _Motion:
@@ -108,6 +116,10 @@ class _Desk:
             return joint if effect.kind == "friction" else f"{joint}, load"
         return f"{'pulley' if effect.kind == 'pulley_friction' else 'edge'} {effect.joint} ({joint})"
 
+    def _style(self, effect: Effect) -> str:
+        """Return how a law is drawn: grey where nothing tells its Coulomb friction."""
+        return "fitted" if is_known(effect, self._picture) else "unknown"
+
     def _note(self, effect: Effect) -> str:
         numbers = numbers_of(effect, self._picture.report)
         return (
@@ -142,7 +154,7 @@ class _Desk:
             x_label=x_label,
             y_label=y_label,
             bands=(Band("confidence", x, both("high", "low"), both("low", "high")),),
-            curves=(Curve("start", x, both("start", "start")), Curve("fitted", x, both("fitted", "fitted"))),
+            curves=(Curve("start", x, both("start", "start")), Curve(self._style(fitted), x, both("fitted", "fitted"))),
             stripes={"standstill": [(-unit * threshold, unit * threshold)]} if threshold else {},
             data=_histogram(unit * sliding, -limit, limit),
             x_limits=(-limit, limit),
@@ -168,7 +180,7 @@ class _Desk:
                 curves += [Curve("slow_limit", angle, factor * limit) for limit in (curve.low, curve.high)]
             else:
                 bands.append(Band(f"{style}_confidence", angle, factor * curve.low, factor * curve.high))
-            curves.append(Curve(style, angle, factor * curve.fitted))
+            curves.append(Curve(self._style(fitted) if style == "fitted" else style, angle, factor * curve.fitted))
         before = self._picture.fitted.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
         lowest, highest = factor * laws[-1].fitted.min(), factor * laws[-1].fitted.max()
         return Panel(

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tendonfmu.estimate import FitPicture, Fitted, FrictionFit, identifiability, verdicts
-from tendonfmu.files import counted
+from tendonfmu.estimate import FitPicture, Fitted, FrictionFit, identifiability, known_numbers, verdicts
+from tendonfmu.files import are, counted
+from tendonfmu.model import Finger, effects
 from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit
 
 Report = Mapping[str, Any]
@@ -109,13 +110,29 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     if "given_numbers" in report:  # reports of earlier versions have none
         yield report["given_numbers"]["paragraph"]
     count, of = report["identified"]["count"], report["identified"]["of"]
-    if count == of:
-        yield f"All {of} numbers are identified: their standard errors are at most {_LIMIT} of their values."
-    else:
-        yield (
-            f"{count} of {of} numbers are identified: their standard errors are at most {_LIMIT} of their values. What "
-            f"would identify the {'last one' if of - count == 1 else f'other {of - count}'} is listed below."
-        )
+    kept = sum(entry["reason"] == "kept" for entry in report["parameters"])
+    yield (
+        f"{count} of {of} numbers are identified by these recordings: their standard errors are at most {_LIMIT} of "
+        "their values, and at most half of what was known before."
+    )
+    if kept:
+        yield f"{counted(kept, 'number')} {are(kept)} kept from the earlier estimate: these recordings tell no more."
+    if count + kept < of:
+        yield f"What would identify the other {of - count - kept} is listed below."
+    yield from sums_known(picture.fitted)
+
+
+def sums_known(finger: Finger) -> Iterator[str]:
+    """Name the tendons whose friction is known in sum, but not at each of its places."""
+    known = known_numbers(finger.data)
+    for i, name in enumerate(finger.tendon_names, start=1):
+        places = [effect.path for effect in effects(finger.data) if effect.tendon == i]
+        if f"tendons[{i}]" in known and not all(path in known for path in places):
+            value, error = known[f"tendons[{i}]"]
+            yield (
+                f"Coulomb friction of tendon {name}, all {counted(len(places), 'place')} together: "
+                f"{rounded(100.0 * value, 2)} ± {rounded(100.0 * error, 1)} % of its force."
+            )
 
 
 def _what(picture: FitPicture) -> Iterator[str]:
@@ -219,7 +236,7 @@ def tables(fit: FrictionFit) -> Iterator[Table]:
     report, known = fit.report_, fit.report_["identified"]
     yield _residuals(report, fit.description_.joint_names)
     yield (
-        f"numbers with a standard error of at most 30 %: {known['count']} of {known['of']}",
+        f"numbers that these recordings identify: {known['count']} of {known['of']}",
         ("kind", "numbers", "identified", "median change", "at a bound"),
         list(_kinds(fit.numbers_)),
     )
@@ -289,11 +306,12 @@ def lines(fit: FrictionFit) -> Iterator[str]:
         yield _uncertainty(report["uncertainty"])
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():
         yield f"  {count} not identified: {verdicts.CAUSES[cause]}"
-        several = [number for number in numbers if number.cause == cause]
+        several = [number for number in numbers if number.cause == cause and number.advice]
         for number in several[:EXAMPLES]:
             yield f"    {number.number.path}: {number.advice}"
-        if count > EXAMPLES:
+        if len(several) > EXAMPLES:
             yield f"    ... and {count - EXAMPLES} more; --report lists all"
+    yield from sums_known(fit.description_)
 
 
 def _uncertainty(uncertainty: Report) -> str:

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis import Cause, Diagnosis, reported_causes
 from tendonfmu.drawing import GREY
+from tendonfmu.estimate import known_numbers
 from tendonfmu.files import are, counted, listed
 from tendonfmu.model import EDGE_RED, Effect, FingerDrawing, Mark, effects, finger_drawing, finger_svg
 from tendonfmu.report.diagnosis_words import words_of
@@ -87,29 +88,38 @@ def keys_of(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
 
 
 def friction_figure(data: Data) -> FingerFigure:
-    """Draw the finger with its largest friction by place."""
+    """Draw the finger with its largest friction by place, where the data tell it; else that of the tendon."""
+    known, unknown = known_numbers(data), dict[int, int]()
     places: list[tuple[float, Mark]] = []
-    for effect in effects(data):
-        size = max(_level(law) for law in effect.laws)
-        if effect.kind == "friction":
-            places.append((np.inf, Mark(rounded(1e3 * size, 2), effect.joint, None)))
+    for effect in (effect for effect in effects(data) if effect.tendon or effect.kind == "friction"):
+        if effect.path not in known:
+            unknown[effect.tendon] = unknown.get(effect.tendon, 0) + 1
         elif effect.tendon:
-            places.append((size, _mark(effect, size)))
+            places.append((known[effect.path][0], _mark(effect, known[effect.path][0])))
+        else:
+            places.append((np.inf, Mark(rounded(1e3 * known[effect.path][0], 2), effect.joint, None)))
     drawing = finger_drawing(data)
     largest = sorted((place for place in places if place[0] > 0.0), key=lambda place: -place[0])[:MOST_PLACES]
-    fewer = " Only the largest are shown." if len(places) > MOST_PLACES else ""
-    caption = (
-        "Coulomb friction: of a joint in mN·m, of a pulley or an edge in % of the tendon force. The base is on the "
-        f"left.{fewer}"
-    )
-    return FingerFigure(finger_svg(drawing, [mark for _, mark in largest]), list(keys_of(drawing)), caption)
+    caption = [
+        "Coulomb friction: of a joint in mN·m, of a pulley or an edge in % of the tendon force.",
+        "The base is on the left.",
+    ]
+    if len(places) > MOST_PLACES:
+        caption.append("Only the largest are shown.")
+    if unknown:
+        left_out = counted(sum(unknown.values()), "place")
+        caption.append(f"Left out: {left_out} whose friction the recordings do not tell.")
+    caption += [
+        f"All places of tendon {drawing.tendons[tendon - 1].name} together: {_percent(known[path][0])}."
+        for tendon in sorted(unknown)
+        if (path := f"tendons[{tendon}]") in known
+    ]
+    return FingerFigure(finger_svg(drawing, [mark for _, mark in largest]), list(keys_of(drawing)), " ".join(caption))
 
 
 def _mark(effect: Effect, size: float) -> Mark:
-    return Mark(f"{rounded(100.0 * size, 2)} %", effect.joint, effect.tendon, effect.kind == "edge_friction")
+    return Mark(_percent(size), effect.joint, effect.tendon, effect.kind == "edge_friction")
 
 
-def _level(law: Data) -> float:
-    """Return the Coulomb friction of a law, the larger of its two sides."""
-    sides = [law[side] for side in ("positive", "negative") if side in law] or [law]
-    return max(float(side.get("coulomb", 0.0)) for side in sides)
+def _percent(share: float) -> str:
+    return f"{rounded(100.0 * share, 2)} %"

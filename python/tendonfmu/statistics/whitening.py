@@ -21,6 +21,9 @@ WINDOWS = ((1, 1), (2, 2), (3, 3), (4, 4), (5, 8), (9, 16), (17, 32), (33, 64), 
 _ROOM = 20  # rows for each coefficient, at least
 CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
 FEWEST = 20  # pairs of a lag; lags with fewer are not used
+# Noise is forgotten within LASTING. What lasts longer is an error of the model, which counts as new with every stroke;
+# what returns LATER, with strokes that are alike, counts as new every RETURN (docs/evidence/recalibration.md).
+LASTING, LATER, RETURN = 0.1, 1.0, 10.0  # s
 
 
 @dataclass(frozen=True)
@@ -125,18 +128,34 @@ def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
 
 def correlation_time(values: Numbers) -> float:
     """Return τ of a series in samples, at least 1."""
+    return _correlation(values)[0]
+
+
+def _correlation(values: Numbers) -> tuple[float, Numbers, float]:
+    """Return τ in samples, ρ_k for k = 1 .. [K], and the size of a ρ_k that chance makes of noise with this τ."""
     known = ~np.isnan(values)
     count = int(known.sum())
     filled = np.where(known, values, 0.0)
     power = float(filled @ filled)
     if count < FEWEST or power == 0.0:
-        return 1.0
+        return 1.0, np.zeros(0), 1.0
     pairs = np.round(_autocovariance(known.astype(np.float64)))
     reach = int(np.argmax(pairs < FEWEST)) or len(pairs)
     correlations = _autocovariance(filled)[1:reach] / pairs[1:reach] / (power / count)
     ended = correlations <= CHANCE / np.sqrt(pairs[1:reach])
     last = int(np.argmax(ended)) if ended.any() else len(correlations)
-    return min(1.0 + 2.0 * float(correlations[:last].sum()), float(count))
+    time = min(1.0 + 2.0 * float(correlations[:last].sum()), float(count))
+    return time, correlations, float(np.sqrt(time / count))
+
+
+def _shares(correlations: Numbers, chance: float, step: float) -> tuple[float, float]:
+    """Return the shares of the variance that last for longer than noise does, and that return with later strokes."""
+    first, later = (max(round(time / step), 1) for time in (LASTING, LATER))
+    if len(correlations) < first:
+        return 0.0, 0.0
+    lasting = float(correlations[first - 1])
+    returning = float(np.abs(correlations[later - 1 : len(correlations) // 2]).max(initial=0.0))
+    return min(lasting, 1.0) * (lasting > chance), min(returning, 1.0) * (returning > 4.0 * chance)
 
 
 def _autocovariance(values: Numbers) -> Numbers:
@@ -146,10 +165,19 @@ def _autocovariance(values: Numbers) -> Numbers:
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(values)])
 
 
-def sample_weights(standardised: Numbers) -> Numbers:
+def sample_weights(standardised: Numbers, step: float, stroke: float) -> Numbers:
     """Return the share of an independent sample that each sample of a stretch counts for."""
-    # standardised: [N, n]; returns 1/τ of each joint [n]
-    return np.array([1.0 / correlation_time(column) for column in standardised.T])
+    # standardised: [N, n]; step, stroke: time of a sample and of a stroke (s); returns 1/τ of each joint [n]
+    weights = []
+    for column in standardised.T:
+        time, correlations, chance = _correlation(column)
+        if time > 1.0:
+            lasting, returning = _shares(correlations, chance, step)
+            share, new = (returning, RETURN) if returning > lasting else (lasting, stroke)
+            new = min(max(new / step, time), float(np.sum(~np.isnan(column))))
+            time = max(time, (1.0 - share) * time + share * new)
+        weights.append(1.0 / time)
+    return np.array(weights)
 
 
 def effective_samples(standardised: Sequence[Numbers], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
