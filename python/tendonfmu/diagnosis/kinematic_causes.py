@@ -35,6 +35,7 @@ from tendonfmu.recordings import (
     TendonRouting,
     learn_routing,
     prepare,
+    smooth_speeds,
     varying_sentences,
 )
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
@@ -401,26 +402,55 @@ class _Geometry:
 
 
 class _Unseen:
-    """The samples that nothing was learned from."""
+    """The samples that nothing was learned from, without what the equation lacks in the reference as well.
+
+    That is what delays of sensors, springs that are not linear and arms that vary leave.
+    """
 
     def __init__(self, given: Input, seed: int) -> None:
         self._seed = seed
-        listed = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
-        self._recordings = [(each.recording, blocks_of(each.time, mask)) for each, mask in listed if mask.any()]
+        unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
+        self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
+        self._trained = [(each.recording, each.train) for each in given.training]
+        middle = [
+            np.concatenate([recording.groups[name][mask] for recording, mask in self._trained]).mean(axis=0)
+            for name in ("tendon_force", "joint_position")
+            if all(name in recording.groups for recording, _ in self._trained)
+        ]
+        self._shapes = {id(recording): _shapes(recording, *middle) for recording, _ in (*self._judged, *self._trained)}
 
     def gain(self, base: _Geometry, off: Sequence[Off], own: Sequence[Off]) -> Interval:
         """Return the gain of some of all that is off, the others kept."""
-        without = base.moved([each for each in off if each not in own])
-        pairs = [
-            np.column_stack([index.sums((one.left(recording) ** 2).sum(axis=1)) for one in (without, base.moved(off))])
-            for recording, index in self._recordings
-        ]
+        now, without = base.moved(off), base.moved([each for each in off if each not in own])
+        left, shapes = (
+            np.concatenate([of(recording)[mask] for recording, mask in self._trained])
+            for of in (now.left, lambda recording: self._shapes[id(recording)])
+        )
+        shapes = np.where(left[..., None] != 0.0, shapes, 0.0)
+        parts = np.array([np.linalg.lstsq(shapes[:, i], left[:, i])[0] for i in range(left.shape[1])])
+        pairs = []
+        for recording, index in self._judged:
+            shared = np.einsum("kic,ic->ki", self._shapes[id(recording)], parts)
+            both = [one.left(recording) for one in (without, now)]
+            squares = [np.where(one != 0.0, one - shared, 0.0) ** 2 for one in both]
+            pairs.append(np.column_stack([index.sums(each.sum(axis=1)) for each in squares]))
         before, after = np.concatenate(pairs).T
         if not before.sum() > 0.0:
             return Interval(0.0, 0.0, 0.0)
-        between = variance_between(pairs) / len(pairs)
-        gain = gain_interval(before, after, self._seed, between)
+        gain = gain_interval(before, after, self._seed, variance_between(pairs) / len(pairs))
         return gain if math.isfinite(gain.low) else Interval(gain.value, 0.0, 1.0)
+
+
+def _shapes(recording: Recording, force: Numbers, angle: Numbers | None = None) -> Numbers:
+    """Return speeds of position and force, and squares of force and angles, for each tendon [N, m, c]."""
+    # force: [m], angle: [n]; where squares are 0
+    groups, time = recording.groups, recording.time
+    own = [smooth_speeds(time, groups[name]) for name in ("tendon_position", "tendon_force")]
+    shapes = np.stack([*own, (groups["tendon_force"] - force) ** 2], axis=2)
+    if angle is None or "joint_position" not in groups:
+        return shapes
+    squares = np.repeat(((groups["joint_position"] - angle) ** 2)[:, None], len(force), axis=1)
+    return np.concatenate([shapes, squares], axis=2)
 
 
 def _rows(recording: Recording, chosen: Flags) -> Recording:

@@ -11,7 +11,7 @@ are free in both, and what the equation lacks (squares) is shared, so that anoth
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
@@ -24,7 +24,7 @@ from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import FEWEST, white_noise
 from tendonfmu.recordings.smoothing import zero_phase
-from tendonfmu.statistics import noisy_regression
+from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
 FEWEST_BLOCKS = 8
@@ -268,8 +268,8 @@ def _samples(recording: Recording, side: int) -> _Samples | None:
         groups["tendon_position"],
         groups["tendon_force"],
         groups["joint_position"],
-        _speeds(time, groups["tendon_position"]),
-        _speeds(time, groups["tendon_force"]),
+        smooth_speeds(time, groups["tendon_position"]),
+        smooth_speeds(time, groups["tendon_force"]),
         noise["tendon_force"],
         noise["joint_position"],
         np.floor((time - time[0]) / BLOCK).astype(np.int64),
@@ -307,7 +307,7 @@ def _changing(time: Numbers, values: Numbers) -> Flags:
     return changing
 
 
-def _speeds(time: Numbers, values: Numbers) -> Numbers:
+def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     """Compute the smooth derivatives [N, c] between gaps; 0 in pieces too short to smooth."""
     speeds = np.zeros_like(values)
     for begin, end in pairwise([0, *gaps(time), len(time)]):
@@ -349,9 +349,14 @@ def _of_tendon(
     noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
     count, position = len(joints), samples.position[taut, i]
     lacking = squares if sides > 1 else squares[:, :0]  # by the equation, in the reference as well
-    columns = np.column_stack([*([own] * sides), shared, lacking])
-    all_noise = np.array([*([*noise] * sides), *noise_shared, *np.zeros(lacking.shape[1])])
-    found = noisy_regression(columns, all_noise, position, block, side, own.shape[1])
+
+    def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
+        columns = np.column_stack([*([own] * sides), shared, lacking])
+        variance = np.append(noise, np.zeros(own.shape[1] - len(noise)))
+        all_noise = np.array([*np.tile(variance, sides), *noise_shared, *np.zeros(lacking.shape[1])])
+        return noisy_regression(columns, all_noise, position, block, side, own.shape[1])
+
+    found = regression(own, lacking)
     if found is None:
         return None
     first = own.shape[1] * sides
@@ -359,7 +364,7 @@ def _of_tendon(
     finite = np.isfinite([found.difference(k, k + own.shape[1] if sides > 1 else None)[1] for k in range(count)])
     is_whole = bool(finite[arms[joints] != 0.0].all())  # else the zero has a part of a joint that stands still
 
-    def learned(path: str, at: int, then: int, described: float, least: float) -> Learned:
+    def learned(path: str, at: int, then: int, described: float, least: float, found: Estimate = found) -> Learned:
         value, half, p_value = found.difference(at, then if sides > 1 else None)
         before = value - found.change(at, then) if sides > 1 else described
         return Learned(f"tendons[{i + 1}].{path}", value, half, before, True, least, p_value)
@@ -372,13 +377,21 @@ def _of_tendon(
     }
     least = RIGID * float(position.std()) / max(float(own[:, -1].std()), 1e-12)
     compliance = learned("stiffness", count, count + own.shape[1], 1.0 / float(tendon["stiffness"]), least)
-    zero = learned("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm)
+    stiffness = _stiffness(compliance)
+    # of a spring that is another one, what is not linear is too, and with it where its force is 0
+    bent = (
+        regression(np.column_stack([own, own[:, -1] ** 2]), lacking[:, :-1])
+        if sides > 1 and stiffness.differs
+        else None
+    )
+    at_zero = bent or found
+    zero = learned("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm, at_zero)
     return TendonRouting(
         i,
         {j: replace(each, is_known=each.half < KNOWN * abs(each.value)) for j, each in arms_of.items()},
-        _stiffness(compliance),
+        stiffness,
         replace(zero, is_known=is_whole and zero.half < KNOWN * arm),
-        {} if sides > 1 else dict(_varying(columns, all_noise, squares[:, :count], position, block, joints)),
+        dict(_varying(lambda squares: regression(own, squares), own, joints)) if sides == 1 else {},
         Learned("time", -drift, drift_half, 0.0, bool(np.isfinite(drift_half)), LEAST_DRIFT),
     )
 
@@ -396,16 +409,15 @@ def _stiffness(compliance: Learned) -> Learned:
 
 
 def _varying(
-    columns: Numbers, noise: Numbers, squares: Numbers, position: Numbers, block: Indices, joints: Indices
+    regression: Callable[[Numbers], Estimate | None], own: Numbers, joints: Indices
 ) -> Iterator[tuple[int, float]]:
     """Yield (joint, share) where the arm changes with the joint's angle: x0 then has a part with its square."""
     count = len(joints)
-    whole, none = np.column_stack([columns, squares]), np.zeros(len(block), dtype=np.int64)
-    found = noisy_regression(whole, np.append(noise, np.zeros(count)), position, block, none, columns.shape[1])
+    found = regression((own[:, :count] - own[:, :count].mean(axis=0)) ** 2)
     if found is None:
         return
     for k, j in enumerate(joints):
-        (bend, bend_half, _), (arm, half, _) = found.difference(columns.shape[1] + k), found.difference(k)
-        change = 2.0 * abs(bend) * float(np.ptp(columns[:, k])) / max(abs(arm), 1e-12)
+        (bend, bend_half, _), (arm, half, _) = found.difference(-1 - count + k), found.difference(k)
+        change = 2.0 * abs(bend) * float(np.ptp(own[:, k])) / max(abs(arm), 1e-12)
         if abs(bend) > 1.5 * bend_half and change > VARIES and half < KNOWN * abs(arm):
             yield int(j), change
