@@ -33,9 +33,11 @@ from tendonfmu.recordings import (
     Learned,
     Recording,
     TendonRouting,
+    curves,
     learn_routing,
     prepare,
     smooth_speeds,
+    span_of,
     varying_sentences,
 )
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
@@ -412,12 +414,12 @@ class _Unseen:
         unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
         self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
         self._trained = [(each.recording, each.train) for each in given.training]
-        middle = [
-            np.concatenate([recording.groups[name][mask] for recording, mask in self._trained]).mean(axis=0)
+        spans = [
+            span_of(np.concatenate([recording.groups[name][mask] for recording, mask in self._trained]))
             for name in ("tendon_force", "joint_position")
             if all(name in recording.groups for recording, _ in self._trained)
         ]
-        self._shapes = {id(recording): _shapes(recording, *middle) for recording, _ in (*self._judged, *self._trained)}
+        self._shapes = {id(recording): _shapes(recording, *spans) for recording, _ in (*self._judged, *self._trained)}
 
     def gain(self, base: _Geometry, off: Sequence[Off], own: Sequence[Off]) -> Interval:
         """Return the gain of some of all that is off, the others kept."""
@@ -442,15 +444,17 @@ class _Unseen:
 
 
 def _shapes(recording: Recording, force: Numbers, angle: Numbers | None = None) -> Numbers:
-    """Return speeds of position and force, and squares of force and angles, for each tendon [N, m, c]."""
-    # force: [m], angle: [n]; where squares are 0
+    """Return speeds of position and force, and curves of force and angles, for each tendon [N, m, c]."""
+    # force: [2, m], angle: [2, n]; spans
     groups, time = recording.groups, recording.time
+    tendons = groups["tendon_force"].shape[1]
     own = [smooth_speeds(time, groups[name]) for name in ("tendon_position", "tendon_force")]
-    shapes = np.stack([*own, (groups["tendon_force"] - force) ** 2], axis=2)
+    bent = curves(groups["tendon_force"], force).reshape(len(time), tendons, -1)
+    shapes = np.concatenate([np.stack(own, axis=2), bent], axis=2)
     if angle is None or "joint_position" not in groups:
         return shapes
-    squares = np.repeat(((groups["joint_position"] - angle) ** 2)[:, None], len(force), axis=1)
-    return np.concatenate([shapes, squares], axis=2)
+    common = np.repeat(curves(groups["joint_position"], angle)[:, None], tendons, axis=1)
+    return np.concatenate([shapes, common], axis=2)
 
 
 def _rows(recording: Recording, chosen: Flags) -> Recording:

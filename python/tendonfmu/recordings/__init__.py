@@ -51,7 +51,16 @@ if TYPE_CHECKING:
         track,
         whiteness,
     )
-    from .routing import Learned, TendonRouting, learn_routing, require_routing, routed, smooth_speeds
+    from .routing import (
+        Learned,
+        TendonRouting,
+        curves,
+        learn_routing,
+        require_routing,
+        routed,
+        smooth_speeds,
+        span_of,
+    )
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import Signals, smoothing_of, zero_phase
 

@@ -6,7 +6,7 @@ measured around a smooth curve, is taken out of their moments, else large noise 
 (W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
 that are read some milliseconds apart do no harm. The intervals are those of sums over blocks of 2 s, so that they hold
 for correlated residuals, too. Recordings of a reference are regressed together with those of now: arms, 1/k and zero
-are free in both, and what the equation lacks (squares) is shared, so that another load or range is no change.
+are free in both, and what the equation lacks (curves) is shared, so that another load or range is no change.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
+DEGREE, FAR = 5, 1.2  # of polynomials, and times half of the range, beyond which they are constant
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
 
@@ -318,6 +319,18 @@ def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     return speeds
 
 
+def span_of(values: Numbers) -> Numbers:
+    """Return the middle and half of the range of columns [2, c]."""
+    low, high = np.quantile(values, [0.01, 0.99], axis=0)
+    return np.array([(low + high) / 2.0, np.maximum((high - low) / 2.0, 1e-12)])
+
+
+def curves(values: Numbers, span: Numbers) -> Numbers:
+    """Return what the equation lacks where springs or arms are not constant: polynomials of columns [N, c (d - 1)]."""
+    scaled = np.clip((values - span[0]) / span[1], -FAR, FAR)
+    return np.asarray(np.polynomial.legendre.legvander(scaled, DEGREE)[..., 2:].reshape(len(values), -1))
+
+
 # --- one tendon -------------------------------------------------------------------------------------------------------
 
 
@@ -344,11 +357,10 @@ def _of_tendon(
             samples.force[:, list(seen_from)],
         ]
     )[taut]
-    squares = (own - own.mean(axis=0)) ** 2
     noise = np.array([*samples.angle_noise[joints], samples.force_noise[i]])
     noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
     count, position = len(joints), samples.position[taut, i]
-    lacking = squares if sides > 1 else squares[:, :0]  # by the equation, in the reference as well
+    lacking = curves(own, span_of(own)) if sides > 1 else own[:, :0]
 
     def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
         columns = np.column_stack([*([own] * sides), shared, lacking])
@@ -380,7 +392,7 @@ def _of_tendon(
     stiffness = _stiffness(compliance)
     # of a spring that is another one, what is not linear is too, and with it where its force is 0
     bent = (
-        regression(np.column_stack([own, own[:, -1] ** 2]), lacking[:, :-1])
+        regression(np.column_stack([own, own[:, -1] ** 2]), lacking[:, : -DEGREE + 1])
         if sides > 1 and stiffness.differs
         else None
     )
