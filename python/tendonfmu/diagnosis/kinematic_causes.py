@@ -37,7 +37,6 @@ from tendonfmu.recordings import (
     learn_routing,
     prepare,
     smooth_speeds,
-    span_of,
     varying_sentences,
 )
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
@@ -202,17 +201,23 @@ def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> Kinemat
     found = replace(none, known=keys, warnings=warnings)
     if not is_long:
         return replace(found, uncertain=tuple(_causes(given, found, off, known, lambda own: Interval(0.0, 0.0, 0.0))))
-    return _judged(given, found, off, known, least_gain, seed)
+    return _judged(given, found, off, known, learned, least_gain, seed)
 
 
 def _judged(
-    given: Input, found: KinematicCauses, off: Sequence[Off], known: dict[Where, Off], least_gain: float, seed: int
+    given: Input,
+    found: KinematicCauses,
+    off: Sequence[Off],
+    known: dict[Where, Off],
+    learned: Sequence[TendonRouting],
+    least_gain: float,
+    seed: int,
 ) -> KinematicCauses:
     """Divide what is off into causes and what is too small or uncertain."""
     small = [each for each in off if abs(each.number.off) < each.least]
     kept = [each for each in off if each not in small]
     base = _Geometry.of(given.finger.data).as_reference(list(known.values()))
-    unseen = _Unseen(given, seed)
+    unseen = _Unseen(given, learned, seed)
     while True:
         causes = list(_causes(given, found, kept, known, partial(unseen.gain, base, kept)))
         weak = {cause.effect for cause in causes if not (cause.gain.low > 0.0 and cause.gain.value >= least_gain)}
@@ -409,31 +414,28 @@ class _Unseen:
     That is what delays of sensors, springs that are not linear and arms that vary leave.
     """
 
-    def __init__(self, given: Input, seed: int) -> None:
+    def __init__(self, given: Input, learned: Sequence[TendonRouting], seed: int) -> None:
         self._seed = seed
         unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
         self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
         self._trained = [(each.recording, each.train) for each in given.training]
-        spans = [
-            span_of(np.concatenate([recording.groups[name][mask] for recording, mask in self._trained]))
-            for name in ("tendon_force", "joint_position")
-            if all(name in recording.groups for recording, _ in self._trained)
-        ]
-        self._shapes = {id(recording): _shapes(recording, *spans) for recording, _ in (*self._judged, *self._trained)}
+        self._shapes = {
+            id(recording): np.stack([_shapes(recording, each) for each in learned], axis=1)
+            for recording, _ in (*self._judged, *self._trained)
+        }
+        self._tendons = [each.tendon for each in learned]
 
     def gain(self, base: _Geometry, off: Sequence[Off], own: Sequence[Off]) -> Interval:
         """Return the gain of some of all that is off, the others kept."""
         now, without = base.moved(off), base.moved([each for each in off if each not in own])
-        left, shapes = (
-            np.concatenate([of(recording)[mask] for recording, mask in self._trained])
-            for of in (now.left, lambda recording: self._shapes[id(recording)])
-        )
+        left = np.concatenate([now.left(each)[mask][:, self._tendons] for each, mask in self._trained])
+        shapes = np.concatenate([self._shapes[id(each)][mask] for each, mask in self._trained])
         shapes = np.where(left[..., None] != 0.0, shapes, 0.0)
         parts = np.array([np.linalg.lstsq(shapes[:, i], left[:, i])[0] for i in range(left.shape[1])])
         pairs = []
         for recording, index in self._judged:
             shared = np.einsum("kic,ic->ki", self._shapes[id(recording)], parts)
-            both = [one.left(recording) for one in (without, now)]
+            both = [one.left(recording)[:, self._tendons] for one in (without, now)]
             squares = [np.where(one != 0.0, one - shared, 0.0) ** 2 for one in both]
             pairs.append(np.column_stack([index.sums(each.sum(axis=1)) for each in squares]))
         before, after = np.concatenate(pairs).T
@@ -443,18 +445,13 @@ class _Unseen:
         return gain if math.isfinite(gain.low) else Interval(gain.value, 0.0, 1.0)
 
 
-def _shapes(recording: Recording, force: Numbers, angle: Numbers | None = None) -> Numbers:
-    """Return speeds of position and force, and curves of force and angles, for each tendon [N, m, c]."""
-    # force: [2, m], angle: [2, n]; spans
-    groups, time = recording.groups, recording.time
-    tendons = groups["tendon_force"].shape[1]
-    own = [smooth_speeds(time, groups[name]) for name in ("tendon_position", "tendon_force")]
-    bent = curves(groups["tendon_force"], force).reshape(len(time), tendons, -1)
-    shapes = np.concatenate([np.stack(own, axis=2), bent], axis=2)
-    if angle is None or "joint_position" not in groups:
-        return shapes
-    common = np.repeat(curves(groups["joint_position"], angle)[:, None], tendons, axis=1)
-    return np.concatenate([shapes, common], axis=2)
+def _shapes(recording: Recording, routing: TendonRouting) -> Numbers:
+    """Return speeds of a tendon's position and force, and curves of force and angles [N, c]."""
+    groups, time, own = recording.groups, recording.time, [routing.tendon]
+    speeds = [smooth_speeds(time, groups[name][:, own]) for name in ("tendon_position", "tendon_force")]
+    angle = groups.get("joint_position", np.zeros((len(time), 0)))
+    span = routing.span[:, -1 - angle.shape[1] :]
+    return np.concatenate([*speeds, curves(np.column_stack([angle, groups["tendon_force"][:, own]]), span)], axis=1)
 
 
 def _rows(recording: Recording, chosen: Flags) -> Recording:

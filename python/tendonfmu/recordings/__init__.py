@@ -59,7 +59,6 @@ if TYPE_CHECKING:
         require_routing,
         routed,
         smooth_speeds,
-        span_of,
     )
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import Signals, smoothing_of, zero_phase

@@ -93,6 +93,7 @@ class TendonRouting:
     zero: Learned
     varying: Mapping[int, float]  # joints at which the arm changes with the angle, by so much of it over the motion
     drift: Learned  # s/s, by which the clock of the angles runs faster than that of the tendon
+    span: Numbers  # of the angles and the force: middle and half of the range [2, joints + 1]
     seen_from: Sequence[int] = ()  # without encoders: the tendons whose positions give the angles
 
     @property
@@ -319,16 +320,16 @@ def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     return speeds
 
 
-def span_of(values: Numbers) -> Numbers:
+def _span(values: Numbers) -> Numbers:
     """Return the middle and half of the range of columns [2, c]."""
     low, high = np.quantile(values, [0.01, 0.99], axis=0)
-    return np.array([(low + high) / 2.0, np.maximum((high - low) / 2.0, 1e-12)])
+    return np.asarray([(low + high) / 2.0, np.maximum((high - low) / 2.0, 1e-12)])
 
 
 def curves(values: Numbers, span: Numbers) -> Numbers:
-    """Return what the equation lacks where springs or arms are not constant: polynomials of columns [N, c (d - 1)]."""
+    """Return what the equation lacks where springs or arms are not constant: powers of columns [N, c (d - 1)]."""
     scaled = np.clip((values - span[0]) / span[1], -FAR, FAR)
-    return np.asarray(np.polynomial.legendre.legvander(scaled, DEGREE)[..., 2:].reshape(len(values), -1))
+    return np.asarray(np.concatenate([scaled**k for k in range(2, DEGREE + 1)], axis=1))
 
 
 # --- one tendon -------------------------------------------------------------------------------------------------------
@@ -360,7 +361,8 @@ def _of_tendon(
     noise = np.array([*samples.angle_noise[joints], samples.force_noise[i]])
     noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
     count, position = len(joints), samples.position[taut, i]
-    lacking = curves(own, span_of(own)) if sides > 1 else own[:, :0]
+    span = _span(own)
+    lacking = curves(own, span) if sides > 1 else own[:, :0]
 
     def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
         columns = np.column_stack([*([own] * sides), shared, lacking])
@@ -390,14 +392,13 @@ def _of_tendon(
     least = RIGID * float(position.std()) / max(float(own[:, -1].std()), 1e-12)
     compliance = learned("stiffness", count, count + own.shape[1], 1.0 / float(tendon["stiffness"]), least)
     stiffness = _stiffness(compliance)
-    # of a spring that is another one, what is not linear is too, and with it where its force is 0
-    bent = (
-        regression(np.column_stack([own, own[:, -1] ** 2]), lacking[:, : -DEGREE + 1])
-        if sides > 1 and stiffness.differs
-        else None
-    )
-    at_zero = bent or found
-    zero = learned("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm, at_zero)
+    at_zero, given = ("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm), None
+    zero = learned(*at_zero)
+    if sides > 1 and stiffness.differs:  # what is not linear in it is another, too, and with it where its force is 0
+        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1]))
+    if given is not None:
+        bent = learned(*at_zero, given)
+        zero = replace(bent, described=zero.described, value=zero.described + bent.off)
     return TendonRouting(
         i,
         {j: replace(each, is_known=each.half < KNOWN * abs(each.value)) for j, each in arms_of.items()},
@@ -405,6 +406,7 @@ def _of_tendon(
         replace(zero, is_known=is_whole and zero.half < KNOWN * arm),
         dict(_varying(lambda squares: regression(own, squares), own, joints)) if sides == 1 else {},
         Learned("time", -drift, drift_half, 0.0, bool(np.isfinite(drift_half)), LEAST_DRIFT),
+        span,
     )
 
 
