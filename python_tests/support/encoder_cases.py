@@ -1,6 +1,6 @@
 """How often an encoder that slipped, a zero, an arm or a spring that is off is named: the table of docs/evidence/change.md.
 
-    .venv/bin/python python_tests/support/encoder_cases.py --half even
+.venv/bin/python python_tests/support/encoder_cases.py --half even
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Case:
     def causes(self, with_reference: bool) -> tuple[Cause, ...]:
         now = [self.now.recording(10 * self.seed + k) for k in (1, 2)]
         then = [self.before.recording(10 * self.seed + 3)] if with_reference else None
-        given = read_input(self.before.description, now[:1], now[1:], then, 1, 0.03, False)
+        given = read_input(self.before.description, now[:1], now[1:], then, 1, 0.03, True)
         return find_kinematic_causes(given, 0.03, 0).causes
 
     def is_right(self, causes: Sequence[Cause]) -> bool:
@@ -91,9 +91,11 @@ def rows(half: str) -> Iterator[str]:
                 causes = case.causes(with_reference)
                 right += case.is_right(causes)
                 false += any(not case.is_true(cause) for cause in causes)
-                if not case.is_right(causes) and case.effect or any(not case.is_true(cause) for cause in causes):
-                    print(f"  {kind}, seed {seed}, reference {with_reference}: {list(causes)} for {case.effect}"
-                          f" {case.joint} {case.tendon} {case.size}")
+                if (not case.is_right(causes) and case.effect) or any(not case.is_true(cause) for cause in causes):
+                    print(
+                        f"  {kind}, seed {seed}, reference {with_reference}: {list(causes)} for {case.effect}"
+                        f" {case.joint} {case.tendon} {case.size}"
+                    )
             cells += [f"{right}/{len(seeds)}" if KINDS[kind][0] else "", f"{false}/{len(seeds)}"]
         yield f"| {kind} | {' | '.join(cells)} |"
 

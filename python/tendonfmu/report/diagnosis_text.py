@@ -13,11 +13,13 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import (
     CONTACT,
     UNKNOWN,
+    ZERO,
     Cause,
     CausePlace,
     Diagnosis,
     Invisible,
     Names,
+    Where,
     at_place,
     names_in,
     numbered,
@@ -190,7 +192,13 @@ def confusion_sentence(cause: Cause, names: Names) -> str:
     """Name what the data cannot distinguish a cause from; empty if nothing."""
     if not cause.confusable_with:
         return ""
-    others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
+    places: dict[str, list[Where]] = {}
+    for other in cause.confusable_with:
+        places.setdefault(other.effect if other.effect == ZERO else str(other), []).append(other)
+    others = [
+        f"{at_place(title_of(first.effect), first, names)}{''.join(f' and {names.place(other)}' for other in more)}"
+        for first, *more in places.values()
+    ]
     return f"These recordings cannot distinguish it from: {'; '.join(others)}."
 
 
