@@ -1,4 +1,4 @@
-"""How often an encoder that slipped, a zero, an arm or a spring that is off is named: the table of docs/evidence/change.md.
+"""How often what is off between angles and tendons is named: the table of docs/evidence/change.md.
 
 .venv/bin/python python_tests/support/encoder_cases.py --half even
 """

@@ -130,17 +130,19 @@ class Unseen:
         unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
         self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
         self._trained = [(each.recording, each.train) for each in given.training]
+        self._reference = [(each.recording, each.train) for each in given.reference]
         self._shapes = {
             id(recording): np.stack([_shapes(recording, each) for each in learned], axis=1)
-            for recording, _ in (*self._judged, *self._trained)
+            for recording, _ in (*self._judged, *self._trained, *self._reference)
         }
         self._tendons = [each.tendon for each in learned]
 
     def gain(self, base: Geometry, off: Sequence[Off], own: Sequence[Off]) -> Interval:
         """Return the gain of some of all that is off, the others kept."""
         now, without = base.moved(off), base.moved([each for each in off if each not in own])
-        left = np.concatenate([now.left(each)[mask][:, self._tendons] for each, mask in self._trained])
-        shapes = np.concatenate([self._shapes[id(each)][mask] for each, mask in self._trained])
+        learned = [*((now, *each) for each in self._trained), *((base, *each) for each in self._reference)]
+        left = np.concatenate([one.left(each)[mask][:, self._tendons] for one, each, mask in learned])
+        shapes = np.concatenate([self._shapes[id(each)][mask] for _, each, mask in learned])
         shapes = np.where(left[..., None] != 0.0, shapes, 0.0)
         parts = np.array([np.linalg.lstsq(shapes[:, i], left[:, i])[0] for i in range(left.shape[1])])
         pairs = []

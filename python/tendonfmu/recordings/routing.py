@@ -38,6 +38,7 @@ LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it:
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
 DEGREE, FAR = 5, 1.2  # of polynomials, and times half of the range, beyond which they are constant
+BLOCKS_PER_COLUMN = 1.5  # at least; fewer columns else
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
 
@@ -326,10 +327,10 @@ def _span(values: Numbers) -> Numbers:
     return np.asarray([(low + high) / 2.0, np.maximum((high - low) / 2.0, 1e-12)])
 
 
-def curves(values: Numbers, span: Numbers) -> Numbers:
+def curves(values: Numbers, span: Numbers, degree: int = DEGREE) -> Numbers:
     """Return what the equation lacks where springs or arms are not constant: powers of columns [N, c (d - 1)]."""
     scaled = np.clip((values - span[0]) / span[1], -FAR, FAR)
-    return np.asarray(np.concatenate([scaled**k for k in range(2, DEGREE + 1)], axis=1))
+    return np.asarray(np.concatenate([scaled**k for k in range(2, degree + 1)] or [scaled[:, :0]], axis=1))
 
 
 # --- one tendon -------------------------------------------------------------------------------------------------------
@@ -362,7 +363,10 @@ def _of_tendon(
     noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
     count, position = len(joints), samples.position[taut, i]
     span = _span(own)
-    lacking = curves(own, span) if sides > 1 else own[:, :0]
+    degree, many = DEGREE if sides > 1 else 1, len(np.unique(block))
+    while degree > 1 and many < BLOCKS_PER_COLUMN * own.shape[1] * (sides + degree - 1):
+        degree -= 1
+    lacking = curves(own, span, degree)
 
     def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
         columns = np.column_stack([*([own] * sides), shared, lacking])
@@ -395,7 +399,7 @@ def _of_tendon(
     at_zero, given = ("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm), None
     zero = learned(*at_zero)
     if sides > 1 and stiffness.differs:  # what is not linear in it is another, too, and with it where its force is 0
-        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1]))
+        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1], degree))
     if given is not None:
         bent = learned(*at_zero, given)
         zero = replace(bent, described=zero.described, value=zero.described + bent.off)
