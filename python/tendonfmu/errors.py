@@ -19,6 +19,10 @@ class NothingLeftError(InputError):
     """Recordings are sound, but of a part of them nothing is left to learn from. The message is one line."""
 
 
+class TooLargeError(InputError):
+    """Sound input needs more memory than there is. The message is one line."""
+
+
 class InputWarning(UserWarning):
     """Input from the user is accepted, but not all of it is used. The message is one line that starts with the file."""
 
@@ -32,7 +36,7 @@ def own_fault(what: str) -> Iterator[None]:
     """Turn an InputError inside the block into an InternalError, since all input has been checked before."""
     try:
         yield
-    except (OutputError, NothingLeftError):
+    except (OutputError, NothingLeftError, TooLargeError):
         raise
     except InputError as refused:
         raise InternalError(f"{what}: {refused}") from refused

@@ -24,7 +24,7 @@ from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant
 from tendonfmu.diagnosis.effects.description_edit import Edit, apply_edits, data_number, finer_paths, is_law_number
 from tendonfmu.diagnosis.series import block_late_forces, block_prediction
 from tendonfmu.diagnosis.span import Span, span_of
-from tendonfmu.errors import InputError
+from tendonfmu.errors import TooLargeError
 from tendonfmu.estimate import Estimator, unknown_names
 from tendonfmu.model import LIMITS, native
 from tendonfmu.recordings import FitRecording
@@ -105,7 +105,7 @@ def candidate_columns(
 
 def _refuse_too_many(size: float, columns: int) -> None:
     if size > _MOST_MEMORY:
-        raise InputError(
+        raise TooLargeError(
             f"{columns} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
             "a finger of fewer joints and tendons at a time, or shorter recordings"
         )

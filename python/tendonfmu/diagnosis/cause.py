@@ -122,6 +122,8 @@ class Cause:
         Family-wise, over all effects and places that were tested.
     gain
         Of this cause alone on unseen data: 1 − rms with / rms without, the other causes kept.
+    gain_unit
+        Of the rms: "N.m" of the torque; "m" of the tendons' positions, of numbers that lead from angles to them.
     confusable_with
         What the data cannot distinguish from it.
     parameters
@@ -145,6 +147,7 @@ class Cause:
     explanation: str = ""
     p_value: float = 1.0
     gain: Interval = NO_GAIN
+    gain_unit: str = "N.m"
     confusable_with: tuple[Where, ...] = ()
     parameters: Parameters = field(default_factory=dict)
     size: str = ""

@@ -21,6 +21,7 @@ from tendonfmu.diagnosis.change_diagnosis import diagnose_change
 from tendonfmu.diagnosis.extension_diagnosis import diagnose_extension
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
+from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import own_fault
@@ -60,9 +61,11 @@ def diagnose(
     with threadpool_limits(limits=max(jobs, 1)):
         given = read_input(finger, recordings, tests, reference, kinematics, least_gain, checked)
         settings = FitSettings(threads=jobs, path=given.finger.path)
+        kinematic = find_kinematic_causes(given, least_gain, seed)
+        given = kinematic.corrected(given)
         with phases.start(SIGNALS):
             chosen = choose(given.finger, given.reference or given.whole, settings)
         asked = Asked(given, least_gain, seed, settings, phases)
         with own_fault("diagnosis"):  # all input has been checked and fitted once
             diagnosis = diagnose_change(asked, chosen) if given.reference else diagnose_extension(asked, chosen)
-            return replace(diagnosis, seconds=perf_counter() - begun)
+            return replace(kinematic.in_diagnosis(diagnosis), seconds=perf_counter() - begun)

@@ -31,6 +31,7 @@ from tendonfmu.diagnosis.change_diagnosis import sizes_now
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
+from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
 from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
@@ -178,10 +179,13 @@ def sizes_in(
 ) -> dict[str, Any]:
     """Return a row: the sizes of these effects at these places in one recording, all of them free."""
     given = read_input(finger, [recording], [], reference, kinematics, least_gain, True)
+    kinematic = find_kinematic_causes(given, least_gain, seed)
+    given, named = kinematic.corrected(given), [tuple(key) for key in json.loads(keys)]
     settings = FitSettings(threads=1, path=given.finger.path)
     asked = Asked(given, 0.0, seed, settings, Phases({}))
     chosen = choose(given.finger, given.reference, settings)
-    sizes = sizes_now(asked, chosen, [tuple(key) for key in json.loads(keys)])
+    sizes = sizes_now(asked, chosen, [key for key in named if key not in kinematic.known])
+    sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
     return {
         "recording": recording,
         "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in sizes}),

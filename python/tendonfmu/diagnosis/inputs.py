@@ -101,7 +101,7 @@ def _read(
     given = read_finger(finger)
     held = Held() if test_sources else apart
     read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
-    warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH)
+    warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH, besides=("routing",))
     training = [prepare(given, recording, kinematics, held) for recording in read]
     unseen = [prepare(given, other, kinematics, Held()) for other in others]
     require_noise(given, training)

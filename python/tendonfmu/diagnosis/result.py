@@ -149,7 +149,7 @@ class Diagnosis:
     gain: Interval  # over all joints on the test data: 1 − rms of the extended / rms of the nominal model
     # rms over all joints on unseen data of the nominal model and after each cause, in the order of `causes`, N·m
     steps: tuple[float, ...]
-    causes: tuple[Cause, ...]
+    causes: tuple[Cause, ...]  # those whose gain is of positions have no step
     too_small: tuple[Cause, ...]  # causes that are certain, but not material or not confirmed on unseen data
     invisible: tuple[Invisible, ...]
     events: tuple[Event, ...]  # stretches left out of the fit
@@ -171,3 +171,8 @@ class Diagnosis:
     references: tuple[str, ...] = ()  # names of the reference recordings
     repeated: int = 0  # number of motions of the reference that were repeated exactly
     load: SteadyLoad | None = None  # torque that is present now and was not in the reference
+
+    @property
+    def torque_causes(self) -> tuple[Cause, ...]:
+        """The causes that change the modelled torque, in the order of `steps`."""
+        return tuple(cause for cause in self.causes if cause.gain_unit == "N.m")

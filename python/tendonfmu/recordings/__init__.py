@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles
     from .match import UNFIT_FOR_SEARCH, admit, belongs
-    from .match_text import check_report, recording_report, refusal_report, routing_entry
+    from .match_text import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .prepared import (
         FitRecording,
         Held,
@@ -50,7 +50,15 @@ if TYPE_CHECKING:
         read_recordings,
     )
     from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness
-    from .routing import learn_routing, require_routing, routed
+    from .routing import (
+        Learned,
+        TendonRouting,
+        curves,
+        learn_routing,
+        require_routing,
+        routed,
+        smooth_speeds,
+    )
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import Signals, smoothing_of, zero_phase
 

@@ -86,12 +86,16 @@ def belongs(finger: Finger, recordings: Sequence[Recording], *, unfit: float = U
     return findings
 
 
-def admit(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[str]:
-    """Check recordings before a fit, and refuse those that do not belong to the finger."""
+def admit(
+    finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT, besides: Sequence[str] = ()
+) -> list[str]:
+    """Check recordings before a fit, and refuse those that do not belong to the finger; `besides`: not warned of."""
     for recording in recordings:
         check_numbers(recording)
     findings = belongs(finger, recordings, unfit=unfit)
-    return refuse_errors([finding for finding in findings if finding.kind not in LEFT_TO_THE_FIT])
+    known = {(kind, severity) for kind in LEFT_TO_THE_FIT for severity in ("error", "warning")}
+    known |= {(kind, "warning") for kind in besides}
+    return refuse_errors([finding for finding in findings if (finding.kind, finding.severity) not in known])
 
 
 def refuse_errors(findings: Sequence[Finding]) -> list[str]:

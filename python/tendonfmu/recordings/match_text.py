@@ -196,6 +196,13 @@ def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
         yield f"zero is off by {1e3 * off:.4g} ± {1e3 * zero.half:.2g} mm, or that of its force by {force:.3g} N"
 
 
+def varying_sentences(finger: Finger, learned: Sequence[TendonRouting]) -> Iterator[str]:
+    """Yield which moment arms change with the angle."""
+    for each in learned:
+        if each.varying:
+            yield f"routing: {_of_tendon(finger, each.as_described)}"
+
+
 def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str, Any]:
     """Report what was learned of the routing: every number, and sentences on what is off and what is not known."""
     changed = {number.path for number in routed(finger, learned)[1]}

@@ -5,17 +5,17 @@ of x0 on q and f0 therefore gives the tendon's row of R, 1/k and its zero. Both 
 measured around a smooth curve, is taken out of their moments, else large noise would make the numbers too small
 (W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
 that are read some milliseconds apart do no harm. The intervals are those of sums over blocks of 2 s, so that they hold
-for correlated residuals, too.
+for correlated residuals, too. Recordings of a reference are regressed together with those of now: arms, 1/k and zero
+are free in both, and what the equation lacks (curves) is shared, so that another load or range is no change.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import stdtrit
 
 from tendonfmu.arrays import Flags, Indices, Numbers
 from tendonfmu.errors import InputError
@@ -24,10 +24,10 @@ from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import FEWEST, white_noise
 from tendonfmu.recordings.smoothing import zero_phase
+from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
 FEWEST_BLOCKS = 8
-LEVEL = 0.975  # of Student's t: intervals of 95 %
 SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
 CERTAIN = 1.5  # halves of an interval; many numbers are compared
@@ -36,29 +36,53 @@ NORMAL = 1.96  # standard deviations of half an interval
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
-OF_NOISE = 0.05  # of the variance in any direction of the columns: with more, they do not tell
-NOISE_KNOWN = 0.2  # of its variance, to which the noise is known
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
+DEGREE, FAR = 5, 1.2  # of polynomials, and times half of the range, beyond which they are constant
+BLOCKS_PER_COLUMN = 1.5  # at least; fewer columns else
 VARIES = 0.03  # of an arm, by which it changes over the motion
 
 
 @dataclass(frozen=True)
 class Learned:
-    """A number that recordings show: its estimate, half of its 95 % interval, and what is described."""
+    """A number that recordings show: its estimate, and what is described or was in the reference."""
 
     path: str
     value: float
-    half: float
+    half: float  # of the 95 % interval of the value, or of its difference from that of the reference
     described: float
     is_known: bool  # whether the recordings determine it
     material: float  # a smaller difference is none
+    p_value: float = 1.0  # of there being no difference
 
     @property
     def differs(self) -> bool:
         """Whether the described number is another one."""
-        off = abs(self.value - self.described)
-        return self.is_known and off > max(CERTAIN * self.half, self.material)
+        return self.is_known and abs(self.off) > self.known_to
+
+    @property
+    def known_to(self) -> float:
+        """The smallest difference that counts."""
+        return max(CERTAIN * self.half, self.material)
+
+    @property
+    def off(self) -> float:
+        """By how much it is larger than described."""
+        return self.value - self.described
+
+    @property
+    def is_absurd(self) -> bool:
+        """Whether columns must be wrong, so that nothing is known of it."""
+        if not self.is_known or not self.described or self.path.endswith("zero"):
+            return False
+        most = LARGEST["stiffness" in self.path]
+        return not 1.0 / most < self.value / self.described < most
+
+    @property
+    def rounded(self) -> float:
+        """The value with a digit more than its interval shows."""
+        digits = int(np.ceil(np.log10(max(abs(self.value) / max(self.half, 1e-15), 1.0)))) + 2
+        return float(f"{self.value:.{digits}g}")
 
 
 @dataclass(frozen=True)
@@ -71,6 +95,7 @@ class TendonRouting:
     zero: Learned
     varying: Mapping[int, float]  # joints at which the arm changes with the angle, by so much of it over the motion
     drift: Learned  # s/s, by which the clock of the angles runs faster than that of the tendon
+    span: Numbers  # of the angles and the force: middle and half of the range [2, joints + 1]
     seen_from: Sequence[int] = ()  # without encoders: the tendons whose positions give the angles
 
     @property
@@ -84,12 +109,21 @@ class TendonRouting:
         return any(number.differs for number in self.numbers)
 
     @property
+    def as_described(self) -> TendonRouting:
+        """Without numbers that differ; what varies stays."""
+        arms = {j: replace(arm, is_known=False) for j, arm in self.arms.items()}
+        stiffness, zero = (replace(number, is_known=False) for number in (self.stiffness, self.zero))
+        return replace(self, arms=arms, stiffness=stiffness, zero=zero)
+
+    @property
     def unknown(self) -> list[str]:
         """Paths of the numbers that the motion cannot tell."""
         return [number.path for number in self.numbers if not number.is_known]
 
 
-def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
+def learn_routing(
+    finger: Finger, recordings: Sequence[Recording], reference: Sequence[Recording] = (), *, coupled: bool = False
+) -> list[TendonRouting]:
     """Learn the routing of every tendon from the recordings with joint positions.
 
     Parameters
@@ -99,21 +133,26 @@ def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Tendo
     recordings
         Those without `joint_position` do not count, but where there are no others: then redundant tendons show
         every stiffness, and at a single joint the arms and zeros of one against the other.
+    reference
+        Of the same finger; what they show is compared with, in place of what is described.
+    coupled
+        Whether to learn the arms at joints that a tendon does not pass, too.
 
     Returns
     -------
     list of TendonRouting
         In the order of the tendons, without those that are slack or whose recordings are too short.
     """
-    measured = [each for each in recordings if "joint_position" in each.groups]
-    if not measured:
-        return _of_redundancy(finger, recordings)
+    sides = [list(side) for side in (recordings, reference) if side]
+    measured = [[each for each in side if "joint_position" in each.groups] for side in sides]
+    if not all(measured):
+        return _of_redundancy(finger, sides)
     if (samples := _joined(measured)) is None:
         return []
-    return [each for i in range(finger.tendons) if (each := _of_tendon(finger, i, samples)) is not None]
+    return [each for i in range(finger.tendons) if (each := _of_tendon(finger, i, samples, coupled=coupled))]
 
 
-def _of_redundancy(finger: Finger, recordings: Sequence[Recording]) -> list[TendonRouting]:
+def _of_redundancy(finger: Finger, sides: Sequence[Sequence[Recording]]) -> list[TendonRouting]:
     """Learn each tendon from angles that as many others as there are joints show.
 
     That determines every stiffness, and at a single joint the arms and zeros of the spare tendons against those of the
@@ -128,12 +167,7 @@ def _of_redundancy(finger: Finger, recordings: Sequence[Recording]) -> list[Tend
             continue
         arm = arms[base, 0] if finger.joints == 1 else 1.0  # of several joints, positions tell as much as angles
         zeros = np.array([float(finger.data["tendons"][j].get("zero") or 0.0) for j in base])
-        seen = [
-            replace(
-                each, groups={**each.groups, "joint_position": (each.groups["tendon_position"][:, base] - zeros) / arm}
-            )
-            for each in recordings
-        ]
+        seen = [[_seen(each, base, zeros, arm) for each in side] for side in sides]
         samples = _joined(seen)
         learned = None if samples is None else _of_tendon(finger, i, samples, base)
         if learned is not None:
@@ -145,6 +179,12 @@ def _of_redundancy(finger: Finger, recordings: Sequence[Recording]) -> list[Tend
             stiffness = replace(stiffness, is_known=is_known, material=SEEN_APART * stiffness.described)
             found.append(replace(learned, arms=arms_of, stiffness=stiffness, zero=zero, varying={}, seen_from=base))
     return found
+
+
+def _seen(recording: Recording, base: list[int], zeros: Numbers, arm: Numbers | float) -> Recording:
+    """Return a recording with what the positions of other tendons show in place of the angles."""
+    angle = (recording.groups["tendon_position"][:, base] - zeros) / arm
+    return replace(recording, groups={**recording.groups, "joint_position": angle})
 
 
 def _independent(arms: Numbers, tendons: Iterable[int]) -> list[int]:
@@ -166,7 +206,7 @@ def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Ten
             if recordings
             else "no recording; expected at least one"
         )
-    if any(_is_absurd(number) for each in learned for number in each.numbers if number.is_known):
+    if any(number.is_absurd for each in learned for number in each.numbers):
         raise InputError(
             f"{recordings[0].path}: the columns do not belong to the description, so no routing can be learned; "
             "tendonfmu check says what is wrong"
@@ -176,37 +216,22 @@ def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Ten
 
 def routed(finger: Finger, learned: Sequence[TendonRouting]) -> tuple[Finger, list[Learned]]:
     """Return the finger with the numbers that differ, and these; the given one if its columns must be wrong."""
-    known = [number for each in learned for number in each.numbers if number.is_known]
-    if any(_is_absurd(number) for number in known):
-        return finger, []
-    moved = [number for number in known if number.differs]
-    if not moved:
+    numbers = [number for each in learned for number in each.numbers]
+    moved = [number for number in numbers if number.differs]
+    if not moved or any(number.is_absurd for number in numbers):
         return finger, []
     data = {**finger.data, "tendons": [dict(tendon) for tendon in finger.data["tendons"]]}
     for each in learned:
         tendon = data["tendons"][each.tendon]
         arms = list(tendon["moment_arms"])
         for j, number in each.arms.items():
-            arms[j] = _rounded(number) if number.differs else arms[j]
+            arms[j] = number.rounded if number.differs else arms[j]
         tendon["moment_arms"] = arms
-        tendon |= {"stiffness": _rounded(each.stiffness)} if each.stiffness.differs else {}
-        tendon |= {"zero": _rounded(each.zero)} if each.zero.differs else {}
-    errors = {number.path: [_rounded(number), float(f"{number.half / NORMAL:.4g}")] for number in moved}
+        tendon |= {"stiffness": each.stiffness.rounded} if each.stiffness.differs else {}
+        tendon |= {"zero": each.zero.rounded} if each.zero.differs else {}
+    errors = {number.path: [number.rounded, float(f"{number.half / NORMAL:.4g}")] for number in moved}
     data["estimated"] = {**(data.get("estimated") or {}), **errors}
     return finger_from_data(data, finger.path), moved
-
-
-def _is_absurd(number: Learned) -> bool:
-    if number.path.endswith("zero"):
-        return False
-    ratio, most = number.value / number.described, LARGEST["stiffness" in number.path]
-    return not 1.0 / most < ratio < most
-
-
-def _rounded(number: Learned) -> float:
-    """Round to a digit more than its interval shows."""
-    digits = int(np.ceil(np.log10(max(abs(number.value) / max(number.half, 1e-15), 1.0)))) + 2
-    return float(f"{number.value:.{digits}g}")
 
 
 def clock_drift(learned: Sequence[TendonRouting]) -> Learned | None:
@@ -235,10 +260,11 @@ class _Samples:
     force_noise: Numbers
     angle_noise: Numbers
     block: Indices
+    side: Indices  # [N] 0 now, 1 of the reference
     sound: Flags  # [N, m] no sensor of the tendon, and no encoder, is held
 
 
-def _samples(recording: Recording) -> _Samples | None:
+def _samples(recording: Recording, side: int) -> _Samples | None:
     groups, time = recording.groups, recording.time
     try:
         noise = {name: white_noise(time, groups[name]) ** 2 for name in ("tendon_force", "joint_position")}
@@ -248,21 +274,23 @@ def _samples(recording: Recording) -> _Samples | None:
         groups["tendon_position"],
         groups["tendon_force"],
         groups["joint_position"],
-        _speeds(time, groups["tendon_position"]),
-        _speeds(time, groups["tendon_force"]),
+        smooth_speeds(time, groups["tendon_position"]),
+        smooth_speeds(time, groups["tendon_force"]),
         noise["tendon_force"],
         noise["joint_position"],
         np.floor((time - time[0]) / BLOCK).astype(np.int64),
+        np.full(len(time), side),
         _changing(time, groups["tendon_force"])
         & _changing(time, groups["tendon_position"])
         & np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None],
     )
 
 
-def _joined(recordings: Sequence[Recording]) -> _Samples | None:
-    """Put the samples of recordings with joint positions together; None if there are none."""
-    parts = [found for each in recordings if len(each) >= FEWEST and (found := _samples(each)) is not None]
-    if not parts:
+def _joined(sides: Sequence[Sequence[Recording]]) -> _Samples | None:
+    """Put the samples of recordings with joint positions together; None if a side has none."""
+    of = [(k, each) for k, side in enumerate(sides) for each in side if len(each) >= FEWEST]
+    parts = [found for k, each in of if (found := _samples(each, k)) is not None]
+    if len({int(each.side[0]) for each in parts}) < max(len(sides), 1):
         return None
     first = np.cumsum([0, *(int(each.block[-1]) + 1 for each in parts)])
     size = [len(each.block) for each in parts]
@@ -285,7 +313,7 @@ def _changing(time: Numbers, values: Numbers) -> Flags:
     return changing
 
 
-def _speeds(time: Numbers, values: Numbers) -> Numbers:
+def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     """Compute the smooth derivatives [N, c] between gaps; 0 in pieces too short to smooth."""
     speeds = np.zeros_like(values)
     for begin, end in pairwise([0, *gaps(time), len(time)]):
@@ -296,23 +324,37 @@ def _speeds(time: Numbers, values: Numbers) -> Numbers:
     return speeds
 
 
+def _span(values: Numbers) -> Numbers:
+    """Return the middle and half of the range of columns [2, c]."""
+    low, high = np.quantile(values, [0.01, 0.99], axis=0)
+    return np.asarray([(low + high) / 2.0, np.maximum((high - low) / 2.0, 1e-12)])
+
+
+def curves(values: Numbers, span: Numbers, degree: int = DEGREE) -> Numbers:
+    """Return what the equation lacks where springs or arms are not constant: powers of columns [N, c (d - 1)]."""
+    scaled = np.clip((values - span[0]) / span[1], -FAR, FAR)
+    return np.asarray(np.concatenate([scaled**k for k in range(2, degree + 1)] or [scaled[:, :0]], axis=1))
+
+
 # --- one tendon -------------------------------------------------------------------------------------------------------
 
 
-def _of_tendon(finger: Finger, i: int, samples: _Samples, seen_from: Sequence[int] = ()) -> TendonRouting | None:
+def _of_tendon(
+    finger: Finger, i: int, samples: _Samples, seen_from: Sequence[int] = (), *, coupled: bool = False
+) -> TendonRouting | None:
     """Learn the numbers of a tendon. The angles are those of encoders, or seen from other tendons."""
     tendon = finger.data["tendons"][i]
     arms = np.asarray(tendon["moment_arms"], dtype=float)
-    joints = np.arange(finger.joints) if seen_from else np.flatnonzero(arms)
+    joints = np.arange(finger.joints) if seen_from or coupled else np.flatnonzero(arms)
     force = np.abs(samples.force)
     taut = ((force > SLACK * force.max(axis=0)) & samples.sound)[:, [i, *seen_from]].all(axis=1)
-    block = samples.block[taut]
-    if len(np.unique(block)) < FEWEST_BLOCKS:
+    block, side = samples.block[taut], samples.side[taut]
+    sides = int(samples.side.max()) + 1
+    if any(len(np.unique(block[side == k])) < FEWEST_BLOCKS for k in range(sides)):
         return None
-    columns = np.column_stack(
+    own = np.column_stack([samples.angle[:, joints], samples.force[:, i]])[taut]
+    shared = np.column_stack(
         [
-            samples.angle[:, joints],
-            samples.force[:, i],
             samples.position_speed[:, i],
             samples.force_speed[:, i],
             # an angle that is read later and later leaves a part that grows with speed and time
@@ -320,94 +362,83 @@ def _of_tendon(finger: Finger, i: int, samples: _Samples, seen_from: Sequence[in
             samples.force[:, list(seen_from)],
         ]
     )[taut]
-    others = samples.force_noise[list(seen_from)]
-    noise = np.array([*samples.angle_noise[joints], samples.force_noise[i], 0.0, 0.0, 0.0, *others])
-    position = samples.position[taut, i]
-    found = _regression(columns, noise, position, block)
+    noise = np.array([*samples.angle_noise[joints], samples.force_noise[i]])
+    noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
+    count, position = len(joints), samples.position[taut, i]
+    span = _span(own)
+    degree, many = DEGREE if sides > 1 else 1, len(np.unique(block))
+    while degree > 1 and many < BLOCKS_PER_COLUMN * own.shape[1] * (sides + degree - 1):
+        degree -= 1
+    lacking = curves(own, span, degree)
+
+    def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
+        columns = np.column_stack([*([own] * sides), shared, lacking])
+        variance = np.append(noise, np.zeros(own.shape[1] - len(noise)))
+        all_noise = np.array([*np.tile(variance, sides), *noise_shared, *np.zeros(lacking.shape[1])])
+        return noisy_regression(columns, all_noise, position, block, side, own.shape[1])
+
+    found = regression(own, lacking)
     if found is None:
         return None
-    value, half = found
-    is_whole = all(np.isfinite(half[: len(joints)]))  # else the zero has a part of a joint that stands still
-    learned = {
-        int(j): _arm(f"tendons[{i + 1}].moment_arms[{j + 1}]", value[k], half[k], float(arms[j]))
-        for k, j in enumerate(joints)
-        if arms[j] != 0.0
-    }
-    at, least = len(joints), RIGID * float(position.std()) / max(float(columns[:, len(joints)].std()), 1e-12)
+    first = own.shape[1] * sides
+    drift, drift_half, _ = found.difference(first + 2)
+    finite = np.isfinite([found.difference(k, k + own.shape[1] if sides > 1 else None)[1] for k in range(count)])
+    is_whole = bool(finite[arms[joints] != 0.0].all())  # else the zero has a part of a joint that stands still
+
+    def learned(path: str, at: int, then: int, described: float, least: float, found: Estimate = found) -> Learned:
+        value, half, p_value = found.difference(at, then if sides > 1 else None)
+        before = value - found.change(at, then) if sides > 1 else described
+        return Learned(f"tendons[{i + 1}].{path}", value, half, before, True, least, p_value)
+
     arm = float(np.abs(arms).max())
+    arms_of = {
+        int(j): learned(f"moment_arms[{j + 1}]", k, k + own.shape[1], float(arms[j]), OTHER[0] * abs(arms[j] or arm))
+        for k, j in enumerate(joints)
+        if arms[j] != 0.0 or (coupled and not seen_from)
+    }
+    least = RIGID * float(position.std()) / max(float(own[:, -1].std()), 1e-12)
+    compliance = learned("stiffness", count, count + own.shape[1], 1.0 / float(tendon["stiffness"]), least)
+    stiffness = _stiffness(compliance)
+    at_zero, given = ("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm), None
+    zero = learned(*at_zero)
+    if sides > 1 and stiffness.differs:  # what is not linear in it is another, too, and with it where its force is 0
+        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1], degree))
+    if given is not None:
+        bent = learned(*at_zero, given)
+        zero = replace(bent, described=zero.described, value=zero.described + bent.off)
     return TendonRouting(
         i,
-        learned,
-        _stiffness(f"tendons[{i + 1}].stiffness", value[at], half[at], float(tendon["stiffness"]), least),
-        Learned(
-            f"tendons[{i + 1}].zero",
-            value[-1],
-            half[-1],
-            float(tendon.get("zero") or 0.0),
-            is_whole and half[-1] < KNOWN * arm,
-            OTHER[2] * arm,
-        ),
-        dict(_varying(columns, noise, position, block, joints)),
-        Learned("time", -value[at + 3], half[at + 3], 0.0, bool(np.isfinite(half[at + 3])), LEAST_DRIFT),
+        {j: replace(each, is_known=each.half < KNOWN * abs(each.value)) for j, each in arms_of.items()},
+        stiffness,
+        replace(zero, is_known=is_whole and zero.half < KNOWN * arm),
+        dict(_varying(lambda squares: regression(own, squares), own, joints)) if sides == 1 else {},
+        Learned("time", -drift, drift_half, 0.0, bool(np.isfinite(drift_half)), LEAST_DRIFT),
+        span,
     )
 
 
-def _arm(path: str, value: float, half: float, described: float) -> Learned:
-    return Learned(path, value, half, described, half < KNOWN * abs(value), OTHER[0] * abs(described))
-
-
-def _stiffness(path: str, compliance: float, half: float, described: float, least: float) -> Learned:
-    is_known = compliance > least and half < KNOWN * compliance
-    value = 1.0 / compliance if compliance > 0.0 else described
-    return Learned(path, value, half * value**2, described, is_known, OTHER[1] * described)
+def _stiffness(compliance: Learned) -> Learned:
+    """Return the stiffness of a compliance, whose `material` is the least that there can be."""
+    least = compliance.material
+    is_known = min(compliance.value, compliance.described) > least and compliance.half < KNOWN * compliance.value
+    value, described = (1.0 / each if each > 0.0 else np.inf for each in (compliance.value, compliance.described))
+    value = value if compliance.value > 0.0 else described
+    half = compliance.half * value**2
+    return replace(
+        compliance, value=value, half=half, described=described, is_known=is_known, material=OTHER[1] * described
+    )
 
 
 def _varying(
-    columns: Numbers, noise: Numbers, position: Numbers, block: Indices, joints: Indices
+    regression: Callable[[Numbers], Estimate | None], own: Numbers, joints: Indices
 ) -> Iterator[tuple[int, float]]:
     """Yield (joint, share) where the arm changes with the joint's angle: x0 then has a part with its square."""
     count = len(joints)
-    middle = columns[:, :count].mean(axis=0)
-    squares = (columns[:, :count] - middle) ** 2
-    found = _regression(np.column_stack([columns, squares]), np.append(noise, np.zeros(count)), position, block)
+    found = regression((own[:, :count] - own[:, :count].mean(axis=0)) ** 2)
     if found is None:
         return
-    value, half = found
     for k, j in enumerate(joints):
-        bend, arm = value[columns.shape[1] + k], abs(value[k])
-        change = 2.0 * abs(bend) * float(np.ptp(columns[:, k])) / max(arm, 1e-12)
-        if abs(bend) > 1.5 * half[columns.shape[1] + k] and change > VARIES and half[k] < KNOWN * arm:
+        (bend, bend_half, _), (arm, half, _) = found.difference(-1 - count + k), found.difference(k)
+        change = 2.0 * abs(bend) * float(np.ptp(own[:, k])) / max(abs(arm), 1e-12)
+        if abs(bend) > 1.5 * bend_half and change > VARIES and half < KNOWN * abs(arm):
             yield int(j), change
-
-
-def _regression(
-    columns: Numbers, noise: Numbers, target: Numbers, block: Indices
-) -> tuple[list[float], list[float]] | None:
-    """Regress on noisy columns and a constant, which comes last: estimates [p + 1] and halves of their intervals."""
-    # columns: [N, p]; noise: [p] variances of the columns; target: [N]; block: [N]
-    used = columns.var(axis=0) > np.maximum(4.0 * noise, 1e-24)  # others stand still; what they do is not known
-    middle, scale = columns[:, used].mean(axis=0), columns[:, used].std(axis=0)
-    design = np.column_stack([(columns[:, used] - middle) / scale, np.ones(len(columns))])
-    of_noise = np.diag(np.append(noise[used] / scale**2, 0.0))
-    moments = design.T @ design - len(design) * of_noise
-    _, number = np.unique(block, return_inverse=True)
-    blocks, free = int(number.max()) + 1, int(number.max()) + 1 - design.shape[1]
-    if free < 1 or np.linalg.eigvalsh(moments)[0] < 1e-9 * len(design):
-        return None
-    share = float(np.linalg.eigvals(np.linalg.solve(design.T @ design, len(design) * of_noise)).real.max())
-    if share > OF_NOISE:
-        return None
-    inverse = np.linalg.inv(moments)
-    beta = inverse @ (design.T @ target)
-    scores = np.zeros((blocks, len(beta)))
-    np.add.at(scores, number, design * (target - design @ beta)[:, None])
-    scores += np.bincount(number)[:, None] * (of_noise @ beta)
-    covariance = inverse @ (scores.T @ scores) @ inverse * blocks / free
-    turn = np.diag(np.append(1.0 / scale, 1.0))
-    turn[-1, :-1] = -middle / scale
-    value, half = np.zeros(len(used) + 1), np.full(len(used) + 1, np.inf)
-    at = np.append(used, True)
-    value[at] = turn @ beta
-    half[at] = stdtrit(free, LEVEL) * np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
-    half[:-1] += NOISE_KNOWN * share * np.abs(value[:-1])
-    return value.tolist(), half.tolist()

@@ -64,7 +64,7 @@ def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
     x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in shown.edges)
     title = f"What remains at {joint}, over {one.split(' (')[0]} and {two.split(' (')[0]}"
     panel = Panel(
-        title="Mean residual of the extended model" if diagnosis.causes else "Mean residual",
+        title="Mean residual of the extended model" if diagnosis.torque_causes else "Mean residual",
         alt=f"{title}, from {-most:.2g} to {most:.2g} {unit}",
         x_label=one,
         y_label=two,
@@ -168,7 +168,7 @@ def _order(kind: str) -> int:
 
 def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
     factor, unit = unit_of(diagnosis)
-    if not diagnosis.causes:  # the extended model is the nominal one
+    if not diagnosis.torque_causes:  # the extended model is the nominal one
         views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
     limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
     return Sheet(
@@ -177,7 +177,7 @@ def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence
         title=f"Residual at {names.joint(joint)}",
         caption="",
         keys=(
-            *(_before_after(diagnosis) if diagnosis.causes else _before_after(diagnosis)[:1]),
+            *(_before_after(diagnosis) if diagnosis.torque_causes else _before_after(diagnosis)[:1]),
             ("before_scatter", f"scatter within a bin, {words_of(diagnosis.kind).nominal}"),
         ),
         panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(diagnosis.kind)) for view in views),

@@ -233,7 +233,7 @@ def _where(where: Where) -> dict[str, Any]:
 def _cause(cause: Cause, kind: str) -> dict[str, Any]:
     return {
         **_where(cause.where),
-        **_fields(cause, "p_value", "gain"),
+        **_fields(cause, "p_value", "gain", "gain_unit"),
         "confusable_with": [_where(other) for other in cause.confusable_with],
         **_numbers_of(cause.parameters),
         **(_changed(cause.changed) if kind == "change" else {}),
@@ -272,7 +272,7 @@ def _waterfall(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """List the rms over all joints on unseen data: of the nominal model, then after each cause."""
     names = names_of(diagnosis)
     steps = [(words_of(diagnosis.kind).nominal, Where("", None, None))]
-    steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in diagnosis.causes]
+    steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in diagnosis.torque_causes]
     return [
         {"label": label, "effect": where.effect or None, "joint": where.joint, "tendon": where.tendon, "rms": rms}
         for (label, where), rms in zip(steps, diagnosis.steps, strict=True)

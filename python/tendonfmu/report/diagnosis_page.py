@@ -115,7 +115,7 @@ def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
 def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
     words, (factor, unit) = words_of(diagnosis.kind), unit_of(diagnosis)
     before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
-    if diagnosis.causes:
+    if diagnosis.torque_causes:
         yield Tile(
             f"{before} → {after}",
             unit,
@@ -309,19 +309,20 @@ def _steps(diagnosis: Diagnosis, names: Names, steps: list[float], widest: float
         low, high = sorted((100.0 * begin / widest, 100.0 * end / widest))
         return Part(tone, round(low, 2), round(high - low, 2))
 
-    if diagnosis.causes:
+    if diagnosis.torque_causes:
         label = f"error of the {words_of(diagnosis.kind).nominal}"
         yield Step(label, f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),))
-    for k, cause in enumerate(diagnosis.causes):
+    numbers = [k for k, cause in enumerate(diagnosis.causes, start=1) if cause.gain_unit == "N.m"]
+    for k, (number, cause) in enumerate(zip(numbers, diagnosis.torque_causes, strict=True)):
         change = shown[k + 1] - shown[k]
         tone, sign = ("cause", "−") if change <= 0 else ("more", "+")
-        label = f"{k + 1}. {at_place(cause.title, cause.where, names)}"
+        label = f"{number}. {at_place(cause.title, cause.where, names)}"
         yield Step(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),))
     noise = _noise(diagnosis, steps[-1])
     parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
     if noise is not None:
         parts = (part("noise", 0.0, noise), part("predictable", noise, steps[-1]))
-    label = "what remains" if diagnosis.causes else "error of the model"
+    label = "what remains" if diagnosis.torque_causes else "error of the model"
     yield Step(label, f"{shown[-1]:.{digits}f}", parts)
 
 

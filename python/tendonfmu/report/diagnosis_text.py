@@ -12,13 +12,14 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import (
     CONTACT,
-    TITLES,
     UNKNOWN,
+    ZERO,
     Cause,
     CausePlace,
     Diagnosis,
     Invisible,
     Names,
+    Where,
     at_place,
     names_in,
     numbered,
@@ -132,7 +133,7 @@ def error_sentence(diagnosis: Diagnosis) -> str:
     factor, unit = unit_of(diagnosis)
     nominal, extended = (together(each.test_rms) for each in (diagnosis.nominal, diagnosis.extended))
     text = f"On {unseen(diagnosis)} the error{words_of(diagnosis.kind).error}"
-    if diagnosis.causes:
+    if diagnosis.torque_causes:
         fall = f"from {rounded(factor * nominal)} to {rounded(factor * extended)} {unit} (rms)"
         text += f" falls {fall}, by {percent_interval(diagnosis.gain)}."
     else:
@@ -191,7 +192,13 @@ def confusion_sentence(cause: Cause, names: Names) -> str:
     """Name what the data cannot distinguish a cause from; empty if nothing."""
     if not cause.confusable_with:
         return ""
-    others = [at_place(title_of(other.effect), other, names) for other in cause.confusable_with]
+    places: dict[str, list[Where]] = {}
+    for other in cause.confusable_with:
+        places.setdefault(other.effect if other.effect == ZERO else str(other), []).append(other)
+    others = [
+        f"{at_place(title_of(first.effect), first, names)}{''.join(f' and {names.place(other)}' for other in more)}"
+        for first, *more in places.values()
+    ]
     return f"These recordings cannot distinguish it from: {'; '.join(others)}."
 
 
@@ -268,7 +275,9 @@ def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
         )
     if cause.where.effect == UNKNOWN:
         return "less error if the predictable part were known"
-    return words.own_gain + (f", with the other {words.one}s in the model" if len(diagnosis.causes) > 1 else "")
+    if cause.gain_unit == "m":
+        return "less error of the tendons' positions, all tendons together, on unseen data"
+    return words.own_gain + (f", with the other {words.one}s in the model" if len(diagnosis.torque_causes) > 1 else "")
 
 
 def own_gain_sentences(diagnosis: Diagnosis) -> Iterator[str]:
@@ -293,7 +302,7 @@ def tables(diagnosis: Diagnosis) -> Iterator[Table]:
             (
                 f"{k}. {cause.where.effect}",
                 names.places(cause),
-                "see below" if cause.where.effect in TITLES and not cause.changed else cause.size,
+                "see below" if cause.where.effect in (CONTACT, UNKNOWN) and not cause.changed else cause.size,
                 percent_interval(cause.gain),
                 ", ".join(dict.fromkeys(other.effect for other in cause.confusable_with)) or "-",
             )

@@ -2,7 +2,7 @@
 
 Series are averaged over blocks, and parts are held out (`blocks`). Splines remove a slow bias (`splines`). Columns are
 judged by their Gram matrices (`block_grams`), noise is whitened and correlated samples are counted (`whitening`), and
-counts and measurements get an interval (`intervals`, `paired_gain`).
+counts and measurements get an interval (`intervals`, `paired_gain`, `noisy_regression`).
 """
 
 from typing import TYPE_CHECKING
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         regular_blocks,
     )
     from .intervals import Interval
+    from .noisy_regression import Estimate, noisy_regression
     from .paired_gain import BlockIndex, blocks_of, gain_interval, variance_between
     from .random_numbers import LARGEST_SEED, Draws
     from .spectral_line import Line, find_lines

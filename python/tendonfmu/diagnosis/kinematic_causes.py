@@ -1,0 +1,301 @@
+"""Moment arms, zeros, springs, couplings and encoders that are off, or have changed: causes like any other.
+
+x0 = zero + R q + f/k holds at every sample of a taut tendon, whatever friction, weight and contact are. The numbers are
+learned from the samples that train (`recordings/routing.py`). The gain of a cause is the share of the rms of what the
+equation leaves, in metres over all tendons, that it removes on unseen samples.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.cause import Cause, CausePlace, Key, Where
+from tendonfmu.diagnosis.effects.description_edit import add_to_number, data_number
+from tendonfmu.diagnosis.inputs import Input
+from tendonfmu.diagnosis.kinematic_words import EXPLANATIONS, size_of_all
+from tendonfmu.diagnosis.moved_zeros import encoder_offsets, offset_of
+from tendonfmu.diagnosis.names import ENCODER, ZERO, title_of
+from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain
+from tendonfmu.diagnosis.tendon_equation import ARM, COUPLING, SPRING, Geometry, Off, Unseen, rows_of
+from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.recordings import (
+    FitRecording,
+    Held,
+    Learned,
+    TendonRouting,
+    learn_routing,
+    prepare,
+    varying_sentences,
+)
+from tendonfmu.statistics import Interval
+
+LEAST_SHARE = {ARM: 0.01, SPRING: 0.03, COUPLING: 0.02}  # of the number; of a coupling, of the tendon's largest arm
+LEAST_ANGLE = 0.004  # rad, a quarter of a degree: of an encoder; a zero turns the joint by as much
+LONGER = "record a minute or more of motion of all joints"
+
+
+@dataclass(frozen=True)
+class KinematicCauses:
+    """What is off, and what it is worth."""
+
+    is_change: bool
+    known: dict[Key, Off] = field(default_factory=dict)  # every number that the recordings show
+    off: tuple[Off, ...] = ()  # those that are causes
+    causes: tuple[Cause, ...] = ()
+    too_small: tuple[Cause, ...] = ()
+    uncertain: tuple[Cause, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    # --- what the rest of the diagnosis works on ---
+
+    def corrected(self, given: Input) -> Input:
+        """Return the input without what is off: what has changed is taken from the recordings, else the finger gets it.
+
+        An encoder's offset is taken from the recordings in both cases.
+        """
+        if not self.off:
+            return given
+        finger, moved = given.finger, self.off
+        if not self.is_change:
+            finger = finger_from_data(self.edited(finger.data), finger.path)
+            moved = tuple(off for off in moved if off.where.effect == ENCODER)
+        before = Geometry.of(finger.data)
+        now = before.moved(moved)
+
+        def again(recordings: Sequence[FitRecording]) -> list[FitRecording]:
+            whole = [prepare(finger, before.seen(each.recording, now), each.kinematics, Held()) for each in recordings]
+            flags = ("train", "held_out", "contact_out")
+            return [
+                replace(new, **{name: getattr(old, name) for name in flags})
+                for new, old in zip(whole, recordings, strict=True)
+            ]
+
+        return replace(given, finger=finger, training=again(given.training), tests=again(given.tests))
+
+    def edited(self, data: Data) -> dict[str, Any]:
+        """Return a description with the numbers that are off; none is an encoder's."""
+        edited: dict[str, Any] = copy.deepcopy(dict(data))
+        for off in self.off:
+            if off.where.effect != ENCODER:
+                path, number = off.number.path, off.number
+                now = data_number(data, path) + number.off if self.is_change else number.rounded
+                add_to_number(edited, path, now - data_number(data, path))
+        return edited
+
+    def in_diagnosis(self, diagnosis: Diagnosis) -> Diagnosis:
+        """Return the diagnosis of the corrected input with these causes."""
+        sentences = [*self._experiments(), diagnosis.experiment.sentence]
+        extended = self.edited(diagnosis.extended_data) if self.is_change else diagnosis.extended_data
+        verdicts = {"adequate": "explained", "unexplained": "partly explained"} if self.causes else {}
+        return replace(
+            diagnosis,
+            verdict=verdicts.get(diagnosis.verdict, diagnosis.verdict),
+            causes=tuple(by_gain([*(self._with_numbers(cause, extended) for cause in self.causes), *diagnosis.causes])),
+            too_small=(*self.too_small, *diagnosis.too_small),
+            uncertain=(*self.uncertain, *diagnosis.uncertain),
+            extended_data=extended,
+            experiment=replace(diagnosis.experiment, sentence=" ".join(filter(None, sentences)))
+            if self.causes
+            else diagnosis.experiment,
+            tested=diagnosis.tested + len(self.known),
+            warnings=(*diagnosis.warnings, *self.warnings),
+        )
+
+    def _with_numbers(self, cause: Cause, extended: Data) -> Cause:
+        """Return a cause with its numbers in the extended description; an encoder's offset is in none."""
+        places = tuple(
+            CausePlace(
+                off.where.joint,
+                off.where.tendon,
+                {
+                    off.number.path: (
+                        off.number.value if cause.effect == ENCODER else data_number(extended, off.number.path),
+                        off.unit,
+                    )
+                },
+            )
+            for off in self.off
+            if off.where.effect == cause.effect
+        )
+        numbers = {path: number for place in places for path, number in place.parameters.items()}
+        return replace(cause, places=places, parameters=numbers)
+
+    def _experiments(self) -> Iterator[str]:
+        effects = {off.where.effect for off in self.off}
+        if ENCODER in effects:
+            yield (
+                "Hold the joint at a stop or in a jig of known angle and read its encoder: that distinguishes an "
+                "encoder that slipped from tendons that all moved."
+            )
+        if effects & {ZERO, SPRING}:
+            yield (
+                "Take all load off the tendon and read its force sensor: that distinguishes its position or spring "
+                "from its force sensor."
+            )
+
+
+# --- finding them -----------------------------------------------------------------------------------------------------
+
+
+def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> KinematicCauses:
+    """Find what is off in recordings that show it: with joint encoders, or with more tendons than joints."""
+    reference = [recording.recording for recording in given.reference]
+    trained = [rows_of(recording.recording, recording.train) for recording in given.training]
+    is_long = True
+    learned = learn_routing(given.finger, trained, reference, coupled=True)
+    if not learned:
+        is_long, whole = False, [recording.recording for recording in given.training]
+        learned = learn_routing(given.finger, whole, reference, coupled=True)
+    none = KinematicCauses(bool(reference))
+    known = {off.where: off for off in _listed(given.finger.data, learned)}
+    if not learned or any(off.number.is_absurd for off in known.values() if off.where.effect != COUPLING):
+        return none
+    offsets, single = _offsets(given.finger.data, known)
+    off = [each for each in known.values() if _is_certain(each, len(known)) and (each.where.effect != ZERO)]
+    off += [each for each in known.values() if each.where in single and _is_certain(each, len(known))]
+    off += [each for each in offsets if _is_certain(each, len(known))]
+    keys = {(where.effect, where.joint, where.tendon): each for where, each in known.items()}
+    keys |= {(ENCODER, j, None): each for j, each in _by_joint(given.finger.data, known)}
+    warnings = () if reference else tuple(varying_sentences(given.finger, learned))
+    found = replace(none, known=keys, warnings=warnings)
+    if not is_long:
+        return replace(found, uncertain=tuple(_causes(given, found, off, known, lambda own: Interval(0.0, 0.0, 0.0))))
+    return _judged(given, found, off, known, learned, least_gain, seed)
+
+
+def _judged(
+    given: Input,
+    found: KinematicCauses,
+    off: Sequence[Off],
+    known: dict[Where, Off],
+    learned: Sequence[TendonRouting],
+    least_gain: float,
+    seed: int,
+) -> KinematicCauses:
+    """Divide what is off into causes and what is too small or uncertain."""
+    small = [each for each in off if abs(each.number.off) < each.least]
+    kept = [each for each in off if each not in small]
+    base = Geometry.of(given.finger.data).as_reference(list(known.values()))
+    unseen = Unseen(given, learned, seed)
+    while True:
+        causes = list(_causes(given, found, kept, known, partial(unseen.gain, base, kept)))
+        weak = {cause.effect for cause in causes if not (cause.gain.low > 0.0 and cause.gain.value >= least_gain)}
+        if not weak:
+            break
+        small += [each for each in kept if each.where.effect in weak]
+        kept = [each for each in kept if each.where.effect not in weak]
+    rest = list(_causes(given, found, small, known, lambda own: unseen.gain(base, [*kept, *own], own)))
+    certain = [cause for cause in rest if cause.gain.low > 0.0]
+    uncertain = [replace(cause, experiment=LONGER) for cause in rest if not cause.gain.low > 0.0]
+    return replace(found, off=tuple(kept), causes=tuple(causes), too_small=tuple(certain), uncertain=tuple(uncertain))
+
+
+def _is_certain(off: Off, tested: int) -> bool:
+    return off.number.differs and off.number.p_value * tested < SIGNIFICANCE
+
+
+def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
+    """Yield every number that the recordings show."""
+    arms = moment_arms(data)
+    for each in learned:
+        i, largest = each.tendon, float(np.abs(arms[each.tendon]).max())
+        for j, arm in each.arms.items():
+            effect = ARM if arms[i, j] else COUPLING
+            least = LEAST_SHARE[effect] * abs(arms[i, j] or largest)
+            yield Off(Where(effect, j + 1, i + 1), arm, least)
+        spring = each.stiffness
+        yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described)
+        yield Off(Where(ZERO, None, i + 1), each.zero, LEAST_ANGLE * largest)
+
+
+# --- zeros ------------------------------------------------------------------------------------------------------------
+
+
+def _offsets(data: Data, known: dict[Where, Off]) -> tuple[list[Off], set[Where]]:
+    """Return the offsets of encoders that explain the zeros, and the zeros that none explains."""
+    zeros = _zeros(known)
+    if not any(zero.number.differs for zero in zeros):
+        return [], set()
+    off, known_to, arms = _of_zeros(data, zeros)
+    found = encoder_offsets(off, known_to, arms)
+    numbers = zip(found.joints.tolist(), found.offset.tolist(), found.half.tolist(), strict=True)
+    offsets = [_encoder(j, offset, half) for j, offset, half in numbers]
+    return offsets, {zero.where for zero, alone in zip(zeros, found.single, strict=True) if alone}
+
+
+def _by_joint(data: Data, known: dict[Where, Off]) -> Iterator[tuple[int, Off]]:
+    """Yield (joint from 1, its encoder's offset if it explained the zeros alone)."""
+    zeros = _zeros(known)
+    if zeros:
+        off, known_to, arms = _of_zeros(data, zeros)
+        for j in np.flatnonzero(arms.any(axis=0)):
+            own = arms[:, j] != 0.0
+            offset, half = offset_of(off[own], known_to[own], arms[own][:, [j]])
+            yield int(j) + 1, _encoder(int(j), float(offset[0]), float(half[0]))
+
+
+def _zeros(known: dict[Where, Off]) -> list[Off]:
+    return [each for where, each in known.items() if where.effect == ZERO and each.number.is_known]
+
+
+def _of_zeros(data: Data, zeros: Sequence[Off]) -> tuple[Numbers, Numbers, Numbers]:
+    """Return how far zeros are off, to what they are known (m) [t], and the arms of their tendons [t, n]."""
+    numbers = [zero.number for zero in zeros]
+    off, known_to = (np.array(values) for values in zip(*((each.off, each.known_to) for each in numbers), strict=True))
+    return off, known_to, moment_arms(data)[[(zero.where.tendon or 1) - 1 for zero in zeros]]
+
+
+def _encoder(j: int, offset: float, half: float) -> Off:
+    p_value = 2.0 * float(ndtr(-1.96 * abs(offset) / max(half, 1e-300)))
+    number = Learned(f"joint_position[{j + 1}]", offset, half, 0.0, True, 0.0, p_value)
+    return Off(Where(ENCODER, j + 1), number, LEAST_ANGLE)
+
+
+# --- causes -----------------------------------------------------------------------------------------------------------
+
+
+def _causes(
+    given: Input,
+    found: KinematicCauses,
+    off: Sequence[Off],
+    known: dict[Where, Off],
+    gain_of: Callable[[Sequence[Off]], Interval],
+) -> Iterator[Cause]:
+    """Yield one cause for each effect, with its places."""
+    arms = moment_arms(given.finger.data)
+    for effect in dict.fromkeys(each.where.effect for each in off):
+        own = sorted((each for each in off if each.where.effect == effect), key=lambda each: -abs(each.number.off))
+        joints, tendons = ({getattr(each.where, name) for each in own} for name in ("joint", "tendon"))
+        where = Where(effect, *(kind.pop() if len(kind) == 1 else None for kind in (joints, tendons)))
+        rivals = dict.fromkeys(rival for each in own for rival in _rivals(each.where, arms))
+        yield Cause(
+            where,
+            title_of(effect),
+            EXPLANATIONS[effect],
+            p_value=min(1.0, max(each.number.p_value for each in own) * len(known)),
+            gain=gain_of(own),
+            gain_unit="m",
+            confusable_with=tuple(rivals),
+            size=size_of_all(effect, [each.size for each in own], found.is_change),
+            places=tuple(CausePlace(each.where.joint, each.where.tendon, {}) for each in own),
+            changed=own[0].size if found.is_change else None,
+        )
+
+
+def _rivals(where: Where, arms: Numbers) -> Iterator[Where]:
+    """Yield what the equation cannot distinguish from this."""
+    if where.effect == ENCODER and where.joint is not None:
+        yield from (Where(ZERO, None, int(i) + 1) for i in np.flatnonzero(arms[:, where.joint - 1]))
+    elif where.effect in (ZERO, SPRING) and where.tendon is not None:
+        yield Where("force_offset" if where.effect == ZERO else "force_gain", None, where.tendon)
+        alone = np.flatnonzero((arms[where.tendon - 1] != 0.0) & ((arms != 0.0).sum(axis=0) == 1))
+        yield from (Where(ENCODER, int(j) + 1) for j in alone if where.effect == ZERO)

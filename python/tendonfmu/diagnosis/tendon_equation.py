@@ -1,0 +1,173 @@
+"""x0 = zero + R q + f/k: what is off in it, what it leaves, and how much of that correcting something removes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.cause import ChangedSize, Where
+from tendonfmu.diagnosis.inputs import Input
+from tendonfmu.diagnosis.names import ENCODER, ZERO
+from tendonfmu.model import moment_arms
+from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, smooth_speeds
+from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
+
+ARM, SPRING, COUPLING = "moment_arm", "tendon_nonlinearity", "joint_coupling"
+UNITS = {ARM: "m", COUPLING: "m", ZERO: "m", SPRING: "N/m", ENCODER: "rad"}
+TAUT = 0.02  # of a tendon's largest force
+
+
+@dataclass(frozen=True)
+class Off:
+    """A number that is off."""
+
+    where: Where
+    number: Learned  # of an encoder: by how much it reads too much
+    least: float  # a smaller one does not matter
+
+    @property
+    def unit(self) -> str:
+        return UNITS[self.where.effect]
+
+    @property
+    def size(self) -> ChangedSize:
+        """How large it was, or is described, and is now."""
+        low, high = (self.number.value + side * self.number.half for side in (-1.0, 1.0))
+        then, off = self.number.described, self.number.off
+        return ChangedSize(
+            "offset" if self.where.effect == ENCODER else self.number.path.rsplit(".", 1)[-1].split("[")[0],
+            self.unit,
+            Interval(then, then, then),
+            Interval(self.number.value, low, high),
+            Interval(off, low - then, high - then),
+        )
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What leads from angles and forces to positions."""
+
+    arms: Numbers  # [m, n]
+    compliance: Numbers  # [m] m/N
+    zero: Numbers  # [m] m
+    encoder: Numbers  # [n] rad; what the encoders read too much
+
+    @classmethod
+    def of(cls, data: Data) -> Geometry:
+        arms = moment_arms(data)
+        stiffness, zero = (
+            np.array([float(tendon.get(key) or 0.0) for tendon in data["tendons"]]) for key in ("stiffness", "zero")
+        )
+        return cls(arms, 1.0 / stiffness, zero, np.zeros(arms.shape[1]))
+
+    def as_reference(self, known: Sequence[Off]) -> Geometry:
+        """Return it with the numbers of the reference; without one, they are those that are described."""
+        return self._set([each for each in known if each.number.is_known], lambda number: number.described)
+
+    def moved(self, off: Sequence[Off]) -> Geometry:
+        """Return it with what is off."""
+        base = self._set(off, lambda number: number.described)
+        now = base._set(off, lambda number: number.value)
+        # the differences count: of a change, the description may be off in both
+        return Geometry(*(mine + (new - old) for mine, new, old in zip(self._all, now._all, base._all, strict=True)))
+
+    @property
+    def _all(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        return self.arms, self.compliance, self.zero, self.encoder
+
+    def _set(self, off: Sequence[Off], of: Callable[[Learned], float]) -> Geometry:
+        new = Geometry(*(values.copy() for values in self._all))
+        for each in off:
+            joint, tendon, value = (each.where.joint or 0) - 1, (each.where.tendon or 0) - 1, of(each.number)
+            if each.where.effect in (ARM, COUPLING):
+                new.arms[tendon, joint] = value
+            elif each.where.effect == SPRING:
+                new.compliance[tendon] = 1.0 / value
+            elif each.where.effect == ZERO:
+                new.zero[tendon] = value
+            else:
+                new.encoder[joint] = value
+        return new
+
+    def left(self, recording: Recording) -> Numbers:
+        """Return what the equation leaves, m [N, m]; 0 where a tendon is slack."""
+        groups, force = recording.groups, recording.groups["tendon_force"]
+        side = groups["tendon_position"] - self.zero - force * self.compliance
+        left = side - self._angle(recording) @ self.arms.T
+        return np.asarray(np.where(np.abs(force) > TAUT * np.abs(force).max(axis=0), left, 0.0))
+
+    def _angle(self, recording: Recording) -> Numbers:
+        groups = recording.groups
+        if "joint_position" in groups:
+            return np.asarray(groups["joint_position"] - self.encoder)
+        side = groups["tendon_position"] - self.zero - groups["tendon_force"] * self.compliance
+        return np.asarray(side @ np.linalg.pinv(self.arms).T)
+
+    def seen(self, recording: Recording, now: Geometry) -> Recording:
+        """Return a recording of `now` as this geometry would have recorded it."""
+        groups, force, angle = dict(recording.groups), recording.groups["tendon_force"], now._angle(recording)
+        moved = now.zero - self.zero + force * (now.compliance - self.compliance)
+        groups["tendon_position"] = groups["tendon_position"] - moved - angle @ (now.arms - self.arms).T
+        if "joint_position" in groups:
+            groups["joint_position"] = angle
+        if (now.arms != self.arms).any():  # the same forces turn the joints otherwise
+            groups["external_torque"] = groups.get("external_torque", 0.0) - force @ (now.arms - self.arms)
+        return replace(recording, groups=groups)
+
+
+class Unseen:
+    """The samples that nothing was learned from, without what the equation lacks in the reference as well.
+
+    That is what delays of sensors, springs that are not linear and arms that vary leave.
+    """
+
+    def __init__(self, given: Input, learned: Sequence[TendonRouting], seed: int) -> None:
+        self._seed = seed
+        unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
+        self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
+        self._trained = [(each.recording, each.train) for each in given.training]
+        self._reference = [(each.recording, each.train) for each in given.reference]
+        self._shapes = {
+            id(recording): np.stack([_shapes(recording, each) for each in learned], axis=1)
+            for recording, _ in (*self._judged, *self._trained, *self._reference)
+        }
+        self._tendons = [each.tendon for each in learned]
+
+    def gain(self, base: Geometry, off: Sequence[Off], own: Sequence[Off]) -> Interval:
+        """Return the gain of some of all that is off, the others kept."""
+        now, without = base.moved(off), base.moved([each for each in off if each not in own])
+        learned = [*((now, *each) for each in self._trained), *((base, *each) for each in self._reference)]
+        left = np.concatenate([one.left(each)[mask][:, self._tendons] for one, each, mask in learned])
+        shapes = np.concatenate([self._shapes[id(each)][mask] for _, each, mask in learned])
+        shapes = np.where(left[..., None] != 0.0, shapes, 0.0)
+        parts = np.array([np.linalg.lstsq(shapes[:, i], left[:, i])[0] for i in range(left.shape[1])])
+        pairs = []
+        for recording, index in self._judged:
+            shared = np.einsum("kic,ic->ki", self._shapes[id(recording)], parts)
+            both = [one.left(recording)[:, self._tendons] for one in (without, now)]
+            squares = [np.where(one != 0.0, one - shared, 0.0) ** 2 for one in both]
+            pairs.append(np.column_stack([index.sums(each.sum(axis=1)) for each in squares]))
+        before, after = np.concatenate(pairs).T
+        if not before.sum() > 0.0:
+            return Interval(0.0, 0.0, 0.0)
+        gain = gain_interval(before, after, self._seed, variance_between(pairs) / len(pairs))
+        return gain if math.isfinite(gain.low) else Interval(gain.value, 0.0, 1.0)
+
+
+def _shapes(recording: Recording, routing: TendonRouting) -> Numbers:
+    """Return speeds of a tendon's position and force, and curves of force and angles [N, c]."""
+    groups, time, own = recording.groups, recording.time, [routing.tendon]
+    speeds = [smooth_speeds(time, groups[name][:, own]) for name in ("tendon_position", "tendon_force")]
+    angle = groups.get("joint_position", np.zeros((len(time), 0)))
+    span = routing.span[:, -1 - angle.shape[1] :]
+    return np.concatenate([*speeds, curves(np.column_stack([angle, groups["tendon_force"][:, own]]), span)], axis=1)
+
+
+def rows_of(recording: Recording, chosen: Flags) -> Recording:
+    """Return a recording of some samples only."""
+    groups = {name: values[chosen] for name, values in recording.groups.items()}
+    return replace(recording, time=recording.time[chosen], groups=groups, contact=None, others={})
