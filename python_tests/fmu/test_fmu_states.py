@@ -314,7 +314,7 @@ def test_whatever_number_stands_in_a_state(kind: Kind) -> None:
         good = instance.save()
         of_model = max(good.find(magic) for magic in (b"TFMUSTA", b"TFplant"))
         for index in range((of_model - 40) // 8):
-            for value in (NAN, INF, -INF, -1.0, 1e300, -1e6, 0.5, 2.0**53):
+            for value in (NAN, math.inf, -math.inf, -1.0, 1e300, -1e6, 0.5, 2.0**53):
                 if instance.restore(with_number(good, index, value)) == ERROR:
                     assert "state" in instance.last_message
                     continue
