@@ -82,6 +82,10 @@ tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* 
     message_start(line, "memory and image must not be NULL");
     return NULL;
   }
+  if (!kernel_rounds_as_written()) {
+    message_start(line, "compiled with -ffast-math, -ffp-contract=fast or the like: expected none of them");
+    return NULL;
+  }
   if (model_read_header(image, image_size, &shape, line)) {
     return NULL;
   }

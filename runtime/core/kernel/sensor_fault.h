@@ -115,11 +115,13 @@ HOT_INLINE quad force_of_spring(const tendonfmu_finger* f, const watched* w, siz
 }
 
 HOT_INLINE quad_mask stood_long(const tendonfmu_finger* f, quad since, double time, double step) {
-  return quad_greater(quad_sub(quad_set(time), since), quad_set(f->derived.settings.fault_hold_time + CLOCK_ROUNDING * step));
+  return quad_greater(quad_sub(quad_set(time), since),
+                      quad_set(f->derived.settings.fault_hold_time + CLOCK_ROUNDING * step));
 }
 
 /* since when f0 is where it is, the last sample with a taut tendon, and whether it stands against its spring */
-HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t i, double time, double step, int* standing) {
+HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t i, double time, double step,
+                                  int* standing) {
   const finger_settings* settings = &f->derived.settings;
   double *before = f->remembered.sensor, *now = f->scratch.sensor;
   const quad held = quad_load(sensor_row(f, before, SENSOR_HELD_FORCE) + i), one = quad_set(1.0);
