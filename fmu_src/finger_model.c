@@ -219,8 +219,8 @@ void model_end_trial(model* m) {
 }
 
 /* The sample belongs to the beginning of the step. */
-const char* model_refuse_step(const model* m, double time, double step, double end) {
-  (void)step, (void)end;
+const char* model_refuse_step(const model* m, double time, double step) {
+  (void)step;
   return time < tendonfmu_get_time(m->finger)
              ? "expected a currentCommunicationPoint not before the sample already taken"
              : NULL;

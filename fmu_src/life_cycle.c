@@ -198,16 +198,16 @@ fmu_status life_reset(component* c) {
 
 /* --- steps -------------------------------------------------------------------------------------------------------- */
 
-/* Why there is no step from `time` over `step`; NULL when there is one. A step past the stop time by rounding is one.
- */
+/* Why there is no step from `time` over `step`; NULL when there is one. Clients round: their last step is the one that
+ * ends nearest to the stop time. */
 static const char* refuse_step(const component* c, double time, double step) {
   if (!isfinite(step) || !(step > 0.0)) {
     return "expected a finite communicationStepSize above 0 s";
   }
-  if (c->stop_time_defined && time > c->stop_time + 0.5 * step) {
-    return "expected a currentCommunicationPoint not past the stop time";
+  if (c->stop_time_defined && time + step > c->stop_time + 0.5 * step) {
+    return "expected a step that ends at the stop time or before";
   }
-  return model_refuse_step(c->model, time, step, c->end_of_step);
+  return model_refuse_step(c->model, time, step);
 }
 
 fmu_status life_step(component* c, double time, double step) {

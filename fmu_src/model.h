@@ -76,8 +76,8 @@ int model_initialise(model* m, struct variables* values, double start);
 int model_begin_trial(model* m, struct variables* values, double start);
 void model_end_trial(model* m);
 
-/* Why there is no step from `time` over `step` after one that ended at `end`; NULL when there is one. */
-const char* model_refuse_step(const model* m, double time, double step, double end);
+/* Why there is no step from `time` over `step`; NULL when there is one. */
+const char* model_refuse_step(const model* m, double time, double step);
 int model_step(model* m, struct variables* values, double time, double step);
 
 /* Time of the outputs. */

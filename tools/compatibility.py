@@ -40,7 +40,6 @@ class Example:
 
     description: str
     recording: str
-    rows: slice  # of the recording
     shows: str  # what the FMU tests
 
 
@@ -48,19 +47,16 @@ EXAMPLES = {
     "cable_loop": Example(
         "python_tests/reference/cable_loop.json",
         "python_tests/reference/cable_loop_in.csv",
-        slice(None),
         "one joint and one cable loop, whose force has either sign. In FMI 3.0 every array has one element",
     ),
     "two_joints": Example(
         "examples/demo_recording/two_joints.json",
         "examples/demo_recording/two_joints_unseen.parquet",
-        slice(1000),
         "two joints, four tendons, free motion",
     ),
     "index_finger": Example(
         "examples/demo_recording/index_finger_calibrated.json",
         "examples/demo_recording/index_finger_pushes.parquet",
-        slice(4000, 5000),
         "four joints, eight tendons, hundreds of parameters. It is pushed: `contact` becomes true",
     ),
 }
@@ -85,7 +81,7 @@ def write_example(name: str, fmi: int, folder: Path) -> Task:
     """Write the FMU of an example and the files beside it. Return what an importer has to do."""
     example = EXAMPLES[name]
     folder.mkdir(parents=True)
-    recording = tf.read_recording(ROOT / example.recording).frame.iloc[example.rows]
+    recording = tf.read_recording(ROOT / example.recording).frame
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tf.InputWarning)  # the cable loop's motion is invented
         fmu = tf.build(ROOT / example.description, folder / f"{name}.fmu", reference=recording, fmi=fmi)

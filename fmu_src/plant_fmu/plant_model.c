@@ -280,57 +280,45 @@ void model_end_trial(model* m) {
 /* --- steps ---------------------------------------------------------------------------------------------------------
  */
 
-const char* model_refuse_step(const model* m, double time, double step, double end) {
-  (void)m;
+/* s, what an importer's additions and the start time leave in the last digits */
+static double lost_digits(double start, double time) {
+  return 1e-15 + 64.0 * DBL_EPSILON * (fabs(time) + fabs(start));
+}
+
+const char* model_refuse_step(const model* m, double time, double step) {
   if (step > longest_step) {
     return "expected a communicationStepSize of at most 1000 s";
   }
-  if (fabs(time - end) > 1e-6 * step + 16.0 * DBL_EPSILON * fabs(time)) {
+  if (fabs(time - model_get_time(m)) > 1e-6 * step + 2.0 * lost_digits(m->start, time)) {
     return "expected a currentCommunicationPoint where the last step ended";
   }
   return NULL;
 }
 
-/* Time of the plant, without what the importer's additions and the start time leave in the last digits: a sensor that
- * samples at 0.003 s is not to wait for the next step because 0.001 + 0.001 + 0.001 is less. */
+/* Time of the plant without these digits: a sensor that samples at 0.003 s is not to wait for the next step because
+ * 0.001 + 0.001 + 0.001 is less. */
 static double plant_time(double start, double time) {
   const double plain = time - start, rounded = round(plain * 1e9) / 1e9;
-  const double lost = 1e-15 + 64.0 * DBL_EPSILON * (fabs(time) + fabs(start));
-  return fabs(plain - rounded) <= lost ? rounded : plain;
-}
-
-/* Gives the plant the importer's inputs, if they are others, and keeps what it had. */
-static int change_inputs(model* m, const double* inputs) {
-  memcpy(m->before, m->inputs, m->input_count * sizeof *m->inputs);
-  m->first_command = !m->commanded && is_command(m, inputs);
-  if (m->first_command) {
-    tendonfmu_plant_save_state(m->plant, m->scratch, m->plant_state_size);
-  }
-  return plant_take_inputs(m, inputs);
-}
-
-/* Inputs are part of the plant's state: after a step that failed they are as they were. Whether any command
- * has come yet only a whole state can say. */
-static void change_inputs_back(model* m) {
-  if (m->first_command) {
-    tendonfmu_plant_restore_state(m->plant, m->scratch, m->plant_state_size);
-    memcpy(m->inputs, m->before, m->input_count * sizeof *m->inputs);
-    m->commanded = 0;
-  } else {
-    plant_take_inputs(m, m->before);
-  }
+  return fabs(plain - rounded) <= lost_digits(start, time) ? rounded : plain;
 }
 
 int model_step(model* m, variables* values, double time, double step) {
   const double end = plant_time(m->start, time + step);
   const int differ = inputs_differ(m, values);
-  if (differ && change_inputs(m, inputs_of(values))) {
-    return -1;
+  const int commanded = m->commanded;
+  if (differ) { /* to go back to: inputs are part of the plant's state */
+    memcpy(m->before, m->inputs, m->input_count * sizeof *m->inputs);
+    tendonfmu_plant_save_state(m->plant, m->scratch, m->plant_state_size);
+    if (plant_take_inputs(m, inputs_of(values))) {
+      return -1;
+    }
   }
   if (end > tendonfmu_plant_get_time(m->plant) && tendonfmu_plant_advance(m->plant, end) != TENDONFMU_PLANT_OK) {
     plant_failed(m);
     if (differ) {
-      change_inputs_back(m);
+      tendonfmu_plant_restore_state(m->plant, m->scratch, m->plant_state_size);
+      memcpy(m->inputs, m->before, m->input_count * sizeof *m->inputs);
+      m->commanded = commanded;
     }
     return -1;
   }

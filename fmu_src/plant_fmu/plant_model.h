@@ -19,7 +19,6 @@ struct model {
   double start;                 /* s, time of the FMU where that of the plant is 0 */
   int running;                  /* initialised for good, not only to look at outputs */
   int commanded;         /* a command that is not all 0 has come; until then the motors hold their first position */
-  int first_command;     /* the last change of inputs brought it */
   int tolerance_written; /* relative_tolerance was written: it stands above that of fmi2SetupExperiment */
   char error[PLANT_ERROR_BYTES];
 };

@@ -68,16 +68,11 @@ const char* model_check_state(model* m, const void* bytes, int initialised) {
   return NULL; /* the plant looks at its own bytes when it takes them */
 }
 
-/* A plant that has not settled with these settings is brought so far only when it asks for it. */
 static int restore_plant(model* m, const double* settings, const void* state) {
-  const size_t size = m->plant_state_size;
   if (memcmp(m->used, settings, sizeof m->used) != 0 && plant_start_over(m, settings)) {
     return -1;
   }
-  tendonfmu_plant_status status = tendonfmu_plant_restore_state(m->plant, state, size);
-  if (status == TENDONFMU_PLANT_WRONG_ORDER && tendonfmu_plant_initialise(m->plant) == TENDONFMU_PLANT_OK) {
-    status = tendonfmu_plant_restore_state(m->plant, state, size);
-  }
+  const tendonfmu_plant_status status = tendonfmu_plant_restore_state(m->plant, state, m->plant_state_size);
   return status == TENDONFMU_PLANT_OK ? 0 : plant_failed(m);
 }
 

@@ -268,6 +268,32 @@ def test_hold_time_counts_from_the_last_sample_that_exceeded(runner: Runner) -> 
     assert contact_of(shorter) == [0, 1, 1, 0, 0, 0]
 
 
+CLOCKS: dict[str, Callable[[int, float], Array]] = {
+    "multiples": lambda count, h: h * np.arange(count),
+    "sums": lambda count, h: np.cumsum(np.full(count, h)) - h,
+    "jittered": lambda count, h: h * np.arange(count) + np.random.default_rng(5).uniform(-1e-14, 1e-14, count),
+    "microseconds": lambda count, h: np.round(h * np.arange(count) + 3.3e-7, 6),
+    "since 1970": lambda count, h: 1.7e9 + h * np.arange(count),
+}
+
+
+@pytest.mark.parametrize("key", ["hold_time", "release_time"])
+@pytest.mark.parametrize("h", [0.001, 0.003, 0.01])
+def test_no_rounding_of_a_clock_changes_a_contact(runner: Runner, h: float, key: str) -> None:
+    """Pushes of two samples every hundred; held for 25 samples exactly, or with a bias that moves after as many."""
+    contact: dict[str, Any] = {"threshold": [0.04], key: 25 * h}
+    bias = {"drift_variance": 0.0, "noise_std": 0.1, "initial_variance": 1e-4}
+    force = np.where(np.arange(2000) % 100 < (2 if key == "hold_time" else 60), 15.0, 10.0)
+    force[:50] = 10.0
+    found = [
+        contact_of(runner(finger([FREE], bias=bias, contact=contact), at_times(clock(2000, h), force, 0.0), 3))
+        for clock in CLOCKS.values()
+    ]
+    expected = 19 * (2 + 25) if key == "hold_time" else None
+    assert all(each == found[0] for each in found)
+    assert expected is None or sum(found[0]) == expected
+
+
 # --- step 6: release
 
 

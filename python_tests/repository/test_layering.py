@@ -250,7 +250,8 @@ def test_a_source_includes_only_what_stands_above_it(part: str) -> None:
 BEYOND_CORE = r"tendonfmu_(estimation|learner|plant)|runtime/(estimation|plant)"
 # Sources and lists of CMake, and what none of them names: neither included nor linked.
 STRANGERS = {
-    "runtime/core/**/*.[ch]": rf"fmi[23]|fmu_src|{BEYOND_CORE}",
+    # printf and scanf allocate in small C libraries
+    "runtime/core/**/*.[ch]": rf"fmi[23]|fmu_src|printf *\(|scanf *\(|{BEYOND_CORE}",
     "runtime/CMakeLists.txt": rf"fmu_src|{BEYOND_CORE}",
     "runtime/description/*": BEYOND_CORE,
     "runtime/plant/*": r"tendonfmu_(estimation|learner)|tendonfmu_core|runtime/(core|estimation)|\.\./core",

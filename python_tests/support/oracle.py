@@ -113,7 +113,7 @@ class FingerOracle:
         f0 = np.asarray(inputs["tendon_force"], dtype=float)
 
         # 0. sensors
-        self._watch(inputs, f0, time, out)
+        self._watch(inputs, f0, time, dt, out)
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first, out)
         x_dot = tendon_velocity(self.R, v)
@@ -154,7 +154,7 @@ class FingerOracle:
             r = np.where(unwatched, 0.0, tau - T_eff)
             self.detector.forget(unwatched)
             joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, out)
-            if self.detector.updates(time):
+            if self.detector.updates(time, dt):
                 K, own = self._gain(dt, noise)
                 correction = K * r
                 self.b_eff = self.b_eff + correction
@@ -189,7 +189,7 @@ class FingerOracle:
         self.samples += 1
         return out
 
-    def _watch(self, inputs: Mapping[str, Array], f0: Array, time: float, out: Step) -> None:
+    def _watch(self, inputs: Mapping[str, Array], f0: Array, time: float, dt: float, out: Step) -> None:
         """Step 0: the rows in use, x0 − f0/k, and by how much the angles of the sample before change with the rows."""
         k = np.array([tendon.stiffness for tendon in self.tendons])
         before = self.spring_end
@@ -199,7 +199,7 @@ class FingerOracle:
             x = self.spring_end + f0 / k
         if self.sensors is not None:
             q = None if self.source == 1 else np.asarray(inputs["joint_position"], dtype=float)
-            self.watch = self.sensors.take(f0, np.asarray(x, dtype=float), q, time, out)
+            self.watch = self.sensors.take(f0, np.asarray(x, dtype=float), q, time, dt, out)
         self.shift = (self.watch.inverse - self.watch.before) @ before
 
     def _kinematics(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import Key, Step, given
+from oracle_finger import Key, Step, as_long, given, longer
 from oracle_rest import RestWatch
 
 Array = NDArray[Any]
@@ -208,8 +208,7 @@ class Detector:
             if self._exceeds(j, r[j], y[j], bounds, mean_force, dt, out) or loaded[j]:
                 found[j] = True
                 self.last_exceeded[j] = time
-            # times are inputs: every implementation subtracts the same two numbers, so this is never "near"
-            elif self.in_contact[j] and time - self.last_exceeded[j] <= self.hold_time:
+            elif self.in_contact[j] and not longer(time - self.last_exceeded[j], self.hold_time, dt):
                 found[j] = True
                 self.branches["held"] += 1
         self.in_contact = found
@@ -269,11 +268,11 @@ class Detector:
             self.branches["evidence_fastest"] += 1
         self.evidence[j] = min(2.0 * self.evidence_time, max(0.0, grown))
 
-    def updates(self, time: float) -> bool:
+    def updates(self, time: float, dt: float) -> bool:
         """Step 6: whether the bias is updated at this sample, after `contact`."""
         if self.contact_since is None:
             return True
-        if self.release_time is None or time - self.contact_since < self.release_time:
+        if self.release_time is None or not as_long(time - self.contact_since, self.release_time, dt):
             return False
         self.branches["update_in_contact"] += 1
         return True

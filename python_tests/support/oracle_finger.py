@@ -131,6 +131,19 @@ def tendon_velocity(R: Array, v: Array) -> Array:
     return np.array([[*(sum(arms[k] * speeds[k] for k in range(j, n)) for j in range(n)), 0.0] for arms in R.tolist()])
 
 
+CLOCK_ROUNDING = 0.01  # of Δt: times so near are equal
+
+
+def as_long(elapsed: float, time: float, dt: float) -> bool:
+    """elapsed ≥ time, for times of clocks that round."""
+    return elapsed >= time - CLOCK_ROUNDING * dt
+
+
+def longer(elapsed: float, time: float, dt: float) -> bool:
+    """elapsed > time, for times of clocks that round."""
+    return elapsed > time + CLOCK_ROUNDING * dt
+
+
 def given(table: Mapping[str, Any] | None, key: str, default: Any) -> Any:
     """The entry, or the default when the table or the key is absent or null."""
     value = None if table is None else table.get(key)

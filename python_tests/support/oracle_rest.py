@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import Key, Step, given
+from oracle_finger import Key, Step, as_long, given
 
 Array = NDArray[Any]
 
@@ -76,7 +76,7 @@ class RestWatch:
             if far.any() or any(changed):
                 self.branches["rest_not_yet"] += 1
                 self._mark(x0, time, False)
-            elif time - since >= self.settle_time:
+            elif as_long(time - since, self.settle_time, dt):
                 self.branches["rest_begins"] += 1
                 self._mark(x0, time, True)
             return
@@ -95,7 +95,7 @@ class RestWatch:
             if self.time is not None:
                 followed = self.followed + (1.0 - math.exp(-dt / self.time)) * (change - self.followed)
                 self.followed = np.where(self.at_rest, self.followed, followed)
-            if time - self.recent[0] >= self.settle_time:
+            if as_long(time - self.recent[0], self.settle_time, dt):
                 self.recent = time, x0.copy(), self.f.copy()
 
     def _mark(self, x0: Array, time: float, standing: bool) -> None:

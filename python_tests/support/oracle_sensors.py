@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_finger import Key, Step, given
+from oracle_finger import Key, Step, as_long, given, longer
 
 Array = NDArray[Any]
 
@@ -128,9 +128,9 @@ class SensorWatch:
     def _is_taut(self, i: int, f: float) -> bool:
         return self.tendons[i].bidirectional or bool(f > self.margin)
 
-    def take(self, f: Array, x: Array, q: Array | None, time: float, out: Step) -> Watch:
+    def take(self, f: Array, x: Array, q: Array | None, time: float, dt: float, out: Step) -> Watch:
         """One sample."""
-        before = self.inverse
+        before, self.dt = self.inverse, dt
 
         def above(name: Key, value: float, limit: float) -> bool:
             return out.above(("sensor", *name), value, limit)
@@ -191,7 +191,7 @@ class SensorWatch:
         return above(("jump", i), abs(f - f_last), bound)
 
     def _long(self, held: tuple[float, float] | None, time: float) -> bool:
-        return held is not None and time - held[1] > self.hold_time
+        return held is not None and longer(time - held[1], self.hold_time, self.dt)
 
     def _force_stands(
         self, i: int, f: float, x: float, w: float | None, again: bool, time: float, above: Above
@@ -255,7 +255,7 @@ class SensorWatch:
         if not agrees:
             tendon.unsound_at = time
             return False
-        if time - tendon.unsound_at < self.recovery_time:
+        if not as_long(time - tendon.unsound_at, self.recovery_time, self.dt):
             self.branches["agrees_for_a_while"] += 1
             return False
         tendon.fault, tendon.fault_since, tendon.unsound_at = "", math.nan, math.nan

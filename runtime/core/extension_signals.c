@@ -151,24 +151,12 @@ void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
-/* ẋ_ij = Σ_{j' >= j} r_ij'·q̇_j' of slopes */
-static void along_tendons(const tendonfmu_finger* f, const double* joint, double* tendon) {
-  const size_t lanes = f->tendon_lanes;
-  for (size_t i = 0; i < lanes; ++i) {
-    double sum = 0.0;
-    for (size_t j = f->joints; j-- > 0;) {
-      sum += f->derived.moment_arm[j * lanes + i] * joint[j];
-      tendon[j * lanes + i] = sum;
-    }
-  }
-}
-
 /* what number k of a signal row makes of what the others remember */
 static void follow_memory(const tendonfmu_finger* f, const extension_row* signal, uint32_t k) {
   const size_t n = f->joints, others = 2 * n + f->tendons, held = filter_slopes(f) + 2 * n;
   const double *slopes_before = signal_slopes(f, signal, k), *before = slopes_before + others;
   double *angle = signal->next_slopes + slope_count(f) * k, *after = angle + others;
-  double travel[MODEL_MAX_JOINTS] = {0.0}, tendon_motion[MODEL_MAX_JOINTS * MODEL_MAX_TENDONS];
+  double travel[MODEL_MAX_JOINTS] = {0.0};
   const double* motion = angle + n;
   if (filters_position(f)) {
     for (size_t j = 0; j < n && !f->scratch.sample.first; ++j) {
@@ -176,9 +164,7 @@ static void follow_memory(const tendonfmu_finger* f, const extension_row* signal
     }
     motion = travel;
   }
-  along_tendons(f, motion, tendon_motion);
-  const effect_direction direction = {
-      .angle = angle, .velocity = angle + n, .motion = motion, .tendon_motion = tendon_motion};
+  const effect_direction direction = {.angle = angle, .velocity = angle + n, .motion = motion};
   for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
     const extension_row* row = f->extensions.row + r;
     if (row->effect->advance_slope) {

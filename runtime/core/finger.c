@@ -78,8 +78,10 @@ tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* 
   model_shape shape;
   uint32_t* words;
   message_start(line, "");
-  if (!memory || !image) {
-    message_start(line, "memory and image must not be NULL");
+  if (!memory || !image || !kernel_rounds_as_written()) {
+    message_start(line, memory && image
+                            ? "compiled with -ffast-math, -ffp-contract=fast or the like: expected none of them"
+                            : "memory and image must not be NULL");
     return NULL;
   }
   if (model_read_header(image, image_size, &shape, line)) {

@@ -14,11 +14,15 @@ namespace tendonfmu::estimation {
 
 constexpr const char* missing = "an argument is missing: NULL";
 
-/* Keeps the reason with the handle, if there is one. */
+/* Keeps the reason with the handle, if there is one; without memory for it there is none. */
 template <typename Handle>
-tendonfmu_status fail(const Handle* handle, tendonfmu_status status, const std::string& reason) {
+tendonfmu_status fail(const Handle* handle, tendonfmu_status status, const char* reason) noexcept {
   if (handle) {
-    handle->error = reason;
+    try {
+      handle->error = reason;
+    } catch (const std::bad_alloc&) {
+      handle->error.clear();
+    }
   }
   return status;
 }
@@ -71,8 +75,9 @@ template <typename Handle>
 tendonfmu_status describe_unknown(const Handle* handle, const unknown_list& all, std::size_t index,
                                   tendonfmu_unknown* unknown) {
   if (index >= all.count()) {
-    return fail(handle, TENDONFMU_BAD_ARGUMENT,
-                "unknown " + std::to_string(index) + ": expected below " + std::to_string(all.count()));
+    return guarded(handle, TENDONFMU_BAD_ARGUMENT, [&] {
+      throw refused("unknown " + std::to_string(index) + ": expected below " + std::to_string(all.count()));
+    });
   }
   static const tendonfmu_role roles[] = {TENDONFMU_COULOMB, TENDONFMU_DROP, TENDONFMU_RATE, TENDONFMU_VISCOUS,
                                          TENDONFMU_VALUE};

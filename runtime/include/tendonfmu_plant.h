@@ -123,9 +123,10 @@ tendonfmu_plant_status tendonfmu_plant_get_signals(const tendonfmu_plant* plant,
 tendonfmu_plant_status tendonfmu_plant_run(tendonfmu_plant* plant, size_t samples, const double* time,
                                            const tendonfmu_plant_signals* signals, size_t* done);
 
-/* State at the present time: continuous and discrete states, inputs, sensors, last step size. Restoring restarts CVODE
- * (it cannot store its history): two restored runs agree to the bit, and with the uninterrupted one within the
- * tolerances. Saving needs an initialised plant; restoring one of the same rig and settings, initialised or not. */
+/* State at the present time: continuous and discrete states, inputs, sensors, the fixed-step integrator's memory. Two
+ * restored runs agree to the bit; with fixed steps also with the uninterrupted one, with CVODE within the tolerances
+ * (restoring restarts it: it cannot store its history). Bytes that no such plant could have saved are refused. Saving
+ * needs an initialised plant; restoring one of the same rig and settings, initialised or not. */
 size_t tendonfmu_plant_state_size(const tendonfmu_plant* plant);
 tendonfmu_plant_status tendonfmu_plant_save_state(const tendonfmu_plant* plant, void* bytes, size_t size);
 tendonfmu_plant_status tendonfmu_plant_restore_state(tendonfmu_plant* plant, const void* bytes, size_t size);

@@ -205,7 +205,6 @@ class cvode_integrator : public integrator {
     work_.right_hand_sides += static_cast<unsigned long long>(evaluations) - counted_.right_hand_sides;
     counted_.steps = static_cast<unsigned long long>(steps);
     counted_.right_hand_sides = static_cast<unsigned long long>(evaluations);
-    CVodeGetLastStep(cvode_, &last_step_);
   }
 
   [[noreturn]] void fail(int flag, double time) {

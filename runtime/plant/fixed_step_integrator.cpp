@@ -58,6 +58,41 @@ void fixed_step_integrator::place_middle(double half, const double* speed) {
   }
 }
 
+void fixed_step_integrator::evaluate(const commands& inputs, double middle, double half, bool slopes) {
+  equations_.want_slopes(slopes);
+  equations_.evaluate_after(half, middle, middle_.data(), inputs, rate_.data());
+  work_.right_hand_sides += 1;
+}
+
+/* The matrix of Newton's method at the present middle, whose slopes were evaluated. */
+void fixed_step_integrator::take_matrix(const commands& inputs, double middle, double half) {
+  linearisation_.take(equations_, middle_.data(), inputs, rigid_slopes::contact_only);
+  work_.jacobians += 1;
+  factored_for_ = linearisation_.factor(half) ? half : 0.0;
+  factored_at_ = middle;
+  factored_state_ = middle_;
+}
+
+void fixed_step_integrator::save_memory(double* numbers) const {
+  double* next = std::copy(acceleration_.begin(), acceleration_.end(), numbers);
+  if (factored_for_ > 0.0) {
+    *next++ = factored_for_;
+    *next++ = factored_at_;
+    std::copy(factored_state_.begin(), factored_state_.end(), next);
+  }
+}
+
+void fixed_step_integrator::restore_memory(const double* numbers, const commands& inputs) {
+  std::copy(numbers, numbers + acceleration_.size(), acceleration_.begin());
+  const double half = numbers[acceleration_.size()], middle = numbers[acceleration_.size() + 1];
+  factored_for_ = 0.0;
+  if (half > 0.0) {
+    std::copy_n(numbers + acceleration_.size() + 2, middle_.size(), middle_.begin());
+    evaluate(inputs, middle, half, true);
+    take_matrix(inputs, middle, half);
+  }
+}
+
 /* Newton's method for the speeds V in the middle: V = q̇ + half q̈(q + half V, V, bristles moved on by `half` at V). */
 bool fixed_step_integrator::find_middle(const commands& inputs, double middle, double half) {
   const state_layout& at = equations_.layout();
@@ -69,13 +104,8 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
   double before = 0.0;
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     place_middle(half, speed);
-    const auto evaluate = [&](bool slopes) {
-      equations_.want_slopes(slopes);
-      equations_.evaluate_after(half, middle, middle_.data(), inputs, rate_.data());
-      work_.right_hand_sides += 1;
-    };
     bool fresh = factored_for_ != half;
-    evaluate(fresh);
+    evaluate(inputs, middle, half, fresh);
     // the matrix of an earlier step does while it still leads quickly to the end
     double largest = 0.0;
     if (!fresh) {
@@ -83,12 +113,10 @@ bool fixed_step_integrator::find_middle(const commands& inputs, double middle, d
     }
     if (!fresh && iteration > 0 && largest > good_progress * before && largest > close_enough) {
       fresh = true;
-      evaluate(true);
+      evaluate(inputs, middle, half, true);
     }
     if (fresh) {
-      linearisation_.take(equations_, middle_.data(), inputs, rigid_slopes::contact_only);
-      work_.jacobians += 1;
-      factored_for_ = linearisation_.factor(half) ? half : 0.0;
+      take_matrix(inputs, middle, half);
       if (factored_for_ == 0.0) {
         return false;
       }
@@ -171,7 +199,6 @@ void fixed_step_integrator::take_steps(const commands& inputs, double from, doub
   for (double k = 0.0; k < count; ++k) {
     step(inputs, from + k * size, size, 0);
   }
-  last_step_ = size;
 }
 
 void fixed_step_integrator::advance(const commands& inputs, double until, moment* now) {

@@ -16,11 +16,15 @@ class fixed_step_integrator : public integrator {
 
   void forget() override;
   void advance(const commands& inputs, double until, moment* now) override;
+  void save_memory(double* numbers) const override;
+  void restore_memory(const double* numbers, const commands& inputs) override;
 
  private:
   void take_steps(const commands& inputs, double from, double to);
   void step(const commands& inputs, double time, double size, int divisions);
   void move_motors(const commands& inputs, double middle, double half);
+  void evaluate(const commands& inputs, double middle, double half, bool slopes);
+  void take_matrix(const commands& inputs, double middle, double half);
   bool find_middle(const commands& inputs, double middle, double half);
   double change_of_speed(double half, const double* speed);
   void place_middle(double half, const double* speed);
@@ -30,6 +34,8 @@ class fixed_step_integrator : public integrator {
   double step_;
   std::vector<double> stops_; /* push_times(): steps end there */
   double factored_for_ = 0.0; /* half a step, s; 0: no matrix */
+  double factored_at_ = 0.0;  /* s, and the state then */
+  std::vector<double> factored_state_;
   std::vector<double> state_, middle_, rate_, change_;
   std::vector<double> acceleration_; /* of the step before: where to look first */
 };

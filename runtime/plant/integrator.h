@@ -26,6 +26,12 @@ struct moment {
   contact_modes modes;
 };
 
+/* Of the fixed-step integrator: acceleration [n]; half a step and its middle, s, and the state there, for its matrix.
+ */
+inline std::size_t memory_size(const state_layout& at) {
+  return at.joints + 2 + at.size();
+}
+
 /* Whether two times are so close that no step fits between them: an integrator then only sets the clock. */
 inline bool same_moment(double time, double until) {
   return until - time <= 1e-15 + 4.0 * std::numeric_limits<double>::epsilon() * std::fabs(until);
@@ -38,23 +44,18 @@ class integrator {
   /* What it remembers no longer holds: the state, its modes or the inputs have changed from outside. */
   virtual void forget() = 0;
 
-  /* Goes on from a saved state whose last step was this, s. */
-  void resume(double last_step) {
-    forget();
-    last_step_ = last_step;
-  }
+  /* What it remembers beside the moment, for saved states: memory_size() numbers, 0 where nothing is remembered. */
+  virtual void save_memory(double*) const {}
+  virtual void restore_memory(const double*, const commands&) { forget(); }
 
   /* Moves `now` on to time `until`. Throws solver_error and leaves `now` as it was. */
   virtual void advance(const commands& inputs, double until, moment* now) = 0;
 
-  /* s; 0: none taken yet. */
-  double last_step() const { return last_step_; }
   const statistics& work() const { return work_; }
   void clear_work() { work_ = {}; }
 
  protected:
   statistics work_;
-  double last_step_ = 0.0;
 };
 
 }  // namespace tendonfmu::plant

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "cvode_integrator.h"
 #include "fixed_step_integrator.h"
@@ -11,9 +10,7 @@
 namespace tendonfmu::plant {
 namespace {
 
-constexpr double same_time = 1e-9;     // s: a sample this little beyond a communication point is taken at it
 constexpr double largest_input = 1e6;  // m, N: beyond it only a mistake
-constexpr std::uint64_t state_mark = 0x31746e616c704654;  // "TFplant1"
 
 void need(bool good, const char* line) {
   if (!good) {
@@ -31,17 +28,6 @@ tendonfmu_plant_settings settings_of(const rig& rig) {
   std::copy(rig.tip.begin(), rig.tip.end(), settings.push_point);
   settings.push_link = static_cast<int>(rig.joint_count());
   return settings;
-}
-
-std::uint64_t digest(const std::vector<double>& numbers) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const double number : numbers) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &number, sizeof bits);
-    hash = (hash ^ bits) * 0x100000001b3;
-    hash ^= hash >> 29;
-  }
-  return hash;
 }
 
 }  // namespace
@@ -152,7 +138,7 @@ void plant::initialise() {
   now_ = start;
   initialised_ = true;
   if (settings_.sensors) {
-    sample(now_);
+    sample();
   }
 }
 
@@ -163,71 +149,65 @@ void plant::need_initialised() const {
 }
 
 /* Through every sample of the sensors on the way. */
-void plant::move_on(double until, moment* now) {
+void plant::move_on(double until) {
+  evaluated_ = false;
   while (settings_.sensors) {
     const double next = samples_ / rig_.sensors.rate;
     if (next > until + same_time) {
       break;
     }
     evaluated_ = false;
-    integrator_->advance(inputs_, std::min(next, until), now);
-    sample(*now);
+    integrator_->advance(inputs_, std::min(next, until), &now_);
+    sample();
   }
-  if (now->time < until) {
+  if (now_.time < until) {
     evaluated_ = false;
   }
-  integrator_->advance(inputs_, until, now);
+  integrator_->advance(inputs_, until, &now_);
 }
 
 void plant::advance(double until) {
   need_initialised();
-  need(std::isfinite(until) && until < 1e9, "time: expected a finite number of seconds below 1e9");
+  need(std::isfinite(until) && until < longest_time, "time: expected a finite number of seconds below 1e9");
   if (until < now_.time) {
     throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "time: expected not before the time of the simulation");
   }
   if (until == now_.time) {
     return;
   }
-  evaluated_ = false;
-  moment ahead = now_;
-  sensor_bank sensors_before = sensors_;
-  const double samples_before = samples_, last_step_before = integrator_->last_step();
+  const std::vector<double> before = state_numbers();
   try {
-    move_on(until, &ahead);
+    move_on(until);
   } catch (...) {
-    evaluated_ = false;
-    sensors_ = std::move(sensors_before);
-    samples_ = samples_before;
-    integrator_->resume(last_step_before);
+    take_numbers(before);
     throw;
   }
-  std::swap(now_, ahead);
 }
 
 // --- signals ---------------------------------------------------------------------------------------------
 
 /* Once for each moment: what the sensors have looked at, the signals show. */
-void plant::evaluate(const moment& now) const {
+void plant::evaluate() const {
   if (evaluated_) {
     return;
   }
   equations_.want_slopes(false);
-  equations_.evaluate(now.time, now.state.data(), &now.modes, inputs_, scratch_.data());
+  equations_.evaluate(now_.time, now_.state.data(), &now_.modes, inputs_, scratch_.data());
   evaluated_ = true;
 }
 
-void plant::sample(const moment& now) {
-  evaluate(now);
+void plant::sample() {
+  evaluate();
   const evaluation& e = equations_.last();
   const state_layout& at = equations_.layout();
   readings exact(at.joints, at.tendons);
   for (std::size_t i = 0; i < at.tendons; ++i) {
     exact.tendon_force[i] = e.force[i];
-    exact.tendon_position[i] = now.state[at.motor() + i];
+    exact.tendon_position[i] = now_.state[at.motor() + i];
   }
   for (std::size_t j = 0; j < at.joints; ++j) {
-    exact.joint_position[j] = now.state[at.angle() + j];
-    exact.joint_velocity[j] = now.state[at.speed() + j];
+    exact.joint_position[j] = now_.state[at.angle() + j];
+    exact.joint_velocity[j] = now_.state[at.speed() + j];
     exact.external_torque[j] = -e.contact.torque[j];
   }
   sensors_.sample(static_cast<std::uint64_t>(samples_), settings_.seed, exact);
@@ -278,7 +258,7 @@ void put(double* array, std::size_t row, const vector3<double>& v) {
 
 void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) const {
   need_initialised();
-  evaluate(now_);
+  evaluate();
   const evaluation& e = equations_.last();
   const state_layout& at = equations_.layout();
   const std::size_t n = at.joints, m = at.tendons;
@@ -329,101 +309,6 @@ void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) con
   if (s.slack) {
     std::copy(now_.modes.slack, now_.modes.slack + m, s.slack + row * m);
   }
-}
-
-// --- saved states ----------------------------------------------------------------------------------------
-
-/* Everything that is remembered, as numbers of a length that the rig fixes. */
-std::vector<double> plant::state_numbers() const {
-  const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
-  std::vector<double> numbers = {now_.time, samples_, integrator_ ? integrator_->last_step() : 0.0,
-                                 inputs_.given ? 1.0 : 0.0, inputs_.pretension};
-  numbers.insert(numbers.end(), inputs_.command, inputs_.command + m);
-  numbers.insert(numbers.end(), inputs_.push.force.begin(), inputs_.push.force.end());
-  numbers.insert(numbers.end(), now_.modes.slack, now_.modes.slack + m);
-  numbers.insert(numbers.end(), now_.modes.below, now_.modes.below + n);
-  numbers.insert(numbers.end(), now_.modes.above, now_.modes.above + n);
-  numbers.push_back(now_.modes.touching ? 1.0 : 0.0);
-  numbers.insert(numbers.end(), now_.state.begin(), now_.state.end());
-  sensors_.append_state(&numbers);
-  return numbers;
-}
-
-namespace {
-
-/* Before the numbers. Settings are compared: a state continues only as it began. */
-struct state_header {
-  std::uint64_t mark, identity, settings, count, digest;
-};
-
-std::uint64_t digest_of(const tendonfmu_plant_settings& s) {
-  return digest({static_cast<double>(s.integrator), s.relative_tolerance, s.step,
-                 static_cast<double>(s.scheduled_motion), static_cast<double>(s.scheduled_pushes),
-                 static_cast<double>(s.sensors), static_cast<double>(s.seed >> 32),
-                 static_cast<double>(s.seed & 0xffffffffu), s.push_point[0], s.push_point[1], s.push_point[2],
-                 static_cast<double>(s.push_link)});
-}
-
-}  // namespace
-
-std::size_t plant::state_bytes() const {
-  return sizeof(state_header) + sizeof(double) * state_numbers().size();
-}
-
-void plant::save(void* bytes, std::size_t size) const {
-  need_initialised();
-  const std::vector<double> numbers = state_numbers();
-  const state_header header = {state_mark, identity_, digest_of(settings_), numbers.size(), digest(numbers)};
-  need(size == sizeof header + sizeof(double) * numbers.size(), "state: expected as many bytes as a state has");
-  std::memcpy(bytes, &header, sizeof header);
-  std::memcpy(static_cast<char*>(bytes) + sizeof header, numbers.data(), sizeof(double) * numbers.size());
-}
-
-void plant::restore(const void* bytes, std::size_t size) {
-  const auto bad = [](const char* line) { throw refusal(TENDONFMU_PLANT_BAD_STATE, line); };
-  std::vector<double> numbers = state_numbers();
-  state_header header;
-  if (size != sizeof header + sizeof(double) * numbers.size()) {
-    bad("state: of another size");
-  }
-  std::memcpy(&header, bytes, sizeof header);
-  if (header.mark != state_mark) {
-    bad("state: not that of a simulated finger");
-  }
-  if (header.identity != identity_) {
-    bad("state: of another rig");
-  }
-  if (header.settings != digest_of(settings_)) {
-    bad("state: taken with other settings");
-  }
-  std::memcpy(numbers.data(), static_cast<const char*>(bytes) + sizeof header, sizeof(double) * numbers.size());
-  if (header.count != numbers.size() || header.digest != digest(numbers)) {
-    bad("state: damaged");
-  }
-
-  const std::size_t n = rig_.joint_count(), m = rig_.tendon_count();
-  evaluated_ = false;
-  make_integrator();
-  const double* next = numbers.data();
-  now_.time = *next++;
-  samples_ = *next++;
-  integrator_->resume(*next++);
-  inputs_.given = *next++ != 0.0;
-  inputs_.pretension = *next++;
-  const auto take = [&](auto* to, std::size_t count) {
-    for (std::size_t k = 0; k < count; ++k) {
-      to[k] = static_cast<std::decay_t<decltype(to[0])>>(*next++);
-    }
-  };
-  take(inputs_.command, m);
-  take(inputs_.push.force.data(), 3);
-  take(now_.modes.slack, m);
-  take(now_.modes.below, n);
-  take(now_.modes.above, n);
-  take(&now_.modes.touching, 1);
-  take(now_.state.data(), now_.state.size());
-  sensors_.restore_state(next);
-  initialised_ = true;
 }
 
 // --- for checks ------------------------------------------------------------------------------------------

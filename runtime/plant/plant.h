@@ -13,6 +13,9 @@
 
 namespace tendonfmu::plant {
 
+constexpr double same_time = 1e-9;    // s: a sample this little beyond a communication point is taken at it
+constexpr double longest_time = 1e9;  // s
+
 /* A call that cannot be answered; `status` says which kind. */
 struct refusal : std::runtime_error {
   tendonfmu_plant_status status;
@@ -49,10 +52,14 @@ class plant {
  private:
   void need_initialised() const;
   void make_integrator();
-  void evaluate(const moment& now) const;
-  void sample(const moment& now);
-  void move_on(double until, moment* now);
+  void evaluate() const;
+  void sample();
+  void move_on(double until);
+  template <class Plant, class Visit>
+  static void visit_state(Plant& plant, Visit visit);
   std::vector<double> state_numbers() const;
+  bool state_is_sound(const std::vector<double>& numbers) const;
+  void take_numbers(const std::vector<double>& numbers);
 
   rig rig_;
   mutable dynamics equations_;

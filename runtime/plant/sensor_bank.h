@@ -29,9 +29,19 @@ class sensor_bank {
 
   void clear();
 
-  /* All that is remembered, as numbers: appended to, and taken from. */
-  void append_state(std::vector<double>* numbers) const;
-  const double* restore_state(const double* numbers);
+  /* Shows each list of remembered numbers to `visit`, in one order: saved states. */
+  template <class Bank, class Visit>
+  static void visit_state(Bank& bank, Visit visit) {
+    auto& newest = bank.newest_;
+    for (auto* values : {&newest.tendon_force, &newest.tendon_position, &newest.joint_position, &newest.joint_velocity,
+                         &newest.external_torque}) {
+      visit(values->data(), values->size());
+    }
+    for (auto& one : bank.lines_) {
+      visit(one.past.data(), one.past.size());
+      visit(one.play.data(), one.play.size());
+    }
+  }
 
  private:
   /* One quantity: its sensor, and the delay's memory of the last samples. */
@@ -41,12 +51,11 @@ class sensor_bank {
     std::size_t channels, depth;
     std::vector<double> past; /* [depth × channels], a ring; none without a delay */
     std::vector<double> play; /* [channels] what the far end of a play shows */
-    double taken = 0.0;       /* samples so far */
   };
 
   void take(line* line, std::uint64_t number, std::uint64_t seed, const std::vector<double>& exact,
             std::vector<double>* shown);
-  double delayed(const line& line, std::size_t channel) const;
+  double delayed(const line& line, double number, std::size_t channel) const;
 
   double rate_;
   std::vector<line> lines_;

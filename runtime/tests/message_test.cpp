@@ -3,8 +3,11 @@
 #include <locale.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
+#include <random>
 #include <string>
 
 #include "core_inside.h"
@@ -69,6 +72,32 @@ TEST(MessageNumber, IsShortWhereItCanBe) {
   EXPECT_EQ(number(0.1), "0.1");
   EXPECT_EQ(number(-4000.0), "-4000");
   EXPECT_EQ(number(1e9), "1e+09");
+}
+
+// The C library's %g, at the first of 6, 15 and 17 digits that reads back.
+TEST(MessageNumber, IsWhatPrintfMakesOfIt) {
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 20000; ++k) {
+    const std::uint64_t bits = random();
+    double value = static_cast<double>(static_cast<std::int64_t>(bits) >> 40) * 1e-3;
+    if (k % 2) {
+      std::memcpy(&value, &bits, sizeof value);
+    }
+    if (k % 16 == 1) {
+      value = std::ldexp(1.0, static_cast<int>(bits % 2098) - 1074); /* powers of two: uneven neighbours */
+    }
+    if (!std::isfinite(value)) {
+      continue;
+    }
+    char expected[40];
+    for (const int digits : {6, 15, 17}) {
+      std::snprintf(expected, sizeof expected, "%.*g", digits, value);
+      if (std::strtod(expected, nullptr) == value) {
+        break;
+      }
+    }
+    ASSERT_EQ(number(value), expected);
+  }
 }
 
 TEST(MessageNumber, SpellsWhatIsNotFinite) {

@@ -156,7 +156,6 @@ TEST_P(PlantOf, FailedAdvanceLeavesEverythingAsItWas) {
     start(*each);
     ASSERT_EQ(tendonfmu_plant_advance(*each, 0.0205), TENDONFMU_PLANT_OK);
   }
-  const Bytes before = one.saved();
   tendonfmu_plant_inputs absurd = {};
   absurd.push_force[0] = absurd.push_force[2] = 1e6;
   ASSERT_EQ(tendonfmu_plant_set_inputs(one, &absurd), TENDONFMU_PLANT_OK);
@@ -169,7 +168,7 @@ TEST_P(PlantOf, FailedAdvanceLeavesEverythingAsItWas) {
   push(one, 0.0);
   push(untouched, 0.1);  // begins anew as well
   push(untouched, 0.0);
-  EXPECT_EQ(one.saved(), before);
+  EXPECT_EQ(one.saved(), untouched.saved());
   for (Plant* each : {&one, &untouched}) {
     ASSERT_EQ(tendonfmu_plant_advance(*each, 0.05), TENDONFMU_PLANT_OK);
   }

@@ -4,8 +4,12 @@
 #include <locale.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "allocation_count.h"
@@ -13,6 +17,7 @@
 
 #if defined(__linux__)
 #include <linux/seccomp.h>
+#include <pthread.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -124,6 +129,81 @@ TEST(QuietStep, MakesNoSystemCall) {
     Outputs outputs(motion.time.size());
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
     EXPECT_EQ(exit_status_without_system_calls([&] { return exercise(finger, motion, outputs, state); }), 0);
+  }
+}
+
+#endif
+
+#if defined(__linux__) && !defined(UNDER_SANITIZER) && defined(__OPTIMIZE__)
+
+/* bytes of stack that a thread has touched for an action */
+template <typename Action>
+std::size_t stack_of_thread(Action action) {
+  const std::size_t size = 1 << 20;
+  const auto untouched = static_cast<unsigned char>(0xa5);
+  void* stack = std::aligned_alloc(4096, size);
+  std::memset(stack, untouched, size);
+  pthread_attr_t attributes;
+  pthread_t thread;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstack(&attributes, stack, size);
+  const auto run = [](void* given) -> void* {
+    (*static_cast<Action*>(given))();
+    return nullptr;
+  };
+  EXPECT_EQ(pthread_create(&thread, &attributes, run, &action), 0);
+  pthread_join(thread, nullptr);
+  pthread_attr_destroy(&attributes);
+  const auto* byte = static_cast<const unsigned char*>(stack);
+  const std::size_t left =
+      static_cast<std::size_t>(std::find_if(byte, byte + size, [&](auto b) { return b != untouched; }) - byte);
+  std::free(stack);
+  return size - left;
+}
+
+/* what tendonfmu.h promises of all calls but creation, reset, and those that change moment arms */
+TEST(QuietStep, UsesLessThanEightKiBOfStack) {
+  const Motion motion = failing_motion(200);
+  const std::size_t at_rest = stack_of_thread([] {});
+  ASSERT_GT(stack_of_thread([] {
+              volatile char block[5000];
+              block[0] = block[4999] = 1;
+            }),
+            at_rest + 4000)
+      << "the use of stack goes unnoticed";
+  for (int k = 0; k < 2 * FINGERS; ++k) {
+    Finger finger(image_of(k % FINGERS));
+    if (k >= FINGERS) {
+      ASSERT_EQ(tendonfmu_set_kernel(finger, "plain"), TENDONFMU_OK);
+    }
+    Outputs outputs(motion.time.size());
+    std::vector<unsigned char> state(tendonfmu_state_size(finger));
+    const tendonfmu_outputs view = outputs.view();
+    const tendonfmu_inputs inputs = motion.row(0);
+    std::vector<double> wrong(tendonfmu_tendon_count(finger), 1.2345678901234567e200);
+    tendonfmu_inputs refused = inputs;
+    refused.tendon_force = wrong.data();
+    std::size_t done = 0;
+    double value = 0.0;
+    const std::pair<const char*, std::function<tendonfmu_status()>> calls[] = {
+        {"initialise", [&] { return tendonfmu_initialise(finger, motion.time[0], &inputs); }},
+        {"step", [&] { return tendonfmu_step(finger, motion.time[1], &inputs); }},
+        {"refused step", [&] { return tendonfmu_step(finger, motion.time[2], &refused); }},
+        {"run", [&] { return tendonfmu_run(finger, 150, &motion.time[2], &inputs, &view, &done); }},
+        {"get_outputs", [&] { return tendonfmu_get_outputs(finger, &view); }},
+        {"get_directional_derivative", [&] { return tendonfmu_get_directional_derivative(finger, &inputs, &view); }},
+        {"set_parameter", [&] { return tendonfmu_set_parameter(finger, "joints[1].friction.static", 0.0041); }},
+        {"get_parameter", [&] { return tendonfmu_get_parameter(finger, "contact.threshold[2]", &value); }},
+        {"save_state", [&] { return tendonfmu_save_state(finger, state.data(), state.size()); }},
+        {"restore_state", [&] { return tendonfmu_restore_state(finger, state.data(), state.size()); }},
+    };
+    for (const auto& [name, call] : calls) {
+      tendonfmu_status status = TENDONFMU_OK;
+      const std::size_t used = stack_of_thread([&] { status = call(); }) - at_rest;
+      EXPECT_EQ(status == TENDONFMU_OK, std::string(name) != "refused step") << name;
+      EXPECT_LT(used, 8192u) << name << ", finger " << k;
+      RecordProperty(name, std::to_string(used));
+    }
   }
 }
 

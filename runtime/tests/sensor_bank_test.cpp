@@ -81,7 +81,8 @@ TEST(SensorBank, ContinuesFromWhatItRemembered) {
   };
   const auto memory = [](const sensor_bank& bank) {
     std::vector<double> numbers;
-    bank.append_state(&numbers);
+    sensor_bank::visit_state(
+        bank, [&](const double* values, std::size_t count) { numbers.insert(numbers.end(), values, values + count); });
     return numbers;
   };
   for (const std::uint64_t stop : {0u, 1u, 2u, 37u, 200u}) {
@@ -89,8 +90,13 @@ TEST(SensorBank, ContinuesFromWhatItRemembered) {
     feed(&straight, 0, 300);
     feed(&first, 0, stop);
     feed(&second, 0, 11);  // another past, to be forgotten
-    std::vector<double> numbers = memory(first);
-    EXPECT_EQ(second.restore_state(numbers.data()), numbers.data() + numbers.size());
+    const std::vector<double> numbers = memory(first);
+    auto next = numbers.begin();
+    sensor_bank::visit_state(second, [&](double* values, std::size_t count) {
+      std::copy_n(next, count, values);
+      next += static_cast<std::ptrdiff_t>(count);
+    });
+    EXPECT_EQ(next, numbers.end());
     feed(&second, stop, 300);
     EXPECT_EQ(memory(second), memory(straight)) << stop;
     straight.clear();

@@ -68,8 +68,7 @@ typedef struct effect_sample {
 /* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
 typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
-  const double *motion, *tendon_motion;   /* [n], [n × lanes] of the travel with a position filter, else of the
-                                             velocity; in advance_slope() only */
+  const double* motion; /* [n] of the travel with a position filter, else of the velocity; in advance_slope() only */
 } effect_direction;
 
 /* The signals of a sample while they are brought in order: rows that an effect may change. */

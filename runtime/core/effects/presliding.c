@@ -80,6 +80,15 @@ static void advance(effect_place place, const double* values, const effect_sampl
   }
 }
 
+/* ẋ_ij = Σ_{j' >= j} r_ij'·q̇_j' of slopes; `at` is that of ij */
+static double along_tendon(const effect_sample* sample, const double* motion, size_t at) {
+  double sum = 0.0;
+  for (size_t j = sample->joints; j-- > at / sample->lanes;) {
+    sum += sample->moment_arm[j * sample->lanes + at % sample->lanes] * motion[j];
+  }
+  return sum;
+}
+
 static void advance_slope(effect_place place, const double* values, const effect_sample* sample, const double* before,
                           const effect_direction* direction, const double* slope_before, double* slope_after) {
   const size_t count = member_count(place, sample->joints, sample->tendons);
@@ -88,7 +97,8 @@ static void advance_slope(effect_place place, const double* values, const effect
     const member_of_place member = find_member(place, sample, k);
     const double distance = distance_of(place, values[0], sample, member.at_joint);
     const double travel = sample->first ? 0.0 : travel_of(sample, member.at_joint, member.at);
-    const double slope = member.at_joint ? direction->motion[member.at] : direction->tendon_motion[member.at];
+    const double slope =
+        member.at_joint ? direction->motion[member.at] : along_tendon(sample, direction->motion, member.at);
     double after[MEMORY_ROWS];
     advance_member(values[0], distance, travel, sample, before + row, after);
     slope_after[row + SHARE] = after[KEPT] * slope_before[row + SHARE] + after[BY_MOTION] * slope;

@@ -186,12 +186,13 @@ COLD_STATIC void watch_rest(tendonfmu_finger* f, double mean_force, double time,
   const finger_state* s = &f->remembered;
   const int standing = s->scalar[STATE_STANDING] != 0.0;
   const double since_mark = time - s->scalar[STATE_MARKED_AT];
+  const double settle_time = f->derived.settings.rest_settle_time - CLOCK_ROUNDING * step;
   change_since_mark(f, step);
   bound_change(f, mean_force, standing ? since_mark : 0.0);
   if (!standing) {
     if (motor_has_moved(f) || torque_has_changed(f)) {
       mark_rest(f, time, 0);
-    } else if (since_mark >= f->derived.settings.rest_settle_time) {
+    } else if (since_mark >= settle_time) {
       mark_rest(f, time, 1);
     }
     for (size_t j = 0; j < f->joint_lanes; ++j) {
@@ -205,7 +206,7 @@ COLD_STATIC void watch_rest(tendonfmu_finger* f, double mean_force, double time,
   } else {
     decide_at_rest(f);
     follow_change(f, step);
-    if (time - s->scalar[STATE_RECENT_AT] >= f->derived.settings.rest_settle_time) {
+    if (time - s->scalar[STATE_RECENT_AT] >= settle_time) {
       mark_recent(f, time);
     }
   }

@@ -78,6 +78,7 @@ HOT_INLINE quad_mask drift_exceeds(const tendonfmu_finger* f, size_t j, quad rat
 HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double time, double step) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;
+  const quad held = quad_set(settings->hold_time + CLOCK_ROUNDING * step);
   const quad now = quad_set(time), one = quad_set(1.0), release = quad_set(settings->release_ratio);
   int any = 0;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
@@ -94,7 +95,7 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
       exceeds = quad_either(exceeds, loaded_since_rest(f, j));
     }
     const quad exceeded_at = quad_select(exceeds, now, quad_load(s->exceeded_at + j));
-    const quad_mask recent = quad_at_least(quad_set(settings->hold_time), quad_sub(now, exceeded_at));
+    const quad_mask recent = quad_at_least(held, quad_sub(now, exceeded_at));
     const quad_mask contact = quad_either(exceeds, quad_both(before, recent));
     quad_store(s->exceeded_at + j, exceeded_at);
     quad_store(s->joint_contact + j, quad_keep(contact, one));
@@ -105,13 +106,14 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
 
 /* whether the bias is updated at this sample: without contact, or in one that has lasted too long; time in contact at
  * rest does not count */
-HOT_INLINE int bias_is_updated(tendonfmu_finger* f, int contact, double time) {
+HOT_INLINE int bias_is_updated(tendonfmu_finger* f, int contact, double time, double step) {
   const finger_state* s = &f->remembered;
   const double release_time = f->derived.settings.release_time;
   if (contact && (s->scalar[STATE_CONTACT] == 0.0 || s->scalar[STATE_CONTACT_AT_REST] != 0.0)) {
     s->scalar[STATE_CONTACT_SINCE] = time;
   }
-  return !contact || (release_time >= 0.0 && time - s->scalar[STATE_CONTACT_SINCE] >= release_time);
+  const double lasted = time - s->scalar[STATE_CONTACT_SINCE] + CLOCK_ROUNDING * step;
+  return !contact || (release_time >= 0.0 && lasted >= release_time);
 }
 
 /* m follows the residual of step 5 */

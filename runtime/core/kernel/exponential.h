@@ -4,6 +4,14 @@
 
 #include "quad.h"
 
+/* Whether sums keep their order and products their rounding: some compilers have flags that change them and name no
+ * macro (core/floating_point.h). */
+HOT_INLINE int rounds_as_written(void) {
+  volatile double near_one = 1.0 + 0x1p-30, small = 1e-3;
+  const double x = near_one, y = small, shift = 6755399441055744.0;
+  return x * x - (1.0 + 0x1p-29) == 0.0 && (y + shift) - shift == 0.0;
+}
+
 HOT_INLINE quad exp_of_minus(quad x) {
   const quad y = quad_min(x, quad_set(708.0));
 

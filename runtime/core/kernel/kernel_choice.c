@@ -1,9 +1,16 @@
+#include "floating_point.h"
+
 #include "kernel_choice.h"
 
 #include <string.h>
 
+#include "exponential.h"
 #include "processor.h"
 #include "step_kernels.h"
+
+int kernel_rounds_as_written(void) {
+  return rounds_as_written();
+}
 
 #if defined(__x86_64__) || defined(_M_X64)
 

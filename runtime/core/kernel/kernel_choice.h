@@ -14,3 +14,6 @@ struct step_kernel {
 /* The fastest kernel that processor and operating system allow ("auto"), or the one of that name; NULL where it cannot
  * run or is not built in. */
 const step_kernel* kernel_choose(const char* name);
+
+/* Whether the compiler has kept the order of sums and the rounding of products. */
+int kernel_rounds_as_written(void);

@@ -114,12 +114,14 @@ HOT_INLINE quad force_of_spring(const tendonfmu_finger* f, const watched* w, siz
   return quad_drop(quad_only_first(pushes, is_set(f->derived.bidirectional + i)), force);
 }
 
-HOT_INLINE quad_mask stood_long(const tendonfmu_finger* f, quad since, double time) {
-  return quad_greater(quad_sub(quad_set(time), since), quad_set(f->derived.settings.fault_hold_time));
+HOT_INLINE quad_mask stood_long(const tendonfmu_finger* f, quad since, double time, double step) {
+  return quad_greater(quad_sub(quad_set(time), since),
+                      quad_set(f->derived.settings.fault_hold_time + CLOCK_ROUNDING * step));
 }
 
 /* since when f0 is where it is, the last sample with a taut tendon, and whether it stands against its spring */
-HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t i, double time, int* standing) {
+HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t i, double time, double step,
+                                  int* standing) {
   const finger_settings* settings = &f->derived.settings;
   double *before = f->remembered.sensor, *now = f->scratch.sensor;
   const quad held = quad_load(sensor_row(f, before, SENSOR_HELD_FORCE) + i), one = quad_set(1.0);
@@ -137,16 +139,16 @@ HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t 
   quad_store(sensor_row(f, now, SENSOR_HAS_TAUT) + i, quad_select(taken, one, has_taut));
   quad_store(sensor_row(f, now, SENSOR_TAUT_FORCE) + i, quad_select(taken, w->force, force));
   quad_store(sensor_row(f, now, SENSOR_TAUT_SPRING) + i, quad_select(taken, w->spring, spring));
-  const quad_mask stands = quad_both(quad_both(w->well, w->taut), stood_long(f, since, time));
+  const quad_mask stands = quad_both(quad_both(w->well, w->taut), stood_long(f, since, time, step));
   *standing |= quad_mask_bits(stands);
   const quad missed = difference(force_of_spring(f, w, i), w->force);
   const quad bound = quad_set(settings->jump_margin + LEAST_RESOLUTIONS * settings->force_resolution);
-  const quad_mask judged = quad_both(quad_both(w->again, w->well), quad_both(known, stood_long(f, since, time)));
+  const quad_mask judged = quad_both(quad_both(w->again, w->well), quad_both(known, stood_long(f, since, time, step)));
   return quad_both(judged, quad_greater(missed, bound));
 }
 
 /* since when x0 is where it is, and whether f0 and w contradict it */
-HOT_INLINE quad_mask position_stands(tendonfmu_finger* f, const watched* w, size_t i, double time) {
+HOT_INLINE quad_mask position_stands(tendonfmu_finger* f, const watched* w, size_t i, double time, double step) {
   const finger_settings* settings = &f->derived.settings;
   double *before = f->remembered.sensor, *now = f->scratch.sensor;
   const quad held = quad_load(sensor_row(f, before, SENSOR_HELD_POSITION) + i);
@@ -166,7 +168,7 @@ HOT_INLINE quad_mask position_stands(tendonfmu_finger* f, const watched* w, size
   const quad allowed =
       quad_add(quad_add(resolved, quad_set(settings->jump_margin)), quad_mul(quad_set(SPRING_ERROR), quad_abs(pulled)));
   const quad missed = quad_abs(quad_add(quad_sub(w->force, force), pulled));
-  const quad_mask judged = quad_both(quad_both(w->again, w->well), stood_long(f, since, time));
+  const quad_mask judged = quad_both(quad_both(w->again, w->well), stood_long(f, since, time, step));
   return quad_both(judged, quad_greater(missed, allowed));
 }
 
@@ -208,7 +210,7 @@ COLD_STATIC quad_mask agrees_again(const tendonfmu_finger* f, const watched* w, 
 
 /* four tendons whose sensors failed before: those that have agreed for recovery_time are well; returns whether any is
  */
-COLD_STATIC int recover(tendonfmu_finger* f, const watched* w, size_t i, double time) {
+COLD_STATIC int recover(tendonfmu_finger* f, const watched* w, size_t i, double time, double step) {
   double* now = f->scratch.sensor;
   const int agree = quad_mask_bits(agrees_again(f, w, i)), well = quad_mask_bits(w->well);
   int any = 0;
@@ -219,7 +221,7 @@ COLD_STATIC int recover(tendonfmu_finger* f, const watched* w, size_t i, double 
     }
     if (!(agree >> lane & 1)) {
       *unsound = time;
-    } else if (time - *unsound >= f->derived.settings.recovery_time) {
+    } else if (time - *unsound + CLOCK_ROUNDING * step >= f->derived.settings.recovery_time) {
       sensor_row(f, now, SENSOR_FAULT)[i + lane] = SENSOR_IS_WELL;
       sensor_row(f, now, SENSOR_FAULT_SINCE)[i + lane] = *unsound = 0.0;
       any = 1;
@@ -297,7 +299,7 @@ COLD_STATIC int begin_faults(tendonfmu_finger* f, const int* bits, const int* ju
 
 /* Before the angles of step 1, with forces and positions as these take them: finds faults, recoveries and the rows in
  * use from now on. All of it goes to scratch, since the sample may yet be refused. */
-HOT_INLINE void watch_sensors(tendonfmu_finger* f, double time) {
+HOT_INLINE void watch_sensors(tendonfmu_finger* f, double time, double step) {
   double* now = f->scratch.sensor;
   const double unsound = count_unsound_rows(f, sensor_row(f, f->remembered.sensor, SENSOR_FAULT));
   const int unwell = f->remembered.scalar[STATE_UNWELL] != 0.0;
@@ -312,12 +314,12 @@ HOT_INLINE void watch_sensors(tendonfmu_finger* f, double time) {
     const watched w = watch_tendons(f, i, unsound);
     copy_sensors(f, i, &w);
     jumps[i / 4] = quad_mask_bits(force_jumps(f, &w));
-    forces[i / 4] = quad_mask_bits(force_stands(f, &w, i, time, &standing)) | jumps[i / 4];
-    positions[i / 4] = quad_mask_bits(position_stands(f, &w, i, time));
+    forces[i / 4] = quad_mask_bits(force_stands(f, &w, i, time, step, &standing)) | jumps[i / 4];
+    positions[i / 4] = quad_mask_bits(position_stands(f, &w, i, time, step));
     any_force |= forces[i / 4];
     any_position |= positions[i / 4];
     if (unwell) {
-      changed |= recover(f, &w, i, time);
+      changed |= recover(f, &w, i, time, step);
     }
   }
   if (any_force) {

@@ -320,7 +320,7 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   }
   const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
-  if (bias_is_updated(f, contact, time)) {
+  if (bias_is_updated(f, contact, time, step)) {
     const double noise = noise_of_step(f, step, mean_force);
     if (settings->watches_drift) {
       follow_drift(f, contact, step, noise);
@@ -364,7 +364,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
     shape_signals(f, time, 0);
   }
   if (f->derived.settings.watches_sensors) {
-    watch_sensors(f, time);
+    watch_sensors(f, time, first ? 0.0 : step);
   }
   const double velocity_gain = find_kinematics(f, time, step);
   if (f->shape.extension_count) {

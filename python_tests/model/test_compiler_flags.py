@@ -1,0 +1,71 @@
+"""Flags that let a compiler reorder sums: refused by name, or without effect on a bit of the exponential."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from repository_paths import ROOT
+
+CORE = ROOT / "runtime" / "core"
+PRINT_EXPONENTIALS = """
+#include "floating_point.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include "kernel/inlining.h"
+#include "kernel/quad_plain.h"
+#include "kernel/exponential.h"
+int main(int count, char** arguments) {
+  if (!rounds_as_written()) {
+    return 3; /* a finger is not created */
+  }
+  const double scale = strtod(arguments[count - 1], NULL);
+  for (int k = 0; k < 2000; ++k) {
+    const quad x = quad_set(scale * k);
+    const quad e = exp_of_minus(x), share = approach_share(x);
+    printf("%a %a\\n", e.lane[0], share.lane[0]);
+  }
+  return 0;
+}
+"""
+FLAGS = [
+    "-ffast-math",
+    "-Ofast",
+    "-funsafe-math-optimizations",
+    "-fassociative-math",
+    "-fassociative-math -fno-signed-zeros -fno-trapping-math",
+    "-freciprocal-math",
+    "-ffinite-math-only",
+    "-fno-signed-zeros",
+    "-ffp-contract=fast",
+]
+SEEN_BY_ALL = ["-ffast-math", "-Ofast", "-ffinite-math-only"]  # clang has macros for no more
+
+
+def compilers() -> list[str]:
+    return [name for name in ("gcc", "clang") if shutil.which(name)]
+
+
+def exponentials(compiler: str, flags: str, folder: Path) -> str | None:
+    """Return what the program prints; None where sources or program refuse the flags by name."""
+    (folder / "print.c").write_text(PRINT_EXPONENTIALS)
+    command = [compiler, "-std=c11", "-O2", "-march=native", *flags.split(), f"-I{CORE}", "-o", "print", "print.c", "-lm"]
+    made = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if made.returncode:
+        assert "TendonFMU cannot be compiled with -ffast-math or a part of it" in made.stderr, made.stderr
+        return None
+    answer = subprocess.run([folder / "print", "0.0173"], capture_output=True, text=True, check=False)
+    assert answer.returncode in (0, 3)
+    return answer.stdout if answer.returncode == 0 else None
+
+
+@pytest.mark.parametrize("compiler", compilers())
+@pytest.mark.parametrize("flags", FLAGS)
+def test_no_flag_gives_other_exponentials(compiler: str, flags: str, tmp_path: Path) -> None:
+    plain, other = exponentials(compiler, "", tmp_path), exponentials(compiler, flags, tmp_path)
+    assert plain is not None and plain.count("\n") == 2000
+    assert other in (None, plain)
+    assert other is None or flags not in SEEN_BY_ALL
