@@ -21,6 +21,7 @@ from fit_cases import (
 )
 from random_fingers import Description
 from tendonfmu.estimate import estimation
+from tendonfmu.estimate.verdicts import slopes
 
 SMALL = small_finger()
 PATHS, VALUES = parameters_of(SMALL)
@@ -181,3 +182,13 @@ def test_wrong_lengths_are_refused(group: Any, scale: Any) -> None:
         estimation.Estimator(image_of(SMALL), group, scale)
     assert str(len(PATHS)) in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_small_drop_moves_static_as_a_large_one_does() -> None:
+    """static = coulomb + drop: the slope is 1 also where the drop is far below the rounding of coulomb."""
+    path = "tendons[2].edge_friction[1].static"
+    coulomb = path.replace("static", "coulomb")
+    estimator = estimator_of(SMALL, {path: 0, coulomb: 1}, {path: 1e-8})
+    z = np.array([unknown.lower if unknown.role == "drop" else unknown.start for unknown in estimator.unknowns])
+    k = [unknown.role for unknown in estimator.unknowns].index("drop")
+    assert slopes(estimator, z)[INDEX[path], k] == pytest.approx(1.0, rel=1e-6)

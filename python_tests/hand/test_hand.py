@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import jsonschema
@@ -15,6 +17,7 @@ from command import Call
 from small_hand import FINGERS, write_hand, write_worn_hand, write_wrist_hand
 from tendonfmu.errors import InputError
 from tendonfmu.hand.description import is_hand, read_hand, with_descriptions
+from tendonfmu.hand.report import score_rows
 from tendonfmu.model.description import read_finger
 
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "hand.schema.json").read_text(encoding="utf-8"))
@@ -172,3 +175,10 @@ def test_the_wrist_s_own_tendons_count(tmp_path: Path) -> None:
     file = write_hand(tmp_path, fingers, wrist={"description": "wrist.json"})
     with pytest.raises(InputError, match="joints of index are flexion, mcp, pip; expected those of the wrist first"):
         read_hand(file)
+
+
+def test_a_finger_without_free_motion_is_a_row_of_the_score() -> None:
+    report = {"free_minutes": 0.0, "free_rms": [None, 0.002]}
+    score: Any = SimpleNamespace(report=report, found=0, events=0, false_alarms=0, median_delay=math.nan)
+    (row,) = score_rows({"index": score}, {})
+    assert row.cells == ("–", "0 in 0 min", "–", "–, 2.00")
