@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion
     from .extension_fit import FitSettings, learn_numbers
-    from .gain import residual_of, squared_residual
+    from .gain import squared_residual
     from .history import History, Line, diagnose_history, share_of
     from .names import CONTACT, TITLES, UNKNOWN, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes
