@@ -103,7 +103,7 @@ def listed(content: Any) -> list[float]:
 def test_a_test_chooses_nothing(
     calibrated: tuple[Calibration, Path], demo_run: DemoRun, folder: Path, tmp_path: Path
 ) -> None:
-    """Of the numbers; the diagnosis and the thresholds are told by what they are given."""
+    """Another one leaves every step as it is, and changes the figures."""
     columns, _ = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
     columns = {name: 1.2 * values if "force" in name else values for name, values in columns.items()}
     kept = {name: values for name, values in columns.items() if name.startswith(("time", "tendon"))}
