@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
-import shutil
 from dataclasses import replace
-from importlib.resources import as_file, files
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,12 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 import diagnosis_examples
-from command import Call, DemoRun
+from command import Call
+from pushed_finger import FINGER, FREE, UNSEEN, pushed
 from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, Options, calibrate
 from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
-from tendonfmu.calibration.report import left_out
-from tendonfmu.calibration.text import calibration_page, size_rows, tiles, verdict, write_calibration
+from tendonfmu.calibration.text import calibration_page, verdict, write_calibration
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import squared_residual
@@ -30,7 +26,6 @@ from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table
 from tendonfmu.interface.calibrating import CalibrateResult
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, at_rows, read_recording
 from tendonfmu.recordings.smoothing import Signals
@@ -39,177 +34,12 @@ from tendonfmu.tasks.steps import Steps
 
 Numbers = NDArray[np.float64]
 
-PUSH = 0.06  # N·m
-FINGER, FREE, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
-
-
-def pushed(recording: Recording, data: dict[str, Any]) -> tuple[dict[str, Numbers], int]:
-    """The recording as it would be with pushes of `PUSH` on joint 1 for 0.5 s every 3 s, and how many there are: the
-    forces that bear them, and springs stretched by these."""
-    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]])
-    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
-    since = (recording.time - recording.time[0]) % 3.0
-    touched = (since >= 2.0) & (since < 2.5)
-    torque = np.zeros((len(recording), arms.shape[1]))
-    torque[:, 0] = PUSH * np.minimum((since - 2.0) / 0.02, 1.0) * touched
-    change = torque @ np.linalg.pinv(arms)
-    columns: dict[str, Numbers] = {"time": recording.time, "contact": touched.astype(float)}
-    force, position = (
-        recording.groups["tendon_force"] + change,
-        recording.groups["tendon_position"] + change / stiffness,
-    )
-    for i in range(len(stiffness)):
-        columns[f"tendon_force[{i + 1}]"] = force[:, i]
-        columns[f"tendon_position[{i + 1}]"] = position[:, i]
-    for j in range(arms.shape[1]):
-        columns[f"external_torque[{j + 1}]"] = torque[:, j]
-    return columns, int((np.diff(touched.astype(int)) == 1).sum())
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Finger, free motion, a test and pushes."""
-    found = tmp_path_factory.mktemp("finger")
-    with as_file(files("tendonfmu") / "data") as data:
-        for name in (FINGER, FREE, UNSEEN):
-            shutil.copy(data / name, found / name)
-    columns, _ = pushed(read_recording(found / UNSEEN), json.loads((found / FINGER).read_text()))
-    write_table(found / "pushes.parquet", columns)
-    return found
-
-
-@pytest.fixture(scope="module")
-def calibrated(folder: Path, demo_run: DemoRun) -> tuple[Calibration, Path]:
-    """The result, and the folder that it is written to: that of the demo, without pushes, goes on."""
-    out = folder / "out"
-    shutil.copytree(demo_run.folder / "calibration", out)
-    found = calibrate(
-        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]
-    )
-    write_calibration(found, out)
-    return found, out
-
 
 def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Calibration, Path]) -> None:
     report = calibrated[0].report
     assert report["structure"]["verdict"] == "explained"
     assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
     assert together(report["error"]["as_given"]) > 1.4 * together(report["error"]["calibrated"])
-
-
-# --- the figures are those of the delivered FMU -----------------------------------------------------------------------
-
-
-def rms_by_run(call: Call, model: Path, recording: Path, output: Path, chosen: NDArray[np.bool_]) -> list[float]:
-    """What `tendonfmu run` leaves of the chosen samples [N], by joint (N·m)."""
-    answer = call("run", model, recording, "-o", output)
-    assert answer.status == 0, answer.err
-    with output.open(encoding="utf-8") as table:
-        names = table.readline().strip().split(",")
-    columns = dict(zip(names, np.loadtxt(output, delimiter=",", skiprows=1).T, strict=True))
-    joints = sum(name.startswith("compensated_torque[") for name in names)
-    left = np.column_stack([columns[f"compensated_torque[{j + 1}]"] for j in range(joints)])[chosen]
-    return [float(value) for value in np.sqrt(np.mean(left**2, axis=0))]
-
-
-def every_fifth(time: Numbers) -> NDArray[np.bool_]:
-    """[N] the blocks 4, 9, ... of a recording without a gap: of 10 s, of a short one a tenth of it."""
-    since = time - time[0]
-    return np.asarray(np.floor(since / min(10.0, 0.1 * since[-1])) % 5 == 4)
-
-
-def test_the_errors_on_a_test_are_those_of_the_fmu(
-    call: Call, calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path
-) -> None:
-    """Over the whole recording, and by pretension: the parts of it have the same sum of squares."""
-    error = calibrated[0].report["error"]
-    chosen = np.ones(len(read_recording(folder / UNSEEN)), dtype=bool)
-    for name, model in (("calibrated", calibrated[1] / "finger.fmu"), ("as_given", folder / FINGER)):
-        found = rms_by_run(call, model, folder / UNSEEN, tmp_path / f"{name}.csv", chosen)
-        assert found == pytest.approx(error[name], rel=1e-9)
-        parts = sum(each["minutes"] * np.square(each[name]) for each in error["pretensions"])
-        assert np.sqrt(parts / error["minutes"]) == pytest.approx(error[name], rel=1e-9)
-    assert error["minutes"] == pytest.approx(40.0 / 60.0, rel=1e-3) and not error["held_out"]
-    forces = [each["mean_force"] for each in error["pretensions"]]
-    assert len(forces) == 2 and forces[0] < 13.0 < 17.0 < forces[1], "as the motion was made"
-
-
-@pytest.fixture(scope="module")
-def short(folder: Path) -> Path:
-    """24 s of the free motion."""
-    read_recording(folder / FREE)[:24.0].write(folder / "short.parquet")
-    return folder / "short.parquet"
-
-
-@pytest.fixture(scope="module")
-def alone(folder: Path, short: Path) -> tuple[Calibration, Path]:
-    """The result without a test, and its folder."""
-    found = calibrate(folder / FINGER, [short], folder / "alone")
-    write_calibration(found, folder / "alone")
-    return found, folder / "alone"
-
-
-def test_the_errors_on_held_out_stretches_are_those_of_the_fmu(
-    call: Call, alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
-) -> None:
-    error = alone[0].report["error"]
-    chosen = every_fifth(read_recording(short).time)
-    for name, model in (("calibrated", alone[1] / "finger.fmu"), ("as_given", folder / FINGER)):
-        found = rms_by_run(call, model, short, tmp_path / f"{name}.csv", chosen)
-        assert found == pytest.approx(error[name], rel=1e-9)
-    assert error["held_out"] and error["minutes"] == pytest.approx(0.2 * 24.0 / 60.0, rel=0.01)
-
-
-def test_no_held_out_sample_chooses_anything(
-    alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
-) -> None:
-    """With other forces there, structure, numbers and bias are the same to the last bit, and only the figures change.
-
-    The least squares of `contact.uncertainty` end in a flat valley, so the same call gives it, and what follows from
-    it, only to some 1e-4.
-    """
-    recording = read_recording(short)
-    rows = np.flatnonzero(every_fifth(recording.time))
-    force = recording.groups["tendon_force"].copy()
-    force[rows] = 1.5 * force[np.random.default_rng(1).permutation(rows)]
-    replace(recording, groups={**recording.groups, "tendon_force": force}).write(tmp_path / "short.parquet")
-    other = calibrate(folder / FINGER, [tmp_path / "short.parquet"], tmp_path / "out")
-    found = alone[0]
-    assert {**other.data, "contact": None} == {**found.data, "contact": None}
-    assert listed(other.data["contact"]) == pytest.approx(listed(found.data["contact"]), rel=1e-3, abs=1e-5)
-    assert other.report["structure"] == found.report["structure"] and other.report["next"] == found.report["next"]
-    assert listed(other.report["detection"]) == pytest.approx(listed(found.report["detection"]), rel=1e-3, abs=1e-5)
-    assert min(other.report["error"]["calibrated"]) > 2.0 * max(found.report["error"]["calibrated"])
-
-
-def listed(content: Any) -> list[float]:
-    """All numbers of JSON, in order."""
-    if isinstance(content, dict | list):
-        return [
-            number for each in (content.values() if isinstance(content, dict) else content) for number in listed(each)
-        ]
-    return [float(content)] if isinstance(content, int | float) else []
-
-
-def test_a_test_chooses_nothing(calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path) -> None:
-    """Of the numbers; the diagnosis and the thresholds are told by what they are given."""
-    columns, _ = pushed(read_recording(folder / UNSEEN), json.loads((folder / FINGER).read_text()))
-    columns = {name: 1.2 * values if "force" in name else values for name, values in columns.items()}
-    kept = {name: values for name, values in columns.items() if name.startswith(("time", "tendon"))}
-    write_table(tmp_path / "loaded.parquet", kept)
-    shutil.copytree(calibrated[1] / ".steps", tmp_path / "out" / ".steps")
-    shutil.copytree(calibrated[1] / "diagnosis", tmp_path / "out" / "diagnosis")
-    other = calibrate(folder / FINGER, [folder / FREE], tmp_path / "out", tests=[tmp_path / "loaded.parquet"])
-    assert other.report["steps"]["repeated"] == ["diagnosis", "fit", "tune"], "no step knows the test"
-    assert other.data == calibrated[0].data
-    assert min(other.report["error"]["calibrated"]) > 1.5 * max(calibrated[0].report["error"]["calibrated"])
-
-
-def test_false_alarms_are_counted_on_the_same_motion(calibrated: tuple[Calibration, Path], folder: Path) -> None:
-    recording = read_recording(folder / UNSEEN)
-    contact = Instance(read_finger(calibrated[1] / "finger.json").image).run(recording.arrays())["contact"].ravel()
-    starts = recording.time[1:][np.diff(contact.astype(int)) == 1]
-    assert calibrated[0].report["alarms"]["alarms"] == 1 + int((np.diff(starts) > 0.2).sum()) > 0
 
 
 def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Path], folder: Path) -> None:
@@ -322,30 +152,6 @@ def test_another_folder_gets_the_diagnosis_too(calibrated: tuple[Calibration, Pa
         assert (tmp_path / name / "diagnosis" / "extended.fmu").is_file()
     copied = (tmp_path / "found" / "diagnosis" / "diagnosis.json").read_bytes()
     assert copied == (calibrated[1] / "diagnosis" / "diagnosis.json").read_bytes()
-
-
-def test_ctrl_c_says_what_is_kept_and_the_next_call_goes_on(
-    call: Call, alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path, monkeypatch: Any
-) -> None:
-    """In the last step, and in the first one."""
-
-    def stopped(*given: Any, **options: Any) -> Any:
-        raise KeyboardInterrupt
-
-    shutil.copytree(alone[1], tmp_path / "out")
-    (tmp_path / "out" / ".steps" / "tune.json").unlink()
-    with monkeypatch.context() as patched:
-        patched.setattr(calibration.ContactTuning, "tune", stopped)
-        answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "out")
-    kept = f"tendonfmu: interrupted; diagnosis, fit done; the same call goes on from there, with {tmp_path / 'out'}"
-    assert answer.status == 130 and answer.err.splitlines()[-1] == kept
-    with monkeypatch.context() as patched:
-        patched.setattr(calibration, "diagnose", stopped)
-        answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "new")
-    assert answer.status == 130 and "interrupted; no step done yet" in answer.err
-    answer = call("calibrate", folder / FINGER, short, "-o", tmp_path / "out")
-    report = json.loads((tmp_path / "out" / "calibration.json").read_text(encoding="utf-8"))
-    assert answer.status == 0 and report["steps"]["repeated"] == ["diagnosis", "fit"]
 
 
 def test_an_earlier_calibration_is_the_prior_of_little_data(
@@ -495,71 +301,3 @@ def test_long_recordings_are_diagnosed_in_part_and_judged_on_another() -> None:
 def test_short_recordings_are_diagnosed_whole() -> None:
     free = [motion(100.0)]
     assert stretches_for_diagnosis(free) == (free, [])
-
-
-# --- sentences --------------------------------------------------------------------------------------------------------
-
-
-def report(given: float, calibrated: float, causes: int, limit: float | None, alarms: int = 0) -> dict[str, Any]:
-    pretension = {"mean_force": 10.0, "as_given": [given, given], "calibrated": [0.5 * calibrated, calibrated]}
-    return {
-        "joints": ["mcp", "pip"],
-        "error": {
-            "as_given": [given, given],
-            "calibrated": [calibrated, calibrated],
-            "pretensions": [
-                pretension,
-                pretension | {"mean_force": 20.0, "calibrated": [calibrated, 1.5 * calibrated]},
-            ],
-        },
-        "structure": {"causes": [{}] * causes},
-        "alarms": {"limit": limit, "alarms": alarms, "minutes": 27.0, "interval": [2.0 * alarms, 9.0]},
-        "detection": {
-            "minutes": 100.0,
-            "tuned_for_per_hour": 6.0,
-            "confidence": 0.9,
-            "smallest_torque": {"median": [0.01, 0.02]},
-        },
-        "pushes": None,
-    }
-
-
-def test_the_verdict_is_one_sentence_with_the_figures() -> None:
-    tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
-    assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence
-    assert "No false alarm in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
-    assert verdict(report(0.0142, 0.00614, 3, None))[1].endswith("27 min of that motion.")
-    assert "more than the 6 that the thresholds were chosen for" in verdict(report(0.0142, 0.00614, 3, 22.0, 4))[1]
-    tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
-    assert tone == "bad" and "no better" in sentence
-    tone, sentence = verdict(report(0.0065, 0.006, 0, 5.33))
-    assert tone == "" and "larger at pip at 20 N: 6.50 before, 9.00 now" in sentence
-
-
-def test_tiles_show_the_worst_joint() -> None:
-    values = list(tiles(report(0.0142, 0.00614, 3, None)))
-    assert values[0][0] == "14.2 → 6.14" and values[1][0] == "14.2 → 9.21" and "pip at 20 N" in values[1][2]
-    assert values[2][:2] == ("0", "in 27 min") and "tuned for 6 an hour on 100 min of other motion" in values[2][2]
-    assert values[3][0] == "20.0" and "at pip" in values[3][2]
-
-
-def test_pushes_are_told_by_size() -> None:
-    rows = [
-        {"from": 0.0, "below": 1.5, "events": 4, "found": 1, "interval": [0.1, 0.8]},
-        {"from": 1.5, "below": 3.0, "events": 4, "found": 2, "interval": [0.1, 0.8]},
-        {"from": 6.0, "below": None, "events": 4, "found": 4, "interval": [0.4, 1.0]},
-    ]
-    found = size_rows({"pushes": {"sizes": rows}})
-    assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
-    assert found[2][1:] == ("4 of 4", "40 to 100 %")
-    assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
-
-
-def test_many_stretches_that_are_left_out_are_one_warning() -> None:
-    events: list[Any] = [
-        SimpleNamespace(recording="a.csv", start=10.0 * k, end=11.0 * k, description=f"at joint {k}")
-        for k in range(1, 5)
-    ]
-    assert len(left_out(events[:2])) == 2 and left_out(events[:2])[0].endswith("at joint 1; left out of the fit")
-    (said,) = left_out(events)
-    assert said.startswith("4 stretches, 10 s in all") and "at joint 4" in said

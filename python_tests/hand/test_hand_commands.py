@@ -39,9 +39,9 @@ def words(page: Path) -> str:
 
 def calibration(error: float, before: float = 4.0) -> dict[str, Any]:
     return {
-        "error": {"as_given": [1e-3 * before], "calibrated": [1e-3 * error], "held_out": True},
+        "error": {"as_given": [1e-3 * before], "calibrated": [1e-3 * error], "pretensions": []},
         "structure": {"causes": []},
-        "detection": {"held_out": {"alarms": 0, "minutes": 2.0, "limit": None}},
+        "alarms": {"alarms": 0, "minutes": 2.0, "limit": None},
         "pushes": None,
         "warnings": [],
     }

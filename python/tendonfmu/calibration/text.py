@@ -89,12 +89,13 @@ def verdict(report: Report) -> tuple[str, str]:
 
 def alarms(report: Report) -> str:
     """Say how many false alarms there were in unseen motion, and what so much motion says of their rate."""
-    found, detection = report["alarms"], report["detection"]
+    found = report["alarms"]
     many = "No false alarm" if found["alarms"] == 0 else capital(counted(found["alarms"], "false alarm"))
     seen = f"{many} in {_long(found['minutes'])} of that motion"
     if found["limit"] is None:
         return f"{seen}."
-    seen += f": with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+    detection = report["detection"]
+    seen += f": with {100 * detection['confidence']:.0f} % confidence fewer than {rounded(found['limit'])} an hour"
     if found["interval"][0] > detection["tuned_for_per_hour"]:
         return f"{seen}, but more than the {detection['tuned_for_per_hour']:.3g} that the thresholds were chosen for."
     return f"{seen}."
@@ -137,7 +138,9 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
         yield _fell(worst.before, worst.after), "mN·m", f"the same where it is worst: {worst.words}"
     meaning = "false alarms in the same motion"
     if found["limit"] is not None:
-        meaning += f"; with {100 * detection['confidence']:.0f} % confidence fewer than {found['limit']:.3g} an hour"
+        meaning += (
+            f"; with {100 * detection['confidence']:.0f} % confidence fewer than {rounded(found['limit'])} an hour"
+        )
     yield str(found["alarms"]), f"in {_long(found['minutes'])}", f"{meaning}; {tuned_for(report)}"
     least, joint = max(zip(detection["smallest_torque"]["median"], report["joints"], strict=True))
     yield (

@@ -1,0 +1,76 @@
+"""What the sentences, tiles and rows of a calibration say."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+from tendonfmu.calibration.report import left_out
+from tendonfmu.calibration.text import size_rows, tiles, verdict
+from tendonfmu.report.numbers import together
+
+
+def report(given: float, calibrated: float, causes: int, limit: float | None, alarms: int = 0) -> dict[str, Any]:
+    pretension = {"mean_force": 10.0, "as_given": [given, given], "calibrated": [0.5 * calibrated, calibrated]}
+    return {
+        "joints": ["mcp", "pip"],
+        "error": {
+            "as_given": [given, given],
+            "calibrated": [calibrated, calibrated],
+            "pretensions": [
+                pretension,
+                pretension | {"mean_force": 20.0, "calibrated": [calibrated, 1.5 * calibrated]},
+            ],
+        },
+        "structure": {"causes": [{}] * causes},
+        "alarms": {"limit": limit, "alarms": alarms, "minutes": 27.0, "interval": [2.0 * alarms, 9.0]},
+        "detection": {
+            "minutes": 100.0,
+            "tuned_for_per_hour": 6.0,
+            "confidence": 0.9,
+            "smallest_torque": {"median": [0.01, 0.02]},
+        },
+        "pushes": None,
+    }
+
+
+def test_the_verdict_is_one_sentence_with_the_figures() -> None:
+    tone, sentence = verdict(report(0.0142, 0.00614, 3, 5.33))
+    assert tone == "good" and "from 14.2 to 6.14 mN·m" in sentence and "3 causes" in sentence
+    assert "No false alarm in 27 min" in sentence and "fewer than 5.33 an hour" in sentence
+    assert verdict(report(0.0142, 0.00614, 3, None))[1].endswith("27 min of that motion.")
+    assert "more than the 6 that the thresholds were chosen for" in verdict(report(0.0142, 0.00614, 3, 22.0, 4))[1]
+    tone, sentence = verdict(report(0.005, 0.006, 0, 5.33))
+    assert tone == "bad" and "no better" in sentence
+    tone, sentence = verdict(report(0.0065, 0.006, 0, 5.33))
+    assert tone == "" and "larger at pip at 20 N: 6.50 before, 9.00 now" in sentence
+
+
+def test_tiles_show_the_worst_joint() -> None:
+    values = list(tiles(report(0.0142, 0.00614, 3, None)))
+    assert values[0][0] == "14.2 → 6.14" and values[1][0] == "14.2 → 9.21" and "pip at 20 N" in values[1][2]
+    assert values[2][:2] == ("0", "in 27 min") and "tuned for 6 an hour on 100 min of other motion" in values[2][2]
+    assert values[3][0] == "20.0" and "at pip" in values[3][2]
+
+
+def test_pushes_are_told_by_size() -> None:
+    rows = [
+        {"from": 0.0, "below": 1.5, "events": 4, "found": 1, "interval": [0.1, 0.8]},
+        {"from": 1.5, "below": 3.0, "events": 4, "found": 2, "interval": [0.1, 0.8]},
+        {"from": 6.0, "below": None, "events": 4, "found": 4, "interval": [0.4, 1.0]},
+    ]
+    found = size_rows({"pushes": {"sizes": rows}})
+    assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
+    assert found[2][1:] == ("4 of 4", "40 to 100 %")
+    assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
+
+
+def test_many_stretches_that_are_left_out_are_one_warning() -> None:
+    events: list[Any] = [
+        SimpleNamespace(recording="a.csv", start=10.0 * k, end=11.0 * k, description=f"at joint {k}")
+        for k in range(1, 5)
+    ]
+    assert len(left_out(events[:2])) == 2 and left_out(events[:2])[0].endswith("at joint 1; left out of the fit")
+    (said,) = left_out(events)
+    assert said.startswith("4 stretches, 10 s in all") and "at joint 4" in said
