@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import copy
+import json
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from fit_cases import small_finger
-from fit_finger import made_recording
+from fit_data import make_recording, wavy_motion
+from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import known_numbers
+from tendonfmu.estimate import FitWarning, FrictionFit, known_numbers
 from tendonfmu.estimate.estimates import with_estimates
-from tendonfmu.estimate.structure import estimable_numbers
+from tendonfmu.estimate.structure import estimable_numbers, get_number, set_number
 from tendonfmu.model import native, read_finger
+from tendonfmu.recordings import Recording
 from tendonfmu.report import friction_figure
 
 COULOMB = "joints[1].friction.coulomb"
@@ -59,6 +64,56 @@ def test_friction_that_only_shows_together_is_drawn_as_the_sum_over_its_tendon()
     known = with_estimates(finger, numbers, covariance, size)
     assert set(known_numbers(known.data)) == {"tendons[1]"}
     caption = friction_figure(known.data).caption
-    assert f"All places of tendon {finger.tendon_names[0]} together: 4 %." in caption
+    assert f"All places of tendon {finger.tendon_names[0]} together: 4.0 %." in caption
     places = 2 + sum(joint.get("friction") is not None for joint in data["joints"])
     assert f"Left out: {places} places" in caption
+
+
+# --- fits -------------------------------------------------------------------------------------------------------------
+
+
+def fitted(finger: Any, *recordings: Recording) -> FrictionFit:
+    """All tendons alike: 19 unknowns, 70 numbers."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        return FrictionFit(finger, share=["tendons"], kinematics=3, tolerance=1e-3, uncertainty=False).fit(recordings)
+
+
+def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -> None:
+    first = fitted(moved_start(), made_recording(duration=40.0))
+    assert first.report_["given_numbers"]["start"] == "guessed"
+    finger = json.loads(first.description_text())
+    again = fitted(finger, made_recording(seed=5, duration=3.0))
+    paragraph = again.report_["given_numbers"]["paragraph"]
+    assert again.report_["given_numbers"]["start"] == "estimated" and "were estimated before" in paragraph
+    reasons = {entry["path"]: entry["reason"] for entry in again.report_["parameters"]}
+    kept = [path for path, reason in reasons.items() if reason == "kept"]
+    assert len(kept) > 5 and all(not number.identified for number in again.numbers_ if number.number.path in kept)
+    path = next(path for path in kept if path.endswith("viscous"))
+    set_number(finger, path, 1.01 * get_number(finger, path))
+    assert set(known_numbers(json.loads(first.description_text()))) - set(known_numbers(finger)) == {path}
+
+
+def at_pretension(force: float, seed: int = 1) -> Recording:
+    motion = wavy_motion(seed, 20.0, 200.0, 2)
+    forces = np.full((len(motion["time"]), 4), force)
+    groups = dict(make_recording(small_finger(), motion, forces, seed).recording)
+    return Recording(Path(f"{force:g}_{seed}.parquet"), groups.pop("time"), groups)
+
+
+def test_a_fit_of_two_pretensions_identifies_and_one_alone_leaves_the_other_no_worse() -> None:
+    """Friction in the joint and at the edge are one number at a single pretension."""
+    start, truth = json.loads(json.dumps(moved_start())), small_finger()
+    low, high = (at_pretension(force) for force in (8.0, 32.0))
+    one, both = (fitted(start, *recordings) for recordings in ([low], [low, high]))
+    assert both.report_["identified"]["count"] > one.report_["identified"]["count"]
+
+    def left(finger: Any, force: float) -> float:
+        recording = at_pretension(force, seed=9)
+        torque = [native.run_recording(data, recording.arrays(), 3)["friction_torque"] for data in (finger, truth)]
+        bias = [native.run_recording(data, recording.arrays(), 3)["bias_torque"] for data in (finger, truth)]
+        return float(np.sqrt(np.mean((torque[0] - bias[0] - torque[1] + bias[1]) ** 2)))
+
+    for force in (8.0, 32.0):
+        assert left(one.description_.data, force) < 1.05 * left(start, force)
+    assert left(both.description_.data, 32.0) < 0.5 * left(start, 32.0)
