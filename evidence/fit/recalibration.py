@@ -171,7 +171,7 @@ def report(jaw: Sequence[Row], siblings: Sequence[Row]) -> str:
             of = row.get("fitted", row.get("seed"))
             chosen = halves["even"](of) if isinstance(of, str) else of % 2 == 0
             row["half"] = "chosen on" if chosen else "others"
-        sections.append(tables.table([*keys, "half", *head], tables.by(rows, [*keys, "half"], _ratios)))
+        sections.append(tables.table([*keys, "half", *head], tables.by(rows, [*keys, "half"], _ratios), text_columns=3))
     return "\n\n".join(sections)
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from jaw_recordings import FAST, FAULT, data_folder, rms, torque_error
 
-from tendonfmu.cli.console import PhaseDisplay, print_tables
+from tendonfmu.cli.console import print_results
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.files.tables import write_table
@@ -63,17 +63,15 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         files = {name: converted(Path(scratch), name) for name in (*EVEN, *ODD, *FAST)}
-        with PhaseDisplay() as display:
-            found = diagnose(
-                NOMINAL,
-                [files[name] for name in EVEN],
-                [files[name] for name in ODD],
-                seed=options.seed,
-                jobs=options.jobs,
-                progress=display,
-            )
+        found = diagnose(
+            NOMINAL,
+            [files[name] for name in EVEN],
+            [files[name] for name in ODD],
+            seed=options.seed,
+            jobs=options.jobs,
+        )
         write_diagnosis(found, options.output)
-        print_tables(tables(found), lines(found), left="may also be")
+        print_results(tables(found), lines(found), left="may also be")
         print_errors(found, files)
 
 

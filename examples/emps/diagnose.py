@@ -15,7 +15,7 @@ from pathlib import Path
 
 from emps_recordings import KINEMATICS, MASS, PULSES, TRAINING, data_folder, read_emps, relative_as_published
 
-from tendonfmu.cli.console import PhaseDisplay, print_tables
+from tendonfmu.cli.console import print_results
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.files.tables import write_table
@@ -37,9 +37,9 @@ def converted(folder: Path, name: str) -> Path:
 
 def run(names: list[str], seed: int, jobs: int) -> Diagnosis:
     """Diagnosis of the first, judged on the others."""
-    with tempfile.TemporaryDirectory() as scratch, PhaseDisplay() as display:
+    with tempfile.TemporaryDirectory() as scratch:
         training, *tests = [converted(Path(scratch), name) for name in names]
-        return diagnose(NOMINAL, [training], tests, kinematics=KINEMATICS, seed=seed, jobs=jobs, progress=display)
+        return diagnose(NOMINAL, [training], tests, kinematics=KINEMATICS, seed=seed, jobs=jobs)
 
 
 def print_errors(found: Diagnosis, names: list[str]) -> None:
@@ -63,7 +63,7 @@ def main() -> None:
     names = [TRAINING, PULSES] if options.pulses else [TRAINING]
     found = run(names, options.seed, options.jobs)
     write_diagnosis(found, options.output)
-    print_tables(tables(found), lines(found), left="may also be")
+    print_results(tables(found), lines(found), left="may also be")
     print_errors(found, names)
 
 

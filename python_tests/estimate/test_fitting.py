@@ -13,11 +13,9 @@ import numpy as np
 import pytest
 
 from fit_cases import small_finger
-from fit_data import make_recording, wavy_motion
 from fit_finger import asymmetric_finger, made_recording, moved_start, write_recording
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.estimates import known_numbers
 from tendonfmu.estimate.files import Unfinished, read_unfinished, write_unfinished
 from tendonfmu.estimate.fitting import FitWarning, FrictionFit
 from tendonfmu.estimate.structure import get_number, set_number, with_sides
@@ -280,46 +278,6 @@ def test_given_numbers_that_do_better_where_nothing_was_fitted_are_kept() -> Non
     assert fit.report_["given_numbers"]["kept"] and "kept" in fit.report_["given_numbers"]["paragraph"]
     held_out = fit.report_["residual"]["held_out"]
     assert held_out["rms"] == pytest.approx(held_out["start_rms"])
-
-
-def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -> None:
-    first = shared(moved_start()).fit(made_recording(duration=40.0))
-    assert first.report_["given_numbers"]["start"] == "guessed"
-    finger = json.loads(first.description_text())
-    again = shared(finger).fit(made_recording(seed=5, duration=3.0))
-    paragraph = again.report_["given_numbers"]["paragraph"]
-    assert again.report_["given_numbers"]["start"] == "estimated" and "were estimated before" in paragraph
-    reasons = {entry["path"]: entry["reason"] for entry in again.report_["parameters"]}
-    kept = [path for path, reason in reasons.items() if reason == "kept"]
-    assert len(kept) > 5 and all(not number.identified for number in again.numbers_ if number.number.path in kept)
-    path = next(path for path in kept if path.endswith("viscous"))
-    set_number(finger, path, 1.01 * get_number(finger, path))
-    assert set(known_numbers(json.loads(first.description_text()))) - set(known_numbers(finger)) == {path}
-
-
-def at_pretension(force: float, seed: int = 1) -> Recording:
-    motion = wavy_motion(seed, 20.0, 200.0, 2)
-    forces = np.full((len(motion["time"]), 4), force)
-    groups = dict(make_recording(small_finger(), motion, forces, seed).recording)
-    return Recording(Path(f"{force:g}_{seed}.parquet"), groups.pop("time"), groups)
-
-
-def test_a_fit_of_two_pretensions_identifies_and_one_alone_leaves_the_other_no_worse() -> None:
-    """Friction in the joint and at the edge are one number at a single pretension."""
-    start, truth = json.loads(json.dumps(moved_start())), small_finger()
-    low, high = (at_pretension(force) for force in (8.0, 32.0))
-    one, both = (shared(start).fit(recordings) for recordings in ([low], [low, high]))
-    assert both.report_["identified"]["count"] > one.report_["identified"]["count"]
-
-    def left(finger: Any, force: float) -> float:
-        recording = at_pretension(force, seed=9)
-        torque = [native.run_recording(data, recording.arrays(), 3)["friction_torque"] for data in (finger, truth)]
-        bias = [native.run_recording(data, recording.arrays(), 3)["bias_torque"] for data in (finger, truth)]
-        return float(np.sqrt(np.mean((torque[0] - bias[0] - torque[1] + bias[1]) ** 2)))
-
-    for force in (8.0, 32.0):
-        assert left(one.description_.data, force) < 1.05 * left(start, force)
-    assert left(both.description_.data, 32.0) < 0.5 * left(start, 32.0)
 
 
 # --- structure --------------------------------------------------------------------------------------------------------

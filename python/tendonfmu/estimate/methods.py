@@ -228,7 +228,9 @@ def learn_batch(
         converged=result.converged,
         weights=weights,
         innovations=[],
-        warnings=[] if result.converged else [f"not converged after {counted(passes, 'pass', 'passes')} over the data"],
+        warnings=[]
+        if result.converged
+        else [f"not converged after {counted(result.passes, 'pass', 'passes')} over the data"],
     )
 
 

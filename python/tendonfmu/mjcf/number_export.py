@@ -157,7 +157,7 @@ def _unsure(report: Path) -> dict[str, str]:
     return {
         row["path"]: why[row["at_bound"]]
         for row in rows
-        if row["at_bound"] or not (row["identified"] or row["reason"] == "kept")
+        if row["at_bound"] or not (row["identified"] or row.get("reason") == "kept")
     }
 
 
