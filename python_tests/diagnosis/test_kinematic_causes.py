@@ -105,7 +105,7 @@ def test_the_command_says_what_slipped(tmp_path: Path, call: Call, monkeypatch: 
     Path("finger.json").write_text(json.dumps(finger.description), encoding="utf-8")
     said = call("diagnose", "finger.json", "now.parquet", "--reference", "then.parquet", "-o", "out")
     assert said.status == 0, said.err
-    assert "encoder" in said.out and "it reads 3° more than before" in said.out
+    assert "encoder_offset" in said.out and "° more than before" in said.out
     report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
     schema = json.loads((files("tendonfmu") / "schema" / "diagnosis.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(report, schema)
