@@ -6,9 +6,11 @@ import json
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 
 from command import Call
@@ -30,6 +32,10 @@ def found(now: EncoderFinger, then: EncoderFinger | None, number: int = 0, test:
         (then or FINGER).description, recordings[:1], recordings[1:] if test else [], reference, 1, 0.03, True
     )
     return find_kinematic_causes(given, 0.03, 0)
+
+
+def columns_of(frame: pd.DataFrame) -> dict[str, Any]:
+    return {str(column): frame[column].to_numpy() for column in frame}
 
 
 def placed(causes: Sequence[Cause]) -> list[tuple[str, int | None, int | None]]:
@@ -94,6 +100,15 @@ def test_the_fewest_offsets_and_zeros() -> None:
     assert both.joints.tolist() == [1] and both.single.tolist() == [True, False, False, False]
 
 
+def test_too_many_columns_are_refused(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lack of memory is no fault of the package."""
+    monkeypatch.setattr("tendonfmu.diagnosis.candidate_columns._MOST_MEMORY", 1e-9)
+    write_table(tmp_path / "rec.parquet", columns_of(FINGER.recording(1, 20.0)))
+    (tmp_path / "finger.json").write_text(json.dumps(FINGER.description), encoding="utf-8")
+    said = call("diagnose", tmp_path / "finger.json", tmp_path / "rec.parquet", "-o", tmp_path / "out")
+    assert said.status == 2 and "columns of candidate causes need" in said.err and said.err.count("\n") == 1
+
+
 def test_the_command_says_what_slipped(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     """The verdict, the files and the page agree, and no warning says the same again."""
     monkeypatch.chdir(tmp_path)
@@ -101,11 +116,11 @@ def test_the_command_says_what_slipped(tmp_path: Path, call: Call, monkeypatch: 
     now = finger.but("encoder", np.radians(3.0), joint=1).but("zero", 3e-4, tendon=0)
     for name, each, seed in (("then", finger, 3), ("now", now, 1)):
         frame = each.recording(seed, SECONDS)
-        write_table(Path(f"{name}.parquet"), {column: frame[column].to_numpy() for column in frame})
+        write_table(Path(f"{name}.parquet"), columns_of(frame))
     Path("finger.json").write_text(json.dumps(finger.description), encoding="utf-8")
     said = call("diagnose", "finger.json", "now.parquet", "--reference", "then.parquet", "-o", "out")
     assert said.status == 0, said.err
-    assert "encoder" in said.out and "it reads 3° more than before" in said.out
+    assert "encoder_offset" in said.out and "° more than before" in said.out
     report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
     schema = json.loads((files("tendonfmu") / "schema" / "diagnosis.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(report, schema)

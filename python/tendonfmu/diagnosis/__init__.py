@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .extension_fit import FitSettings, learn_numbers, with_known
     from .gain import squared_residual
     from .history import History, Line, diagnose_history, share_of
-    from .names import CONTACT, TITLES, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
+    from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes
     from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
     from .series import make_grid
