@@ -54,14 +54,28 @@ def split_recording(hand: Hand, source: HandRecording, others: Collection[str] =
     InputWarning
         Columns are ignored.
     """
-    file, table = _table(hand, source, others)
-    recordings = {part.name: _recording(file, table, part, hand.shared_joints(part), others) for part in hand.parts}
-    if hand.wrist is None:
-        return recordings
-    shared = _wrist_motion(file, table, hand, recordings.get(WRIST))
-    for part in hand.fingers:
-        recordings[part.name] = _with_wrist(hand, part, recordings[part.name], table, shared)
+    recordings, failed = split_parts(hand, source, others)
+    for reason in failed.values():
+        raise InputError(reason)
     return recordings
+
+
+def split_parts(
+    hand: Hand, source: HandRecording, others: Collection[str] = ()
+) -> tuple[dict[str, Recording], dict[str, str]]:
+    """Split a recording, and say why parts have none, by the names of the parts. Nothing is there without the wrist."""
+    file, table = _table(hand, source, others)
+    own = hand.wrist.part if hand.wrist else None
+    wrist = None if own is None else _recording(file, table, own, 0, others)
+    shared = _wrist_motion(file, table, hand, wrist) if hand.wrist else None
+    recordings, failed = dict[str, Recording](), dict[str, str]()
+    for part in hand.fingers:
+        try:
+            recording = _recording(file, table, part, hand.wrist_joints, others)
+            recordings[part.name] = recording if shared is None else _with_wrist(hand, part, recording, table, shared)
+        except InputError as refused:
+            failed[part.name] = str(refused)
+    return recordings | ({} if wrist is None else {WRIST: wrist}), failed
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
