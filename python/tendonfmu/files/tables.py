@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.files.stand_in import path_of
 from tendonfmu.files.texts import are, counted
 from tendonfmu.files.writing import whole_file
 
@@ -57,7 +58,7 @@ def require_extra(module: str, what: str) -> Any:
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:
     """Read all columns of a file as finite numbers."""
     # returns columns [N] in their order
-    file = path if isinstance(path, Path) else Path(path)  # a path of its own kind keeps its name in messages
+    file = path_of(path)  # a path of its own kind keeps its name in messages
     check_format(file)
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected a recording, .csv or .parquet")

@@ -14,7 +14,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InputWarning
-from tendonfmu.files import Table, counted, is_frame, read_table, table_of_frame
+from tendonfmu.files import Table, counted, is_frame, path_of, read_table, table_of_frame
 from tendonfmu.fmu import run_model
 from tendonfmu.hand.description import POSITIONS, WRIST, Hand, HandPart
 from tendonfmu.model import moment_arms, tendon_positions
@@ -88,7 +88,7 @@ def _table(hand: Hand, source: HandRecording, others: Collection[str]) -> tuple[
         return Path("DataFrame"), table_of_frame(Path("DataFrame"), source, check, flags=flags)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"recording: {type(source).__name__}; expected a path or a DataFrame of the whole hand")
-    file = source if isinstance(source, Path) else Path(source)
+    file = path_of(source)
     return file, read_table(file, check, flags=flags)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import counted, write_text
+from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
 from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
 from tendonfmu.model.routing_svg import finger_html
@@ -249,7 +249,7 @@ def finger_file(source: object) -> Path:
         raise InputError(
             f"finger: {'a text' if source.strip() else repr(source)}; {expected}, such as json.loads(text)"
         )
-    return source if isinstance(source, Path) else Path(source)
+    return path_of(source)
 
 
 def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:

@@ -104,6 +104,8 @@ def learn_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Tendo
     list of TendonRouting
         In the order of the tendons, without those that are slack or whose recordings are too short.
     """
+    for recording in recordings:
+        recording.require(finger.joints, finger.tendons, ())
     measured = [each for each in recordings if "joint_position" in each.groups]
     if not measured:
         return _of_redundancy(finger, recordings)
