@@ -19,6 +19,7 @@ from typer.main import get_command
 from tendonfmu.cli import calibrate, check, convert, demo, detect, diagnose, excite, fit, import_mjcf, run
 from tendonfmu.cli.command import SeveralValues
 from tendonfmu.cli.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
+from tendonfmu.cli.memory import prepare_for_limit
 from tendonfmu.errors import InputWarning, refusal
 from tendonfmu.fault_report import write_fault_report
 from tendonfmu.tasks import ended_by_signals
@@ -69,6 +70,7 @@ def main() -> None:
     warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
+            prepare_for_limit()
             asked = [*sys.argv[2:3], "--help"] if sys.argv[1:2] == ["help"] else sys.argv[1:]
             status = _commands()(asked, prog_name="tendonfmu", standalone_mode=False)
         except (KeyboardInterrupt, typer.Abort):
