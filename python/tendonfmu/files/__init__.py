@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         write_blocks,
         write_table,
     )
-    from .texts import are, counted, html_template, listed, percent
+    from .texts import are, by_kind, counted, html_template, listed, percent
     from .writing import check_output, check_output_folder, in_use, is_about, remove_left_behind, whole_file, write_text
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
