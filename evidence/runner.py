@@ -54,7 +54,7 @@ def run_cases(
         jobs,
         folder,
         stop_after=stop_after,
-        failed_again=not keep_errors,
+        keep_failed=keep_errors,
         progress=lambda done, total: say(f"{folder.name}: {done} of {total} cases"),
     )
     if workers == 1 and scheduler is None:

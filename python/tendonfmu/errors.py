@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+
+_NO_MEMORY = ("failed to map segment", "Cannot allocate", "can't start new thread", "Failed to launch worker thread")
 
 
 class InputError(ValueError):
@@ -40,6 +44,32 @@ def own_fault(what: str) -> Iterator[None]:
         raise
     except InputError as refused:
         raise InternalError(f"{what}: {refused}") from refused
+
+
+def refusal(error: BaseException) -> str | None:
+    """Return the line of an error that is no fault of tendonfmu, else None."""
+    if is_without_memory(error):
+        return "not enough memory"
+    if not isinstance(error, InputError | OSError):
+        return None
+    is_own = isinstance(error, OSError) and (error.errno is None or _is_own_file(error.filename))
+    return None if is_own else " ".join(line_of(error).split())
+
+
+def is_without_memory(error: BaseException) -> bool:
+    """Tell whether memory ran out; loaders of libraries and threads say so in words alone."""
+    return (
+        isinstance(error, MemoryError)
+        or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
+        or (
+            isinstance(error, ImportError | RuntimeError | OSError) and any(words in str(error) for words in _NO_MEMORY)
+        )
+    )
+
+
+def _is_own_file(path: object) -> bool:
+    """Tell whether a path lies within the installed package."""
+    return isinstance(path, str) and Path(path).is_absolute() and Path(__file__).parent in Path(path).parents
 
 
 def line_of(error: InputError | OSError) -> str:

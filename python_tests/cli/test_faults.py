@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -21,8 +22,8 @@ from command import Call
 from fmu_binary import FINGER
 from repository_paths import ROOT
 from tendonfmu.cli.console import reader_may_leave
-from tendonfmu.cli.program import write_fault_report
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
+from tendonfmu.fault_report import write_fault_report
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
 from tendonfmu.recordings import read_recording
@@ -136,8 +137,13 @@ def test_recordings_of_which_nothing_is_left_are_no_fault() -> None:
 
 @pytest.mark.parametrize(
     "error",
-    [MemoryError(), ImportError("libarrow.so: failed to map segment from shared object")],
-    ids=["Python", "loader"],
+    [
+        MemoryError(),
+        ImportError("libarrow.so: failed to map segment from shared object"),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+        RuntimeError("can't start new thread"),
+    ],
+    ids=["Python", "loader", "system", "thread"],
 )
 def test_too_little_memory_is_said_and_no_fault(
     call: Call, failing: Callable[[BaseException], None], tmp_path: Path, error: Exception
@@ -146,6 +152,26 @@ def test_too_little_memory_is_said_and_no_fault(
     answer = call("check", "finger.json")
     assert (answer.status, answer.out, answer.err) == (2, "", "tendonfmu: not enough memory\n")
     assert {file.name for file in tmp_path.iterdir()} == {"finger.json"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of Unix")
+@pytest.mark.parametrize("megabytes", [150, 250, 350, 450, 500, 550])
+def test_under_a_limit_a_lack_of_memory_is_one_line(tmp_path: Path, megabytes: int) -> None:
+    """It was "interrupted" (130), a text of OpenBLAS (1), "not a whole Parquet file", or an abort, by its size."""
+    demo = ROOT / "examples" / "demo_recording"
+    given = (demo / "two_joints.json", demo / "two_joints_training.parquet")
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({megabytes} << 20, -1)); "
+    script = f"{limit}import tendonfmu.cli; tendonfmu.cli.main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", script, "run", *given, "-o", tmp_path / "out.csv"],
+        env={name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")},
+        capture_output=True,
+        text=True,
+    )
+    if megabytes > 400 and ended.returncode == 0:
+        return  # enough
+    assert (ended.returncode, ended.stdout, ended.stderr) == (2, "", "tendonfmu: not enough memory\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_disk_that_fails_under_results_is_not_taken_for_a_closed_terminal() -> None:

@@ -22,6 +22,7 @@ from fmu_binary import FINGER
 from plant_fmu_rig import fmu_rig
 from repository_paths import ROOT
 from tendonfmu.cli.program import app
+from tendonfmu.files import by_kind
 
 GROUP: Any = typer.main.get_command(app)
 COMMANDS = dict(GROUP.commands)
@@ -388,3 +389,18 @@ def test_help_and_version_by_other_names(call: Call) -> None:
 def test_summaries_of_commands_are_whole(call: Call) -> None:
     commands = call("--help").out.partition("Commands:")[2]
     assert commands.count("\n") > 14 and "..." not in commands and "…" not in commands
+
+
+def test_warnings_of_a_kind_are_one_line() -> None:
+    """A page began with twelve, one for each tendon and file."""
+    rest = "probably numbers that nobody measured; tendonfmu calibrate learns them"
+    alike = [
+        f"{file}: tendon_position[{i}]: zero is off by 0.{i} mm; {rest}" for file in ("a.csv", "b.csv") for i in (1, 2)
+    ]
+    alone = ["c.csv: time: 1 gap, the first of 0.7 s; probably an interrupted log; split it there"]
+    counts = ["d.csv: 5 numbers at a bound", "e.csv: 7 numbers at a bound"]
+    kinds = by_kind([*alike, *alone, *counts, *alike])
+    assert [sentences for _, sentences in kinds] == [alike, alone, counts]
+    first, second, third = (words for words, _ in kinds)
+    assert first == f"tendon_position[1], tendon_position[2]: 2 columns of 2 files: {rest}"
+    assert second == alone[0] and third == f"{counts[0]} (and 1 more of this kind)"

@@ -119,8 +119,7 @@ def test_a_fit_leaves_the_watch_out_and_keeps_its_keys() -> None:
     """The sensors' watch is no part of the friction model."""
     joints = [{"friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}, {}]
     data = json.loads(json.dumps(FINGER | {"joints": joints, "sensor_fault": {"jump_margin": 0.7}}))
-    text = json.dumps(data).encode()
-    finger = Finger(Path("finger"), text, data, native.image_from_json(text))
+    finger = Finger(Path("finger"), data)
     structure = build_structure(finger, Choice())
     assert "sensor_fault" not in structure.start.data
     values = np.array([parameter.start for parameter in native.Instance(structure.start.image).parameters()])

@@ -82,8 +82,7 @@ def finger_data() -> Data:
 
 
 def described(data: Mapping[str, Any]) -> Finger:
-    text = json.dumps(data).encode()
-    return Finger(Path("finger"), text, data, native.image_from_json(text))
+    return Finger(Path("finger"), data)
 
 
 def moved(data: Data, seconds: float, seed: int, gap: bool = False) -> Recording:

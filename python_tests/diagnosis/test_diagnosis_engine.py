@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +31,7 @@ from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import moment_arms
-from tendonfmu.model.native import Instance, image_from_json
+from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.statistics.splines import residual_of
@@ -57,8 +56,7 @@ def finger() -> dict[str, Any]:
 
 
 def described(data: Mapping[str, Any]) -> Finger:
-    text = json.dumps(data).encode()
-    return Finger(Path("finger.json"), text, data, image_from_json(text))
+    return Finger(Path("finger.json"), data)
 
 
 def recorded(truth: Mapping[str, Any], seed: int, source: int, seconds: float = 40.0, delay: int = 0) -> FitRecording:

@@ -41,8 +41,7 @@ NOISE = 0.002
 
 
 def described(data: dict[str, Any]) -> Finger:
-    text = json.dumps(data).encode()
-    return Finger(Path("finger"), text, data, native.image_from_json(text))
+    return Finger(Path("finger"), data)
 
 
 def nominal() -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,9 @@ from tendonfmu.diagnosis import history as change_history
 from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.history import History, Line, Size, diagnose_history, share_of, slope, times_of
 from tendonfmu.diagnosis.names import Names
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files.json_node import finite
+from tendonfmu.model import read_finger
 from tendonfmu.report.history import headline, history_report, trend_sentence, write_history
 from tendonfmu.statistics.intervals import Interval
 from tendonfmu.tasks.jobs import workers_of
@@ -87,6 +87,7 @@ def test_scatter_beyond_the_errors_widens_the_interval() -> None:
 # --- rows -------------------------------------------------------------------------------------------------------------
 
 Calls = list[tuple[str, str]]
+ASKED_OF: list[float] = []  # stiffness of the finger of the last call
 
 
 @pytest.fixture
@@ -96,8 +97,11 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Calls:
 
     def named(*options: Any) -> dict[str, Any]:
         recording = options[-1]
+        ASKED_OF[:] = [options[0].data["tendons"][0]["stiffness"]]
         asked.append(("named", Path(recording).name))
         text = Path(recording).read_text()
+        if text == "fault":
+            raise KeyError("arms")
         if text == "broken":
             raise InputError(f"{recording}: no column; expected some")
         far = float(text) > 1.25
@@ -181,10 +185,56 @@ def test_a_file_that_changed_is_computed_again(
     assert history().lines[0].sizes[1].size.now.value == 1.15
     assert answering == [("named", f"{WEEKS[1]}.csv"), ("sizes", f"{WEEKS[1]}.csv")]
     answering.clear()
-    there = (tmp_path / "finger.json").stat()
-    os.utime(tmp_path / "finger.json", ns=(there.st_atime_ns, there.st_mtime_ns + 10**9))
+    finger = read_finger(tmp_path / "finger.json")
+    finger.replace({"name": "another"}).write(tmp_path / "finger.json")
     history()
     assert len(answering) == 8  # all depend on the finger
+
+
+def test_a_finger_in_memory_counts_as_it_is(tmp_path: Path, history: Callable[[], History], answering: Calls) -> None:
+    """`.replace()` was ignored: the rows were those of the file that the finger came from."""
+    history()
+    answering.clear()
+    files = [tmp_path / f"{date}.csv" for date in WEEKS]
+    changed = read_finger(tmp_path / "finger.json").replace({"tendons[1].stiffness": 1234.0})
+    found = diagnose_history(changed, files, [tmp_path / "2026-02-23.csv"], rows=tmp_path / "out")
+    assert len(answering) == 8 and set(ASKED_OF) == {1234.0} and found.finger == changed.name
+
+
+def test_rows_of_another_version_are_made_again(
+    history: Callable[[], History], answering: Calls, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    history()
+    answering.clear()
+    monkeypatch.setattr(change_history, "version_here", lambda: "another")
+    history()
+    assert len(answering) == 8
+
+
+def test_what_failed_is_tried_again(tmp_path: Path, history: Callable[[], History], answering: Calls) -> None:
+    file = tmp_path / f"{WEEKS[1]}.csv"
+    file.write_text("fault")
+    assert [Path(name).stem for name, _ in history().failed] == [WEEKS[1]]
+    ((_, why),) = history().failed
+    assert why.startswith("internal error (KeyError), a fault of tendonfmu") and why.endswith(".causes.json")
+    assert "Traceback" in json.loads(Path(why.rpartition(" ")[2]).read_text())["fault"]
+    answering.clear()
+    history()
+    assert answering == [("named", f"{WEEKS[1]}.csv")]
+
+
+def test_if_all_fail_it_is_the_end(tmp_path: Path, history: Callable[[], History]) -> None:
+    """It said that nothing has changed in 0 recordings."""
+    for date in WEEKS:
+        (tmp_path / f"{date}.csv").write_text("broken")
+    with pytest.raises(
+        InputError, match=r"finger\.json: no recording could be diagnosed; .*\.csv: no column; expected"
+    ):
+        history()
+    for date in WEEKS:
+        (tmp_path / f"{date}.csv").write_text("fault")
+    with pytest.raises(InternalError, match="Traceback"):
+        history()
 
 
 def test_another_cause_is_sized_in_all(tmp_path: Path, history: Callable[[], History], answering: Calls) -> None:

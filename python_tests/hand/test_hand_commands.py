@@ -18,6 +18,7 @@ from plant_rigs import needs_plant
 from real_browser import Elements
 from repository_paths import ROOT
 from small_hand import FINGERS, worn_columns, write_hand, write_worn_hand
+from tendonfmu.hand import parts
 from tendonfmu.hand.page import COLOURS, PAGE, hand_svg, write_hand_page
 from tendonfmu.hand.parts import PartResult, split_files
 from tendonfmu.hand.report import (
@@ -133,7 +134,8 @@ def test_split_files_keep_their_time_if_nothing_changed(tmp_path: Path) -> None:
     shutil.copy(files["monday"], tmp_path / "other" / "monday.parquet")
     hand, out = tf.read_hand(files["hand"]), tmp_path / "out"
     groups = [[files["monday"]], [tmp_path / "other" / "monday.parquet"]]
-    first, second = split_files(hand, groups, out)
+    (first, second), failed = split_files(hand, groups, out)
+    assert failed == {}
     assert [Path(each[0]).name for each in (first["ring"], second["ring"])] == [
         "monday.parquet",
         "monday_2.parquet",
@@ -163,6 +165,52 @@ def test_the_worse_finger_is_named(tmp_path: Path, call: Call) -> None:
     assert "labelled contact" in report["failed"]["index"] and "warning: index: left out: " in answer.err
     assert "ring is the worst: " in words(Path("out/hand.html")) and Path("out/ring/diagnosis.html").is_file()
     assert not Path("out/index").exists() and report["failed"]["index"].startswith("recordings/index/then.parquet: ")
+
+
+def test_a_finger_without_columns_is_its_row(tmp_path: Path, call: Call) -> None:
+    columns = worn_columns(1, seconds=20.0)
+    files = write_worn_hand(tmp_path, day={name: column for name, column in columns.items() if "ring" not in name})
+    answer = call("diagnose", files["hand"], files["day"], "-o", "out", "--kinematics", "3")
+    wanted = "no column ring_tendon_force[1]; expected 2 columns with tendon_force of ring, in N"
+    assert answer.status == 0 and f"warning: ring: left out: {files['day']}: {wanted}" in answer.err
+    assert Path("out/index/diagnosis.json").is_file() and not Path("out/ring").exists()
+    answer = call("score", files["hand"], files["day"], "-o", "score.json", "--kinematics", "3")
+    assert answer.status == 0 and list(json.loads(Path("score.json").read_text())["failed"]) == ["ring"]
+    answer = call("check", files["hand"], files["day"], "--json")
+    assert answer.status == 1 and f"ring: recordings do not belong to {files['hand']}" in answer.err
+    belongs = {name: part["recordings"][0]["belongs"] for name, part in json.loads(answer.out)["fingers"].items()}
+    assert belongs == {"index": True, "ring": False}
+
+
+@pytest.mark.parametrize("kind", [(), ("--history",)])
+def test_an_internal_error_of_one_finger_is_its_row(
+    tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch, kind: tuple[str, ...]
+) -> None:
+    name = "diagnose_history" if kind else "diagnose"
+    real, broken = getattr(parts, name), {"index"}
+
+    def breaks(finger: Any, *given: Any, **options: Any) -> Any:
+        stem = finger.path.stem if kind else Path(finger).stem
+        if stem in broken:
+            raise KeyError(f"no {stem}")
+        return real(finger, *given, **options)
+
+    monkeypatch.setattr(parts, name, breaks)
+    files = write_worn_hand(tmp_path, then=worn_columns(1, seconds=20.0), later=worn_columns(2, "ring", seconds=20.0))
+    command = ("diagnose", files["hand"], files["later"], "--reference", files["then"], "-o", "out", *kind)
+    answer = call(*command, "--kinematics", "3", "--json")
+    assert answer.status == 0, answer.err
+    report = json.loads(answer.out)
+    assert list(report["fingers"]) == ["ring"]
+    assert report["failed"]["index"].startswith("internal error (KeyError), a fault of tendonfmu, not of its input; ")
+    assert "KeyError: 'no index'" in Path("out/index/tendonfmu-error.txt").read_text()
+    assert "please send the report out/index/tendonfmu-error.txt" in words(Path("out/hand.html"))
+    broken.add("ring")
+    answer = call(*command, "--kinematics", "3")
+    assert answer.status == 3 and answer.err.count("\n") == 1 and "a fault of tendonfmu" in answer.err
+    broken.clear()  # what failed is tried again
+    assert set(json.loads(call(*command, "--kinematics", "3", "--json").out)["fingers"]) == {"index", "ring"}
+    assert not Path("out/index/tendonfmu-error.txt").exists()
 
 
 def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:

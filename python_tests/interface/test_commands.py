@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -156,3 +157,22 @@ def test_calibrate(frame: pd.DataFrame, tmp_path: Path) -> None:
     assert {path.name for path in written} == {"calibration.html", "calibration.json", "finger.json", "finger.fmu"}
     assert tf.read_finger(tmp_path / "out" / "finger.json") == found.finger
     assert "mN·m left" in repr(found) and "srcdoc" in found._repr_html_()
+
+
+def test_messages_name_what_was_given(frame: pd.DataFrame) -> None:
+    """They named files in a temporary folder that was gone."""
+    tendons = {"tendon_force": np.zeros((9, 3)), "tendon_position": np.zeros((9, 3))}
+    few = tf.Recording.from_arrays(np.arange(9.0), **tendons, name="mine")
+    for refused, words in {
+        lambda: tf.calibrate(FINGER, frame.iloc[:300]): "DataFrame: 0.",
+        lambda: tf.calibrate(FINGER, [frame, frame]): "DataFrame 2: given twice, as DataFrame 1; expected each",
+        lambda: tf.calibrate(FINGER, frame, test=frame): "DataFrame: a test, but trained on as well, as DataFrame; ",
+        lambda: tf.calibrate(FINGER, few): "mine: 3 columns tendon_force[...], expected 4",
+        lambda: tf.convert(DEMO / "two_joints_training.parquet", {"format": "x"}): 'map: format = "x"',
+    }.items():
+        with pytest.raises(tf.InputError) as error:
+            refused()
+        assert str(error.value).startswith(words), str(error.value)
+    file = DEMO / "two_joints_training.parquet"
+    with pytest.raises(tf.InputError, match=rf"^{re.escape(str(file))}: "):
+        tf.calibrate(FINGER, tf.read_recording(file)[:0.5])

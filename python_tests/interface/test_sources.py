@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,19 @@ def test_a_finger_cannot_be_changed(finger: tf.Finger) -> None:
     copied["name"] = "another"
     copied["tendons"].clear()
     assert (finger.name, finger.tendons) == ("two_joints", 4)
+
+
+def test_other_data_make_another_image_and_text(finger: tf.Finger) -> None:
+    """`dataclasses.replace` left image and text, and so `to_dict()`, `run` and `build`, as they were."""
+    data = finger.to_dict() | {"name": "another"}
+    data["tendons"][0]["stiffness"] = 1234.0
+    changed = dataclasses.replace(finger, data=data)
+    assert changed.to_dict() == data and changed == tf.read_finger(data) and hash(changed) != hash(finger)
+    assert changed.image == tf.read_finger(data).image != finger.image and b"1234" in changed.text
+    assert pickle.loads(pickle.dumps(changed)) == changed
+    data["tendons"][0]["stiffness"] = -1.0
+    with pytest.raises(tf.InputError, match=r"two_joints\.json: .*stiffness"):
+        tf.run(dataclasses.replace(finger, data=data), RECORDING)
 
 
 def test_replace_makes_another_finger(finger: tf.Finger, tmp_path: Path) -> None:

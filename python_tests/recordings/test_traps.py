@@ -16,10 +16,12 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.model import Finding, Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording, belongs, read_recording
 from tendonfmu.recordings.converters.table import convert_table
-from tendonfmu.recordings.traps import is_magnitude, wrapped
+from tendonfmu.recordings.routing import learn_routing
+from tendonfmu.recordings.traps import find_traps, is_magnitude, wrapped
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
-FREE = ROOT / "examples" / "demo_recording" / "index_finger_free.parquet"
+DEMO = ROOT / "examples" / "demo_recording"
+FREE = DEMO / "index_finger_free.parquet"
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +83,67 @@ def test_another_unit_from_the_middle_on(sound: tuple[Finger, Recording], group:
     (finding,) = found(sound, **{group: values})
     assert (finding.kind, finding.columns) == ("switched", (f"{group}[2]",)) and unit in finding.line()
     assert "times as much after 1" in finding.line()  # 15 s
+
+
+def test_a_burst_at_the_end_is_no_unit() -> None:
+    """A tendon that snaps back from slack passes 4.1 times a force within a sample: it was told to be in lbf."""
+    rng, count = np.random.default_rng(1), 24 * 600
+    force, position = 14.0 + 0.03 * rng.normal(size=(count, 4)), 1e-5 * rng.normal(size=(count, 4))
+    force[-100:-93, 0] = 14.0, 0.0, 6.07, 25.0, 27.64, 15.7, 3.3
+    recording = Recording(Path("x"), 0.004 * np.arange(count), {"tendon_force": force, "tendon_position": position})
+    assert list(find_traps(read_finger(DEMO / "two_joints.json"), recording)) == []
+    force[-100:-93, 0] = 14.0
+    force[-4000:, 0] *= 4.448222
+    (trap,) = find_traps(read_finger(DEMO / "two_joints.json"), recording)
+    assert (trap.kind, trap.what) == ("switched", "lbf") and trap.at == pytest.approx(41.6, abs=2.4)
+
+
+def test_a_slow_encoder_of_14_bits_repeats_its_values(sound: tuple[Finger, Recording]) -> None:
+    """In degrees with four decimals its steps are unequal by rounding, and slow motion counted as fast."""
+    step = 360.0 / 2**14
+    degrees = np.round(np.round(np.degrees(0.3 * sound[1].groups["joint_position"]) / step) * step, 4)
+    columns = np.radians(degrees) / 0.3
+    repeats = (np.diff(columns, axis=0) == 0.0).all(axis=1).mean()
+    assert repeats > 0.05 and "repeated" not in [each.kind for each in found(sound, joint_position=columns)]
+
+
+def moving(stiffness_at: float = 1.0, stuck: bool = False) -> tuple[Finger, Recording]:
+    """A minute of both joints; the second stands half of the time, or its encoder is stuck."""
+    finger = read_finger(DEMO / "two_joints.json")
+    time = np.arange(30000) / 500.0
+    strokes = 0.5 - 0.5 * np.cos(np.pi * np.clip(time % 4.0, 0.0, 2.0))
+    angle = np.column_stack([0.5 * np.sin(1.7 * time), strokes])
+    noise = 0.02 * np.random.default_rng(1).normal(size=(30000, 4))
+    force = 12.0 + 3.0 * np.sin(0.9 * time[:, None] + np.arange(4)) + noise
+    stiffness = stiffness_at * np.array([tendon["stiffness"] for tendon in finger.data["tendons"]])
+    stretch = (force - 12.0) / stiffness + 12.0 * stiffness_at / stiffness  # as described at the mean force
+    position = angle @ np.array(finger.moment_arms).T + stretch
+    measured = np.round(angle / 4e-4) * 4e-4
+    if stuck:
+        measured[2000:4000, 1] = measured[2000, 1]
+    groups = {"tendon_force": force, "tendon_position": position, "joint_position": measured}
+    return finger, Recording(Path("x"), time, groups)
+
+
+def test_a_joint_that_stands_is_not_stuck() -> None:
+    """The guessed arms made its tendons seem to move it, with those of the joint before."""
+    finger, recording = moving()
+    arms = np.array(finger.moment_arms)
+    arms[:, 0] *= 1.4, 1.0, 0.7, 1.0
+    guessed = finger.replace({f"tendons[{i + 1}].moment_arms": row.tolist() for i, row in enumerate(arms)})
+    assert "held" not in [finding.kind for finding in belongs(guessed, [recording])]
+    stuck = [each for each in belongs(guessed, [moving(stuck=True)[1]]) if each.kind == "held"]
+    assert [finding.columns for finding in stuck] == [("joint_position[2]",)]
+
+
+def test_a_calibrated_finger_is_not_told_to_be_calibrated() -> None:
+    """A spring that stiffens has another stiffness and zero at each pretension, which give the same angle."""
+    finger, recording = moving(stiffness_at=1.06)
+    assert any(each.differs for each in learn_routing(finger, [recording])) and belongs(finger, [recording]) == []
+    finger, recording = moving()
+    off = finger.replace({"tendons[1].zero": 2e-4})
+    (finding,) = belongs(off, [recording])
+    assert finding.kind == "routing" and "zero is off by -0.2" in finding.line()
 
 
 @pytest.mark.parametrize("ppm", [10.0, 100.0])

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.files.tables import write_table
-from tendonfmu.model import native
 from tendonfmu.model.description import Finger
 from tendonfmu.recordings.recording import Recording
 
@@ -110,8 +109,7 @@ def described(**joint: Any) -> dict[str, Any]:
 
 
 def finger(data: Mapping[str, Any] | None = None) -> Finger:
-    text = json.dumps(data or described()).encode()
-    return Finger(Path("finger.json"), text, json.loads(text), native.image_from_json(text))
+    return Finger(Path("finger.json"), data or described())
 
 
 def recording(columns: Columns, name: str = "now.parquet") -> Recording:

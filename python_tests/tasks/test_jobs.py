@@ -12,9 +12,9 @@ import pytest
 
 import some_jobs
 from dask_on_loopback import dask_processes
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError
 from tendonfmu.tasks import jobs as engine
-from tendonfmu.tasks.jobs import Job, rows_of, run_jobs, waiting_jobs, workers_of
+from tendonfmu.tasks.jobs import Job, fault_words, refuse_if_all_failed, rows_of, run_jobs, waiting_jobs, workers_of
 
 
 def noting(count: int, seconds: float, log: Path) -> list[Job]:
@@ -28,14 +28,37 @@ def begun(log: Path) -> list[int]:
 def test_jobs_are_resumed_and_a_failure_is_a_row(tmp_path: Path) -> None:
     some = [Job(str(k), (k,)) for k in range(4)]
     assert run_jobs(some_jobs.fail, some[:3], tmp_path) == 3
-    assert [job.name for job in waiting_jobs(some, tmp_path)] == ["3"]
-    assert [job.name for job in waiting_jobs(some, tmp_path, failed_again=True)] == ["2", "3"]
+    assert [job.name for job in waiting_jobs(some, tmp_path, keep_failed=True)] == ["3"]
+    assert [job.name for job in waiting_jobs(some, tmp_path)] == ["2", "3"]
+    assert run_jobs(some_jobs.fail, some, tmp_path, keep_failed=True) == 1
+    assert run_jobs(some_jobs.fail, some, tmp_path, keep_failed=True) == 0
     assert run_jobs(some_jobs.fail, some, tmp_path) == 1
-    assert run_jobs(some_jobs.fail, some, tmp_path) == 0
     rows = rows_of(some, tmp_path)
     assert [row["name"] for row in rows] == ["0", "1", "2", "3"]
     assert rows[2]["error"] == "ValueError: two is refused" and rows[0]["error"] == ""
     assert rows[0]["bad"] is None and rows[0]["run_seconds"] >= 0.0
+
+
+def refuse_or_break(broken: bool) -> dict[str, int]:
+    raise KeyError("arms") if broken else InputError("a.csv: no column\ntime")
+
+
+def test_a_row_says_whose_fault_it_is(tmp_path: Path) -> None:
+    some = [Job("refused", (False,)), Job("broken", (True,))]
+    run_jobs(refuse_or_break, some, tmp_path)
+    refused, broken = rows_of(some, tmp_path)
+    assert (refused["error"], refused["fault"]) == ("a.csv: no column time", "")
+    assert "Traceback" in broken["fault"] and "platform:" in broken["fault"]
+    words = fault_words(broken, Path("rows/broken.json"))
+    assert (
+        words
+        == "internal error (KeyError), a fault of tendonfmu, not of its input; please send the report rows/broken.json"
+    )
+    with pytest.raises(InputError, match=r"^none could be done; a\.csv: no column time$"):
+        refuse_if_all_failed([broken, refused], "none could be done")
+    with pytest.raises(InternalError, match="Traceback"):
+        refuse_if_all_failed([broken], "none could be done")
+    refuse_if_all_failed([broken, {"error": ""}], "none could be done")
 
 
 def test_a_name_that_stands_twice_is_refused(tmp_path: Path) -> None:

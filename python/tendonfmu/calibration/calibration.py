@@ -41,7 +41,7 @@ from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose, squared_residual
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once, check_unseen, described
-from tendonfmu.files import finite, percent, write_text
+from tendonfmu.files import finite, path_of, percent, write_text
 from tendonfmu.model import Finger, description_text, read_finger
 from tendonfmu.options import CalibrateOptions, ScoreOptions
 from tendonfmu.recordings import (
@@ -158,9 +158,9 @@ def calibrate(
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
     with phases.start("reading"):
-        earlier = None if previous is None else Path(previous)
+        earlier = None if previous is None else path_of(previous)
         case = _read(
-            Path(finger), earlier, [[Path(file) for file in files] for files in (free, tests, pushes)], options
+            path_of(finger), earlier, [[path_of(file) for file in files] for files in (free, tests, pushes)], options
         )
     run = _Run(case, Path(folder), options, phases)
     report, data, shown = run.report()

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import inspect
 import math
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
-from pathlib import Path, PosixPath, WindowsPath
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
@@ -22,11 +21,6 @@ from typer.core import TyperCommand
 from tendonfmu.cli.console import DASH, PRINTED
 from tendonfmu.errors import InputError
 from tendonfmu.options import Number, Option, Options, Several
-
-if TYPE_CHECKING:
-    SystemPath = Path
-else:
-    SystemPath = PosixPath if os.name == "posix" else WindowsPath
 
 REPEATED = ("--test", "--pushes")  # `--test A B` means `--test A --test B`
 # how a file begins -> its suffix; what is none of these is a table in text
@@ -182,16 +176,6 @@ def several_values(args: Sequence[str], valued: set[str]) -> list[str]:
 # --- standard input ---------------------------------------------------------------------------------------------------
 
 
-class StandardInput(SystemPath):
-    """A temporary file with what standard input held. As text it is its name alone, such as `standard_input.csv`."""
-
-    def __str__(self) -> str:
-        return self.name
-
-    def __fspath__(self) -> str:
-        return super().__str__()
-
-
 @contextmanager
 def _standard_input(arguments: Mapping[str, Any], reads: Sequence[str]) -> Iterator[Mapping[str, Any]]:
     """Put a file with standard input in the place of `-` in the arguments in `reads`, one file or several."""
@@ -222,6 +206,8 @@ def _kept(content: bytes, folder: Path) -> Path:
         raise InputError("-: standard input is empty; expected a finger description (JSON), an FMU or a recording")
     start = content[:100].lstrip(b"\xef\xbb\xbf \t\r\n")
     suffix = next((suffix for begin, suffix in _BEGINNINGS.items() if start.startswith(begin)), ".csv")
-    file = StandardInput(folder, f"standard_input{suffix}")
+    from tendonfmu.files import StandIn
+
+    file = StandIn.of(folder / f"standard_input{suffix}", f"standard_input{suffix}")
     file.write_bytes(content)
     return file

@@ -125,10 +125,12 @@ def leave(status: int) -> NoReturn:
 
 
 def print_results(tables: Iterable[Any], lines: Iterable[str], left: str, warnings: Iterable[str] = ()) -> None:
-    """Print tables of (title, headings, rows), lines, and then the warnings, each once."""
+    """Print tables of (title, headings, rows), lines, and then a line for each kind of warnings; reports have all."""
+    from tendonfmu.files import by_kind
+
     _print_tables(tables, lines, left)
-    for sentence in dict.fromkeys(warnings):
-        warn(sentence)
+    for words, _ in by_kind(warnings):
+        warn(words)
 
 
 def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:

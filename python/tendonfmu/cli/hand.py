@@ -19,7 +19,7 @@ Progress = Callable[..., None]
 
 def check_hand(file: Path, recordings: Sequence[Path], progress: bool | None) -> bool:
     """Print what a hand is, and whether recordings belong to each of its fingers. Return whether all of it is sound."""
-    from tendonfmu.hand import read_hand, split_recording
+    from tendonfmu.hand import read_hand, split_parts
     from tendonfmu.model import description_findings
     from tendonfmu.recordings import belongs, check_report, recording_report
 
@@ -49,8 +49,14 @@ def check_hand(file: Path, recordings: Sequence[Path], progress: bool | None) ->
     lines = []
     with progress_bar("recordings", progress if recordings else False, total=len(recordings)) as show_progress:
         for number, recording in enumerate(recordings, start=1):
-            split = split_recording(hand, recording)
+            split, failed = split_parts(hand, recording)
             for part in hand.parts:
+                if part.name in failed:
+                    reason = failed[part.name]
+                    error = {"severity": "error", "line": reason}
+                    checked[part.name].append({"file": str(recording), "belongs": False, "findings": [error]})
+                    lines.append(reason)
+                    continue
                 seen = belongs(part.finger, [split[part.name]])
                 checked[part.name].append(recording_report(split[part.name], seen))
                 lines += [checked[part.name][-1]["verdict"], *(f"{each.severity}: {each.line()}" for each in seen)]

@@ -8,11 +8,9 @@ Exit status: 0 done, 1 the answer is no, 2 bad usage or input, 3 internal fault 
 from __future__ import annotations
 
 import functools
-import itertools
 import sys
 import warnings
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
@@ -21,11 +19,12 @@ from typer.main import get_command
 from tendonfmu.cli import calibrate, check, convert, demo, detect, diagnose, excite, fit, import_mjcf, run
 from tendonfmu.cli.command import SeveralValues
 from tendonfmu.cli.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
-from tendonfmu.errors import InputError, InputWarning, line_of
+from tendonfmu.cli.memory import prepare_for_limit
+from tendonfmu.errors import InputWarning, refusal
+from tendonfmu.fault_report import write_fault_report
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning
-_PACKAGES = ("numpy", "scipy", "scikit-learn", "pyarrow", "fmpy", "typer", "rich")  # versions of a fault report
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -71,17 +70,9 @@ def main() -> None:
     warnings.simplefilter("default", InputWarning)  # each text once
     with ended_by_signals() as ending:
         try:
+            prepare_for_limit()
             asked = [*sys.argv[2:3], "--help"] if sys.argv[1:2] == ["help"] else sys.argv[1:]
             status = _commands()(asked, prog_name="tendonfmu", standalone_mode=False)
-        except (InputError, OSError) as refused:
-            if ending.asked is not None:  # a bar on a closed terminal, or an import that the signal cut short
-                _interrupted(ending.status)
-            if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
-                sys.stderr.close()
-                sys.exit(0)
-            if isinstance(refused, OSError) and (refused.errno is None or is_own_file(refused.filename)):
-                _fault(refused)
-            _refuse(line_of(refused))
         except (KeyboardInterrupt, typer.Abort):
             _interrupted(ending.status)
         except SystemExit as ended:
@@ -89,10 +80,13 @@ def main() -> None:
                 leave(ending.status)
             raise
         except Exception as refused:
-            if ending.asked is not None:  # compiled modules turn it into an ImportError while they are loaded
+            if ending.asked is not None:  # a bar on a closed terminal, or an import that the signal cut short
                 _interrupted(ending.status)
-            if is_without_memory(refused):
-                _refuse("not enough memory")
+            if isinstance(refused, BrokenPipeError):  # the reader of standard output has closed it, as `head` does
+                sys.stderr.close()
+                sys.exit(0)
+            if (reason := refusal(refused)) is not None:
+                _refuse(reason)
             # Bad usage is recognised by this method: its class has moved between versions of typer.
             if not hasattr(refused, "format_message"):
                 _fault(refused)
@@ -157,84 +151,3 @@ def options(
     ] = False,
 ) -> None:
     """Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor."""
-
-
-# --- what a user sends after an internal fault (its imports would take time of every command) ------------------------
-
-
-def write_fault_report(error: BaseException, arguments: Sequence[str]) -> Path | None:
-    """Write `tendonfmu-error-YYYYMMDD-HHMMSS.txt` and return its path, or None if no folder is writable."""
-    # It is written whole or not at all, and never replaces another file.
-    import tempfile
-
-    text = _report(error, arguments)
-    for folder in (".", None):
-        try:
-            return _written(Path(folder or tempfile.gettempdir()), text)
-        except (OSError, InputError):
-            continue
-    return None
-
-
-def is_own_file(path: object) -> bool:
-    """Tell whether the path of an OSError lies within the installed package."""
-    return isinstance(path, str) and Path(path).is_absolute() and Path(__file__).parent.parent in Path(path).parents
-
-
-def is_without_memory(error: BaseException) -> bool:
-    """Tell whether memory ran out, in Python or as a library was loaded, which the loader says in words alone."""
-    return isinstance(error, MemoryError) or (
-        isinstance(error, ImportError)
-        and any(words in str(error) for words in ("failed to map segment", "Cannot allocate"))
-    )
-
-
-def _written(folder: Path, text: str) -> Path:
-    """Write the text under the first free name of this second. Raises OSError or InputError."""
-    from datetime import datetime
-
-    from tendonfmu.files import whole_file
-
-    stem = datetime.now().strftime("tendonfmu-error-%Y%m%d-%H%M%S")
-    for number in itertools.count(1):
-        file = folder / (f"{stem}.txt" if number == 1 else f"{stem}-{number}.txt")
-        try:
-            file.touch(exist_ok=False)  # reserves the name
-            break
-        except FileExistsError:
-            continue
-    try:
-        with whole_file(file) as temporary:
-            temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
-    except BaseException:
-        file.unlink(missing_ok=True)
-        raise
-    return file
-
-
-def _report(error: BaseException, arguments: Sequence[str]) -> str:
-    import platform
-    import shlex
-    import traceback
-    from datetime import datetime
-
-    lines = [
-        "An internal error of tendonfmu. Please send this file to its developers; it holds no measured data.",
-        "",
-        f"command:  {shlex.join(['tendonfmu', *arguments])}",
-        f"time:     {datetime.now().astimezone().isoformat(timespec='seconds')}",
-        f"platform: {platform.platform()}, {platform.machine()}",
-        f"python:   {sys.version.split()[0]} ({platform.python_implementation()})",
-        *(f"{name}: {_version(name)}" for name in ("tendonfmu", *_PACKAGES)),
-        "",
-    ]
-    return "\n".join(lines) + "\n" + "".join(traceback.format_exception(error))
-
-
-def _version(package: str) -> str:
-    from importlib.metadata import PackageNotFoundError, version  # 10 ms of every command
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"

@@ -271,7 +271,8 @@ def read_subject(source: FingerSource) -> Subject:
     except KeyError:
         raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`") from None
     try:
-        return Subject(model, Finger(model, text, json.loads(text), native.image_from_json(text)), packed=True)
+        native.image_from_json(text)
+        return Subject(model, Finger(model, json.loads(text)), packed=True)
     except ValueError as refused:
         raise InputError(f"{model}: resources/finger.json: {refused}") from None
 

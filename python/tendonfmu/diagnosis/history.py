@@ -15,7 +15,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from itertools import pairwise
@@ -36,7 +36,16 @@ from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
-from tendonfmu.tasks import Job, Phases, rows_of, run_jobs
+from tendonfmu.tasks import (
+    Job,
+    Phases,
+    fault_words,
+    refuse_if_all_failed,
+    row_file,
+    rows_of,
+    run_jobs,
+    version_here,
+)
 
 File = str | os.PathLike[str]
 
@@ -99,7 +108,7 @@ def diagnose_history(
 ) -> History:
     """Diagnose each recording against the reference and follow every cause over all of them.
 
-    A call with the same `rows` continues where an earlier one stopped.
+    A call with the same `rows` continues where an earlier one stopped, and tries again what failed.
 
     Parameters
     ----------
@@ -130,7 +139,8 @@ def diagnose_history(
     Raises
     ------
     InputError
-        If a file or an option is at fault, or if there is nothing to compare with the reference.
+        If a file or an option is at fault, if there is nothing to compare with the reference, or if no recording could
+        be diagnosed.
     """
     given = read_finger(finger)
     files = [str(recording) for recording in recordings]
@@ -138,7 +148,7 @@ def diagnose_history(
     later = files if reference else files[1:]
     if not later:
         raise InputError("history: one recording; expected two at least, or a reference")
-    options = (str(given.path), before, kinematics, least_gain, seed)
+    options = (given, before, kinematics, least_gain, seed)
     names = _names(later, options)
     first = [Job(f"{name}.causes", (*options, file)) for name, file in zip(names, later, strict=True)]
     total = 2 * len(later)
@@ -154,11 +164,19 @@ def diagnose_history(
     run_jobs(sizes_in, second, rows, client, progress=lambda done, _: progress(total - len(second) + done, total))
     of = dict(zip((job.arguments[-2] for job in second), rows_of(second, rows), strict=True))
     sizes = [of.get(file, {}) for file in later]
-    return _history(given.name, before, later, causes, sizes)
+    ends = [size if size.get("error") else cause for cause, size in zip(causes, sizes, strict=True)]
+    refuse_if_all_failed(ends, f"{given.path}: no recording could be diagnosed")
+    failed = {
+        job.arguments[5]: fault_words(row, row_file(rows, job.name))
+        for jobs in (first, second)
+        for job, row in zip(jobs, rows_of(jobs, rows), strict=True)
+        if row.get("error")
+    }
+    return _history(given.name, before, later, causes, sizes, failed)
 
 
 def named_in(
-    finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str
+    finger: Finger, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str
 ) -> dict[str, Any]:
     """Return a row: what has changed in one recording."""
     diagnosis = diagnose(
@@ -175,7 +193,7 @@ def named_in(
 
 
 def sizes_in(
-    finger: str, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
+    finger: Finger, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
 ) -> dict[str, Any]:
     """Return a row: the sizes of these effects at these places in one recording, all of them free."""
     given = read_input(finger, [recording], [], reference, kinematics, least_gain, True)
@@ -219,15 +237,9 @@ def _history(
     recordings: Sequence[str],
     causes: Sequence[dict[str, Any]],
     sizes: Sequence[dict[str, Any]],
+    failed: Mapping[str, str],
 ) -> History:
-    failed = [
-        (recording, row["error"])
-        for recording, rows in zip(recordings, zip(causes, sizes, strict=True), strict=True)
-        for row in rows
-        if row.get("error")
-    ]
-    bad = {recording for recording, _ in failed}
-    kept = [k for k, recording in enumerate(recordings) if recording not in bad]
+    kept = [k for k, recording in enumerate(recordings) if recording not in failed]
     times, dated = times_of([*references, *(recordings[k] for k in kept)])
     times = times[len(references) :]
     if not dated:
@@ -247,7 +259,7 @@ def _history(
         dated=dated,
         lines=tuple(sorted((line for line in lines if line.sizes), key=_importance, reverse=True)),
         verdicts=tuple(str(causes[k]["verdict"]) for k in kept),
-        failed=tuple(dict(failed).items()),
+        failed=tuple(failed.items()),
     )
 
 
@@ -308,8 +320,8 @@ def _date(name: str) -> float | None:
 def _names(recordings: Sequence[str], options: Sequence[Any]) -> list[str]:
     """Return names of rows: number, stem, and a mark of all that the row depends on."""
     # If any of this differs, the row is computed again.
-    finger, references = str(options[0]), list(options[1])
-    shared = [*options, *(_stamp(file) for file in (finger, *references))]
+    finger, references, *others = options
+    shared = [version_here(), finger.data, references, *others, *(_stamp(file) for file in references)]
     return [
         f"{k:04d}_{Path(recording).stem}_{_mark([*shared, recording, _stamp(recording)])}"
         for k, recording in enumerate(recordings, start=1)

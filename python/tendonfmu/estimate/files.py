@@ -39,19 +39,20 @@ def check_outputs(output: Path, report: Path | None, figures: Path | None, input
 def check_given_once(training: Iterable[object], compared: Iterable[object], role: str = "compared with") -> None:
     """Check that no recording is given twice, as if it were two measurements, or trained on and compared with."""
     # Recordings in memory are not checked, since they may be pieces of one file.
-    seen: dict[Path, bool] = {}
+    seen: dict[Path, tuple[bool, str]] = {}
     for sources, trained in ((training, True), (compared, False)):
         for source in sources:
             if not isinstance(source, str | os.PathLike):
                 continue
-            file = Path(source).resolve()
+            file = Path(os.fspath(source)).resolve()
             same = next((other for other in seen if other == file or _same_bytes(other, file)), None)
             if same is not None:
-                what = "" if same == file else f", as {same.name}"
-                if seen[same] and not trained:
+                was_trained, name = seen[same]
+                what = "" if same == file else f", as {name}"
+                if was_trained and not trained:
                     raise InputError(f"{source}: {role}, but trained on as well{what}; expected another recording")
                 raise InputError(f"{source}: given twice{what}; expected each recording once")
-            seen[file] = trained
+            seen[file] = trained, Path(str(source)).name
 
 
 def _same_bytes(one: Path, other: Path) -> bool:

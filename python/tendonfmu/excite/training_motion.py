@@ -104,11 +104,11 @@ def read_subject(path: Path) -> Subject:
     if isinstance(finger, str):
         described = read_finger(path.parent / finger)
     else:
-        text = json.dumps(finger).encode()
         try:
-            described = Finger(path, text, finger, native.image_from_json(text))
+            native.image_from_json(json.dumps(finger).encode())
         except native.NativeError as refused:
             raise InputError(f"{path}: finger: {refused}") from None
+        described = Finger(path, finger)
     return Subject(described, _limits(path, data, len(described.joint_names)))
 
 

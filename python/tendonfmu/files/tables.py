@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, is_without_memory
+from tendonfmu.files.stand_in import path_of
 from tendonfmu.files.texts import are, counted
 from tendonfmu.files.writing import whole_file
 
@@ -57,13 +58,15 @@ def require_extra(module: str, what: str) -> Any:
 def read_table(path: str | os.PathLike[str], check_names: CheckNames, flags: Collection[str] = ()) -> Table:
     """Read all columns of a file as finite numbers."""
     # returns columns [N] in their order
-    file = path if isinstance(path, Path) else Path(path)  # a path of its own kind keeps its name in messages
+    file = path_of(path)  # a path of its own kind keeps its name in messages
     check_format(file)
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected a recording, .csv or .parquet")
     try:
         table = (_read_csv if file.suffix.lower() == ".csv" else _read_parquet)(file, check_names, flags)
     except OSError as error:
+        if is_without_memory(error):
+            raise
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from None
     check_finite(file, table)
     return table
@@ -163,12 +166,14 @@ def _read_parquet(file: Path, check_names: CheckNames, flags: Collection[str]) -
     import pyarrow.parquet as pq
 
     try:
-        with pq.ParquetFile(file) as parquet:
+        with pq.ParquetFile(file, pre_buffer=False) as parquet:  # without threads, which end the process without memory
             names = parquet.schema_arrow.names
             check_duplicates(file, names)
             wanted = check_names(file, names)
             names = names if wanted is None else list(wanted)
-            columns = parquet.read(columns=names).select(names).columns
+            columns = parquet.read(columns=names, use_threads=False).select(names).columns
+    except MemoryError:
+        raise
     except pa.ArrowException as error:
         raise InputError(f"{file}: not a whole Parquet file ({str(error).splitlines()[0]})") from None
     return {name: _numbers(file, name, column, flags) for name, column in zip(names, columns, strict=True)}

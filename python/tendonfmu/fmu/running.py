@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import FORMATS, counted
+from tendonfmu.files import FORMATS, counted, path_of
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
 from tendonfmu.model import (
     FLAGS,
@@ -93,7 +93,7 @@ def run_model(
     """Run a finger or an FMU over a recording."""
     # returns `time` [N], then the FMU's outputs by name, [N] or [N, k]
     if isinstance(model, str | os.PathLike):
-        file = model if isinstance(model, Path) else Path(model)
+        file = path_of(model)
         check_model(file)
         if file.suffix.lower() != ".json":
             columns = run_fmu(file, recording, kinematics_source=kinematics_source, progress=progress)

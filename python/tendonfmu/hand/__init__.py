@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .description import Hand, is_hand, read_hand
     from .outcome import HandOutcome, calibrate_hand, diagnose_hand
     from .parts import score_hand
-    from .recordings import split_recording
+    from .recordings import split_parts, split_recording
     from .report import SCORE_HEADINGS, PartRow, score_rows, shared_warnings
     from .running import HandRun, run_hand
 

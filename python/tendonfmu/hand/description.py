@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import Node, Refusal, counted, read_json, report_text
+from tendonfmu.files import Node, Refusal, counted, path_of, read_json, report_text
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import GROUP_PER, GROUPS, LABEL
 
@@ -144,7 +144,7 @@ def read_hand(source: Hand | str | os.PathLike[str]) -> Hand:
         return source
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"hand: {type(source).__name__}; expected the path of a hand (JSON), or a Hand")
-    path = source if isinstance(source, Path) else Path(source)
+    path = path_of(source)
     data = read_json(path, "a hand")
     try:
         root = Node(data)

@@ -11,27 +11,27 @@ import json
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tendonfmu.calibration import REPORT as CALIBRATION
 from tendonfmu.calibration import calibrate, write_calibration
 from tendonfmu.diagnosis import History, Names, diagnose, diagnose_history
-from tendonfmu.errors import InputError, InternalError
-from tendonfmu.files import whole_file
+from tendonfmu.errors import InputError
+from tendonfmu.files import whole_file, write_text
 from tendonfmu.hand.description import Hand, HandPart
-from tendonfmu.hand.recordings import split_recording
+from tendonfmu.hand.recordings import split_parts
 from tendonfmu.interface import ScoreResult, ScoreWarning, score
 from tendonfmu.options import CalibrateOptions, DiagnoseOptions, ScoreOptions
 from tendonfmu.recordings import LABEL
 from tendonfmu.report import REPORT as DIAGNOSIS
 from tendonfmu.report import write_diagnosis, write_history
-from tendonfmu.tasks import Job, rows_of, run_jobs
+from tendonfmu.tasks import Job, Row, failed_row, fault_words, refuse_if_all_failed, rows_of, run_jobs
 
 RECORDINGS = "recordings"  # folder of the split recordings
-REFUSALS = ("InputError", "OutputError", "NothingLeftError")
+FAULT = "tendonfmu-error.txt"  # in the folder of a part: what a user sends after an internal error
 Progress = Callable[[int, int], None]
 Split = Mapping[str, list[str]]  # files with the recordings of each part, by its name
 
@@ -46,26 +46,28 @@ class PartResult:
     history: History | None = None
 
 
-def split_files(hand: Hand, groups: Sequence[Sequence[Path]], folder: Path) -> list[Split]:
-    """Write the recordings of the parts into a folder; all files are checked before the first one is written."""
+def split_files(hand: Hand, groups: Sequence[Sequence[Path]], folder: Path) -> tuple[list[Split], dict[str, str]]:
+    """Write the recordings of the parts, if all files can be read. Return them, and why a part has none."""
+    failed: dict[str, str] = {}
     for file in itertools.chain(*groups):
-        split_recording(hand, file)
+        failed = split_parts(hand, file)[1] | failed
     taken: set[str] = set()
-    return [_split(hand, files, folder / RECORDINGS, taken) for files in groups]
+    return [_split(hand, files, folder / RECORDINGS, taken, failed) for files in groups], failed
 
 
-def _split(hand: Hand, files: Sequence[Path], folder: Path, taken: set[str]) -> Split:
+def _split(hand: Hand, files: Sequence[Path], folder: Path, taken: set[str], failed: Mapping[str, str]) -> Split:
     of_part: dict[str, list[str]] = {part.name: [] for part in hand.parts}
     for file in files:
         names = itertools.chain([file.stem], (f"{file.stem}_{k}" for k in itertools.count(2)))
         name = next(name for name in names if name not in taken)
         taken.add(name)
-        for part, recording in split_recording(hand, file).items():
+        recordings = split_parts(hand, file)[0]
+        for part in recordings.keys() - failed.keys():
             target = folder / part / f"{name}.parquet"
             target.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory() as scratch:
                 made = Path(scratch) / target.name
-                recording.write(made)
+                recordings[part].write(made)
                 # a file that is the same keeps its time, by which finished work is known
                 if not (target.is_file() and filecmp.cmp(made, target, shallow=False)):
                     with whole_file(target) as temporary:
@@ -80,14 +82,14 @@ def _split(hand: Hand, files: Sequence[Path], folder: Path, taken: set[str]) -> 
 def compute_parts(
     function: Callable[..., dict[str, Any]],
     hand: Hand,
-    split: Sequence[Split],
+    split: tuple[Sequence[Split], Mapping[str, str]],
     folder: Path,
     options: CalibrateOptions | DiagnoseOptions,
     client: Any,
     progress: Progress,
     previous: Hand | None = None,
 ) -> list[PartResult]:
-    """Call `calibrate_part` or `diagnose_part` for every part, in a folder of its own."""
+    """Call `calibrate_part` or `diagnose_part` for every part, in a folder of its own. split: of `split_files`."""
     before = {} if previous is None else {part.name: os.path.abspath(part.finger.path) for part in previous.parts}
     jobs = options.jobs if client is None else max(1, options.jobs // len(hand.parts))  # of each, if all run at once
     tasks = []
@@ -95,30 +97,44 @@ def compute_parts(
         if previous is not None and part.name not in before:
             raise InputError(f"{previous.path}: no finger {part.name}; expected the fingers of {hand.path}")
         given = vars(options) | {"kinematics": hand.kinematics(part, options.kinematics), "jobs": jobs}
-        files = [of_part[part.name] for of_part in split]
+        files = [of_part[part.name] for of_part in split[0]]
         own = os.path.abspath(folder / part.name)
         tasks.append(Job(part.name, (os.path.abspath(part.finger.path), files, before.get(part.name), given, own)))
+    tasks = [task for task in tasks if task.name not in split[1]]
     with tempfile.TemporaryDirectory() as rows:
         run_jobs(function, tasks, Path(rows), client, progress=progress)
-        done = rows_of(tasks, Path(rows))
-    return _some([_result(part, row, folder) for part, row in zip(hand.parts, done, strict=True)], hand)
+        done = {row["name"]: row for row in rows_of(tasks, Path(rows))} | _rows_of_split(split[1])
+    refuse_if_all_failed(_named(done.values()), f"{hand.path}: no finger could be done")
+    return [_result(part, done[part.name], folder) for part in hand.parts]
 
 
-def _result(part: HandPart, row: Mapping[str, Any], folder: Path) -> PartResult:
-    """Read the report of a part. Raises InternalError if it failed for a fault of tendonfmu."""
-    if not row["error"]:
-        return PartResult(part, json.loads((folder / part.name / row["report"]).read_text(encoding="utf-8")))
-    kind, _, reason = row["error"].partition(": ")
-    if kind not in REFUSALS:
-        raise InternalError(f"{part.name}: {row['error']}")
-    return PartResult(part, None, reason.replace(f"{os.path.abspath(folder)}{os.sep}", ""))
+def _rows_of_split(failed: Mapping[str, str]) -> dict[str, Row]:
+    """Return the rows of parts that have no recordings."""
+    return {name: {"name": name, "error": reason, "fault": ""} for name, reason in failed.items()}
 
 
-def _some(results: list[PartResult], hand: Hand) -> list[PartResult]:
-    """Refuse results of which every one failed."""
-    if all(result.report is None for result in results):
-        raise InputError(f"{hand.path}: no finger could be done; {results[0].part.name}: {results[0].reason}")
-    return results
+def _named(rows: Iterable[Row]) -> list[Row]:
+    """Return rows whose errors begin with the name of the part."""
+    return [row | {"error": f"{row['name']}: {row['error']}"} if row["error"] else row for row in rows]
+
+
+def _result(part: HandPart, row: Row, folder: Path) -> PartResult:
+    """Read the report of a part, or say why it has none."""
+    (folder / part.name / FAULT).unlink(missing_ok=True)
+    if row["error"]:
+        return PartResult(
+            part, None, _reason(row, folder / part.name / FAULT).replace(f"{folder.absolute()}{os.sep}", "")
+        )
+    report = (folder / part.name / row["report"]).read_text(encoding="utf-8") if "report" in row else "{}"
+    return PartResult(part, json.loads(report))
+
+
+def _reason(row: Row, report: Path) -> str:
+    """Return why a part failed. If tendonfmu is at fault, write what is to be sent."""
+    if row["fault"]:
+        report.parent.mkdir(parents=True, exist_ok=True)
+        write_text(report, row["fault"])
+    return fault_words(row, report)
 
 
 def calibrate_part(
@@ -143,26 +159,30 @@ def diagnose_part(
 
 
 def follow_parts(
-    hand: Hand, split: Sequence[Split], folder: Path, options: DiagnoseOptions, client: Any, progress: Progress
+    hand: Hand,
+    split: tuple[Sequence[Split], Mapping[str, str]],
+    folder: Path,
+    options: DiagnoseOptions,
+    client: Any,
+    progress: Progress,
 ) -> list[PartResult]:
-    """Follow the changes of every part (`diagnose --history`). split: recordings, tests, references."""
-    results = []
+    """Follow the changes of every part (`diagnose --history`). split: of recordings, tests, references."""
+    rows, histories = _rows_of_split(split[1]), dict[str, History]()
     for k, part in enumerate(hand.parts):
         given = vars(options) | {"kinematics": hand.kinematics(part, options.kinematics)}
         given.pop("jobs")
-        now, _, reference = (of_part[part.name] for of_part in split)
+        now, _, reference = (of_part[part.name] for of_part in split[0])
         own = folder / part.name
         try:
-            history = diagnose_history(part.finger, now, reference, rows=own, client=client, **given)
-        except InputError as refused:
-            results.append(PartResult(part, None, str(refused)))
-        else:
-            failed = history.failed[0][1] if history.failed and not history.recordings else ""
-            results.append(PartResult(part, None if failed else {}, failed, history))
-            if not failed:
+            if part.name not in rows:
+                history = diagnose_history(part.finger, now, reference, rows=own, client=client, **given)
                 write_history(history, Names(tuple(part.finger.joint_names), tuple(part.finger.tendon_names)), own)
+                histories[part.name], rows[part.name] = history, {"name": part.name, "error": ""}
+        except Exception as failed:  # the others continue; the row reports the error
+            rows[part.name] = failed_row(part.name, failed)
         progress(k + 1, len(hand.parts))
-    return _some(results, hand)
+    refuse_if_all_failed(_named(rows.values()), f"{hand.path}: no finger could be done")
+    return [replace(_result(part, rows[part.name], folder), history=histories.get(part.name)) for part in hand.parts]
 
 
 # --- score ------------------------------------------------------------------------------------------------------------
@@ -173,17 +193,18 @@ def score_hand(
 ) -> tuple[dict[str, ScoreResult], dict[str, str]]:
     """Score every part over recordings of the hand. Returns scores, and the reasons of parts that failed, by name."""
     others = [name for name in (options.labels, options.force) if name not in (None, LABEL)]
-    split = [split_recording(hand, file, others) for file in files]
-    scores, failed = {}, {}
+    split = [split_parts(hand, file, others) for file in files]
+    scores, rows = {}, _rows_of_split({name: why for _, failed in split for name, why in failed.items()})
     for k, part in enumerate(hand.parts):
         given = vars(options) | {"kinematics": hand.kinematics(part, options.kinematics)}
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ScoreWarning)  # in the result
-                scores[part.name] = score(part.finger, [recordings[part.name] for recordings in split], **given)
-        except InputError as refused:
-            failed[part.name] = str(refused)
+            if part.name not in rows:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", ScoreWarning)  # in the result
+                    scores[part.name] = score(part.finger, [recordings[part.name] for recordings, _ in split], **given)
+        except Exception as failed:  # the others continue
+            rows[part.name] = failed_row(part.name, failed)
         progress(k + 1, len(hand.parts))
     if not scores:
-        raise InputError(f"{hand.path}: no finger could be done; {next(iter(failed.values()))}")
-    return scores, failed
+        refuse_if_all_failed(_named(rows.values()), f"{hand.path}: no finger could be done")
+    return scores, {name: _reason(row, Path(f"tendonfmu-error-{name}.txt")) for name, row in rows.items()}

@@ -14,7 +14,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InputWarning
-from tendonfmu.files import Table, counted, is_frame, read_table, table_of_frame
+from tendonfmu.files import Table, counted, is_frame, path_of, read_table, table_of_frame
 from tendonfmu.fmu import run_model
 from tendonfmu.hand.description import POSITIONS, WRIST, Hand, HandPart
 from tendonfmu.model import moment_arms, tendon_positions
@@ -54,14 +54,28 @@ def split_recording(hand: Hand, source: HandRecording, others: Collection[str] =
     InputWarning
         Columns are ignored.
     """
-    file, table = _table(hand, source, others)
-    recordings = {part.name: _recording(file, table, part, hand.shared_joints(part), others) for part in hand.parts}
-    if hand.wrist is None:
-        return recordings
-    shared = _wrist_motion(file, table, hand, recordings.get(WRIST))
-    for part in hand.fingers:
-        recordings[part.name] = _with_wrist(hand, part, recordings[part.name], table, shared)
+    recordings, failed = split_parts(hand, source, others)
+    for reason in failed.values():
+        raise InputError(reason)
     return recordings
+
+
+def split_parts(
+    hand: Hand, source: HandRecording, others: Collection[str] = ()
+) -> tuple[dict[str, Recording], dict[str, str]]:
+    """Split a recording, and say why parts have none, by the names of the parts. Nothing is there without the wrist."""
+    file, table = _table(hand, source, others)
+    own = hand.wrist.part if hand.wrist else None
+    wrist = None if own is None else _recording(file, table, own, 0, others)
+    shared = _wrist_motion(file, table, hand, wrist) if hand.wrist else None
+    recordings, failed = dict[str, Recording](), dict[str, str]()
+    for part in hand.fingers:
+        try:
+            recording = _recording(file, table, part, hand.wrist_joints, others)
+            recordings[part.name] = recording if shared is None else _with_wrist(hand, part, recording, table, shared)
+        except InputError as refused:
+            failed[part.name] = str(refused)
+    return recordings | ({} if wrist is None else {WRIST: wrist}), failed
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -74,7 +88,7 @@ def _table(hand: Hand, source: HandRecording, others: Collection[str]) -> tuple[
         return Path("DataFrame"), table_of_frame(Path("DataFrame"), source, check, flags=flags)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"recording: {type(source).__name__}; expected a path or a DataFrame of the whole hand")
-    file = source if isinstance(source, Path) else Path(source)
+    file = path_of(source)
     return file, read_table(file, check, flags=flags)
 
 

@@ -26,7 +26,7 @@ from tendonfmu.fmu import (
     xml_text,
 )
 from tendonfmu.hand.description import WRIST, Hand, HandPart
-from tendonfmu.hand.recordings import HandRecording, split_recording
+from tendonfmu.hand.recordings import HandRecording, split_parts
 
 START_VALUES = "resources/start_values.ssv"
 TENDONS = ("tendon_force", "tendon_position")
@@ -121,7 +121,7 @@ def _start_values(hand: Hand, start: HandRecording | None) -> dict[str, float | 
     """Return the inputs at the first sample, and the kinematics source of fingers with a shared wrist."""
     values: dict[str, float | int] = {f"{part.name}.{KINEMATICS}": 2 for part in hand.parts if hand.shared_joints(part)}
     if start is not None:
-        for name, recording in split_recording(hand, start).items():
+        for name, recording in split_parts(hand, start)[0].items():
             part = next(part for part in hand.parts if part.name == name)
             for column, _ in _inputs(hand, part):
                 values[f"{name}.{column}"] = float(recording[column][0])

@@ -12,7 +12,7 @@ from typing import Any
 
 from tendonfmu.calibration import Calibration, calibration_page, write_calibration
 from tendonfmu.calibration import calibrate as run
-from tendonfmu.files import write_text
+from tendonfmu.files import StandIn, write_text
 from tendonfmu.model import Finger, FingerSource, description_text, finger_from_data, read_finger
 from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings import RecordingSource, listed_sources, read_recordings
@@ -120,8 +120,9 @@ def calibrate(
     """
     options = CalibrateOptions.of(locals())
     with tempfile.TemporaryDirectory() as scratch:
-        given = Path(scratch) / "finger.json"
-        write_text(given, description_text(read_finger(finger).to_dict()))
+        described = read_finger(finger)
+        given = StandIn.of(Path(scratch) / "finger.json", str(described.path))
+        write_text(given, description_text(described.to_dict()))
         groups = [
             _files(Path(scratch) / name, sources)
             for name, sources in (("free", free), ("test", test), ("pushes", pushes))
@@ -154,5 +155,5 @@ def _files(folder: Path, sources: RecordingSource | Sequence[RecordingSource] | 
             file = file.with_name(f"{file.stem}_.parquet")
         folder.mkdir(exist_ok=True)
         recording.write(file)
-        files.append(file)
+        files.append(StandIn.of(file, str(recording.path)))
     return files

@@ -11,6 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from tendonfmu.files import StandIn
 from tendonfmu.model import Finding, Finger, FingerSource, description_findings, read_finger
 from tendonfmu.recordings import Recording, RecordingSource, belongs, convert_table, listed_sources, read_recordings
 
@@ -89,7 +90,7 @@ def convert(log: str | os.PathLike[str], map: Mapping[str, Any] | str | os.PathL
         The log or the map does not allow it.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        file = Path(scratch) / "map.json" if isinstance(map, Mapping) else Path(map)
+        file = StandIn.of(Path(scratch) / "map.json", "map") if isinstance(map, Mapping) else Path(map)
         if isinstance(map, Mapping):
             file.write_text(json.dumps(map), encoding="utf-8")
         columns = convert_table(Path(log), file).columns

@@ -12,11 +12,12 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import counted, write_text
+from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
 from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
 from tendonfmu.model.routing_svg import finger_html
@@ -43,18 +44,28 @@ class Finger:
     ----------
     path
         The file that it was read from; `finger` if there is none.
-    text
-        Content of the file.
     data
         The parsed JSON, not to be changed.
-    image
-        The model image made from it.
     """
 
     path: Path = field(compare=False)
-    text: bytes = field(compare=False)
-    data: Mapping[str, Any] = field(hash=False)
-    image: bytes
+    data: Mapping[str, Any]
+
+    def __hash__(self) -> int:
+        return hash(self.image)
+
+    @cached_property
+    def text(self) -> bytes:
+        """Content of the file, or the description as `write` writes it."""
+        return description_text(self.data).encode()
+
+    @cached_property
+    def image(self) -> bytes:
+        """The model image made from the description."""
+        try:
+            return native.image_from_json(self.text)
+        except native.NativeError as refused:
+            raise InputError(f"{self.path}: {refused}") from None
 
     def __repr__(self) -> str:
         return f"<Finger {self.name}: {counted(self.joints, 'joint')}, {counted(self.tendons, 'tendon')}>"
@@ -238,7 +249,7 @@ def finger_file(source: object) -> Path:
         raise InputError(
             f"finger: {'a text' if source.strip() else repr(source)}; {expected}, such as json.loads(text)"
         )
-    return source if isinstance(source, Path) else Path(source)
+    return path_of(source)
 
 
 def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
@@ -253,7 +264,9 @@ def finger_from_text(path: Path, text: bytes) -> Finger:
         image = native.image_from_json(text)
     except native.NativeError as refused:
         raise InputError(f"{path}: {refused}") from None
-    return Finger(path=path, text=text, data=json.loads(text), image=image)
+    finger = Finger(path, json.loads(text))
+    vars(finger).update(text=text, image=image)  # `replace` makes a finger without them
+    return finger
 
 
 def description_text(data: Mapping[str, Any]) -> str:

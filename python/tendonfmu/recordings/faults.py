@@ -5,7 +5,7 @@ This module does not use a friction model. The values that a channel is compared
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ SETTLING = 1.0  # s after a stuck sensor, until the velocity filter has forgotte
 SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events need the first, none needs the second
 # m, rad, rad; a channel is stuck only if it should have moved by more
 _MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}
+FEWEST_LEARNED = 100  # samples of motion for each channel that a value is learned from
 _FORCE_SHARE = 0.1  # of a tendon's mean force; a force is stuck only if the others change by more
 _OF_RANGE = 0.05  # of the range in the whole recording; a channel is stuck only if it should have moved by more
 
@@ -126,9 +127,9 @@ def stuck_sensors(recording: Recording, finger: Finger) -> dict[str, list[StuckS
         if name == "tendon_force":
             sensors = list(_stuck_force(recording.groups["tendon_force"], k, runs))
         else:
-            expected = expected_values(recording, finger, name, k)
-            if expected is not None:
-                sensors = list(_stuck(name, recording.groups[name], k, expected, runs))
+            expected = [expected_values(recording, finger, name, k), _learned_values(recording, name, k, runs)]
+            if expected[0] is not None:
+                sensors = list(_stuck(name, recording.groups[name], k, [of for of in expected if of is not None], runs))
         if sensors:
             stuck[f"{name}[{k + 1}]"] = sensors
     return stuck
@@ -145,6 +146,27 @@ def expected_values(recording: Recording, finger: Finger, group: str, k: int) ->
         return np.asarray(angle[:, k])
     step = np.diff(recording.time, prepend=recording.time[0])
     return np.asarray(groups.get("joint_position", angle)[:, k] - np.cumsum(groups[group][:, k] * step))
+
+
+def _learned_values(recording: Recording, group: str, k: int, runs: Runs) -> Numbers | None:
+    """Return the same [N] as the motion outside `runs` teaches it, whatever is described; None if it is too little."""
+    if group == "joint_velocity":
+        return None
+    moving = np.ones(len(recording), dtype=bool)
+    for begin, end in runs:
+        moving[begin:end] = False
+    rows = np.flatnonzero(moving)
+    others = [
+        np.delete(recording.groups[name], k, axis=1) if name == group else recording.groups[name]
+        for name in ("tendon_position", "tendon_force", "joint_position")
+        if name in recording.groups
+    ]
+    known = np.column_stack([*others, np.ones(len(recording))])
+    if len(rows) < FEWEST_LEARNED * known.shape[1]:
+        return None
+    known /= np.maximum(np.abs(known).max(axis=0), 1e-12)
+    weights = np.linalg.lstsq(known[rows], recording.groups[group][rows, k], rcond=1e-9)[0]
+    return np.asarray(known @ weights)
 
 
 def tendon_angles(recording: Recording, finger: Finger) -> Numbers:
@@ -189,11 +211,11 @@ def _position_by_others(groups: Mapping[str, Numbers], arms: Numbers, stretch: N
     return np.asarray(angle @ arms[i] + stretch[:, i])
 
 
-def _stuck(group: str, values: Numbers, k: int, expected: Numbers, runs: Runs) -> Iterator[StuckSensor]:
-    """Yield the runs during which the expected values [N] change."""
-    enough = max(_MOVES[group], _OF_RANGE * float(np.ptp(expected)))
+def _stuck(group: str, values: Numbers, k: int, expected: Sequence[Numbers], runs: Runs) -> Iterator[StuckSensor]:
+    """Yield the runs during which all expected values [N] change."""
+    enough = [max(_MOVES[group], _OF_RANGE * float(np.ptp(of))) for of in expected]
     for begin, end in runs:
-        if np.ptp(expected[begin:end]) > enough:
+        if all(np.ptp(of[begin:end]) > least for of, least in zip(expected, enough, strict=True)):
             yield StuckSensor(group, k + 1, float(values[begin, k]), begin, end)
 
 

@@ -59,6 +59,7 @@ SLACK = 0.01  # of the largest force of a tendon; below, it is slack and does no
 OPPOSED = 0.5  # the sum of torque and reference leaves less than this share of what the difference leaves
 SAME_RATIO = 1.1  # between the ratios of all springs and that of a unit
 LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
+MISLEADS = 5e-3  # rad; numbers that give an angle nearer to the measured one are as good as those of this recording
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
@@ -181,7 +182,7 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         done, left = repairs(balance)
         learned = [] if done else _routing(finger, recording)
         moved = routed(finger, learned)[1]
-        off = [each for each in learned if each.varying or (moved and each.differs)]
+        off = [each for each in learned if each.varying or (moved and _misleads(finger, recording, each))]
         if moved or (off and left > UNFIT):
             severity = "error" if left > unfit else "warning"
             return [text.routing(recording.path, finger, each, severity) for each in off], recording
@@ -216,6 +217,18 @@ def _routing(finger: Finger, recording: Recording) -> list[TendonRouting]:
         replace(each, zero=replace(each.zero, is_known=False)) if pushes[each.tendon] else each
         for each in learn_routing(finger, [recording])
     ]
+
+
+def _misleads(finger: Finger, recording: Recording, learned: TendonRouting) -> bool:
+    """Return whether the described numbers of a tendon, together, give another angle in the recorded motion."""
+    force, arms = recording.groups["tendon_force"][:, learned.tendon], np.zeros(finger.joints)
+    for j, arm in learned.arms.items():
+        arms[j] = arm.described - arm.value if arm.differs else 0.0
+    angles = recording.groups.get("joint_position", tendon_angles(recording, finger))
+    stretch = 1.0 / learned.stiffness.described - 1.0 / learned.stiffness.value if learned.stiffness.differs else 0.0
+    zero = learned.zero.described - learned.zero.value if learned.zero.differs else 0.0
+    off = np.sqrt(np.mean((angles @ arms + force * stretch + zero) ** 2))
+    return bool(off > MISLEADS * np.abs(finger.moment_arms[learned.tendon]).max())
 
 
 def _unit_of_forces(learned: Sequence[TendonRouting]) -> tuple[float, str] | None:

@@ -167,7 +167,9 @@ def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -
         path,
         (f"tendon_position[{learned.tendon + 1}]",),
         seen,
-        "numbers of the description that nobody measured" if learned.differs else "a pulley that is not round",
+        "numbers of the description that nobody measured, or that have changed"
+        if learned.differs
+        else "a pulley that is not round",
         write,
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import Table, counted, frame_of, is_frame, read_table, table_of_frame, write_table
+from tendonfmu.files import Table, counted, frame_of, is_frame, path_of, read_table, table_of_frame, write_table
 from tendonfmu.recordings.columns import GROUP_PER as GROUP_PER
 from tendonfmu.recordings.columns import GROUPS as GROUPS
 from tendonfmu.recordings.columns import LABEL as LABEL
@@ -325,7 +325,7 @@ def read_recording(source: RecordingSource, *, label: str = LABEL, others: Colle
         return Recording.from_frame(source, label=label, others=others)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"recording: {_type_of(source)}")
-    file = source if isinstance(source, Path) else Path(source)
+    file = path_of(source)
     table = read_table(file, partial(read_columns, known={LABEL, label, *others}), flags=(LABEL, label))
     return _of_table(file, table, label, others)
 

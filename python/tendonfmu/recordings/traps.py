@@ -28,14 +28,15 @@ MADE_UP = 0.5  # of the samples; more straight lines are signals that are made u
 SAME = 0.02  # relative, between the jumps and the word
 STRAIGHT, LONGEST_STRAIGHT = 1e-6, 0.1  # of the range, second differences of a line; s
 FEWEST = 8  # samples of a line
+FINEST = 0.05  # of the steps of a sensor: its resolution, or slow motion
 FAST, REPEATED = 5.0, 0.04  # steps of the sensor, of a motion that no repeat belongs in; of its samples
 REGULAR, FEWEST_CHANGES, LONG = 0.9, 50, 1000  # of the changes; changes that are needed; samples of a rest
 WINDOWS = 24  # over which units are compared
 OFF = 0.25  # of the logarithm of a unit, by which the change of scale differs from it
 STEADY = 0.25  # of the change, by which a part may vary
 RESTING, TINY = 1e-6, 1e-30  # of the fastest part: less is rest
-FAR = 3.0  # usual steps of the faster part, beyond which a value jumps
-LEAST_CHANGE = 1.5  # of a logarithm
+FAR, NEIGHBOURS = 3.0, 20  # largest steps among so many samples before and after, beyond which a value jumps
+ROUNDING = 0.01  # of a value, by the digits of a log
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,8 @@ def _repeats(values: Numbers) -> float:
     step = np.abs(np.diff(values, axis=0))
     if len(step) < 3 * FEWEST or not step.any():
         return 0.0
-    finest = np.array([value_step(column) or 0.0 for column in values.T])
+    # encoders repeat a value while they move by less than a step; rounding may have made the steps unequal
+    finest = np.array([np.quantile(of[of > 0.0], FINEST) if of.any() else 0.0 for of in step.T])
     moves = np.asarray(step.any(axis=1))
     fast = np.asarray((step > FAST * finest).any(axis=1)) & moves
     between = ~moves[1:-1] & fast[:-2] & fast[2:]
@@ -190,22 +192,29 @@ def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
             others = np.column_stack([each for other, each in sizes.items() if other != name] or [size * 0.0])
             relative = size[:, k] - np.median(others - others.mean(axis=0), axis=1)
             split = min(
-                range(2, WINDOWS - 1), key=lambda at: relative[:at].var() * at + relative[at:].var() * (WINDOWS - at)
+                range(3, WINDOWS - 2), key=lambda at: relative[:at].var() * at + relative[at:].var() * (WINDOWS - at)
             )
             change = float(np.median(relative[split:]) - np.median(relative[:split]))
             spread = max(relative[: split - 1].std(), relative[split + 1 :].std())
             near = slice(max(parts[split][0] - len(parts[0]), 0), parts[split][-1] + len(parts[0]))
-            begin, usual = float(time[parts[split][0]]), float(np.exp(size[:, k].max()))
+            begin = float(time[parts[split][0]])
             for factor, unit in UNITS[name] if spread < STEADY * abs(change) else ():
                 turned = factor if (change > 0.0) == (factor > 1.0) else 1.0 / factor
-                is_near = abs(change / np.log(turned) - 1.0) < OFF and abs(change) > LEAST_CHANGE
-                if is_near and _jumps_by(groups[name][near, k], turned, usual):
+                is_near = abs(change / np.log(turned) - 1.0) < OFF
+                if is_near and _jumps_by(groups[name][near, k], turned):
                     yield Trap("switched", (f"{name}[{k + 1}]",), float(np.exp(change)), begin, unit)
                     break
 
 
-def _jumps_by(column: Numbers, factor: float, step: float) -> bool:
-    """Return whether a value is followed by so many times itself, further away than usual steps reach."""
+def _jumps_by(column: Numbers, factor: float) -> bool:
+    """Return whether a value is followed by so many times itself, within a step, and by what no step reaches."""
     before, after = column[:-1], column[1:]
-    is_multiple = np.abs(after - factor * before) < np.maximum(0.1 * np.abs(after), 0.01 * np.abs(before))
-    return bool((is_multiple & (np.abs(after - before) > FAR * step)).any())
+    for k in np.flatnonzero(np.abs(after - factor * before) < np.abs(after - before) / FAR):
+        near = column[max(k - NEIGHBOURS, 0) : k + 1], column[k + 1 : k + 2 + NEIGHBOURS]
+        step = max(float(np.abs(np.diff(side)).max(initial=0.0)) for side in near)
+        if (
+            abs(after[k] - factor * before[k]) <= step + ROUNDING * abs(after[k])
+            and step < abs(after[k] - before[k]) / FAR
+        ):
+            return True
+    return False

@@ -223,12 +223,11 @@ def _finger(node: Node, path: Path, files: list[Path]) -> Finger:
         return read_finger(file)
     if not isinstance(node.value, dict):
         node.refuse("a finger description, or the path of one relative to this file")
-    text = json.dumps(node.value).encode()
     try:
-        image = native.image_from_json(text)
+        native.image_from_json(json.dumps(node.value).encode())
     except native.NativeError as refused:
         raise Refusal(f"finger: {refused}") from None
-    return Finger(path=path, text=text, data=node.value, image=image)
+    return Finger(path, node.value)
 
 
 def _links(physics: Node, joints: int) -> tuple[list[Segment], Joints]:

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .jobs import Job, rows_of, run_jobs, workers_of
+    from .jobs import (
+        Job,
+        Row,
+        failed_row,
+        fault_words,
+        refuse_if_all_failed,
+        row_file,
+        rows_of,
+        run_jobs,
+        version_here,
+        workers_of,
+    )
     from .phases import Phases, PhaseState, Step, ended_by_signals, uninterrupted
     from .steps import FOLDER, Steps, digest_of, digest_of_file, forget_steps
 

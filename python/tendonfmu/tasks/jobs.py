@@ -6,13 +6,15 @@
     rows = rows_of(jobs, Path("history"))
 
 The row of a job, its result, is DIR/rows/NAME.json. It is written whole as soon as the job ends. A job with a row is
-not run again. The calling process writes the rows, so workers need no shared disk for them.
+not run again unless it failed: its `error` is the line for the user, and `fault` the report if tendonfmu is at fault.
+The calling process writes the rows, so workers need no shared disk for them.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,7 +25,8 @@ from typing import Any
 import numpy as np
 
 import tendonfmu
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, InternalError, refusal
+from tendonfmu.fault_report import fault_report
 from tendonfmu.files import check_output_folder, whole_file
 
 ROWS = "rows"
@@ -41,13 +44,14 @@ class Job:
     arguments: tuple[Any, ...] = ()  # arguments of the function; they are pickled
 
 
-def _row_file(folder: Path, name: str) -> Path:
+def row_file(folder: Path, name: str) -> Path:
+    """Return the file of a job's row."""
     return folder / ROWS / f"{name}.json"
 
 
 def _read_row(folder: Path, name: str) -> Row | None:
     """Return the row of a job, or None if the job has not ended."""
-    file = _row_file(folder, name)
+    file = row_file(folder, name)
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else None
 
 
@@ -57,10 +61,10 @@ def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
     return [row for row in rows if row is not None]
 
 
-def waiting_jobs(jobs: Sequence[Job], folder: Path, failed_again: bool = False) -> list[Job]:
+def waiting_jobs(jobs: Sequence[Job], folder: Path, keep_failed: bool = False) -> list[Job]:
     """Return the jobs that have to run."""
     rows = [_read_row(folder, job.name) for job in jobs]
-    return [job for job, row in zip(jobs, rows, strict=True) if row is None or (failed_again and row.get("error"))]
+    return [job for job, row in zip(jobs, rows, strict=True) if row is None or (row.get("error") and not keep_failed)]
 
 
 def run_jobs(
@@ -70,20 +74,20 @@ def run_jobs(
     client: Any = None,
     *,
     stop_after: float = math.inf,
-    failed_again: bool = False,
+    keep_failed: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Call the function for each job without a row, and write its row when it ends."""
+    """Call the function for each job without a row, or whose row failed, and write its row when it ends."""
     # stop_after: (s)
     _check_names(jobs)
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
-    waiting = waiting_jobs(jobs, folder, failed_again)
+    waiting = waiting_jobs(jobs, folder, keep_failed)
     done = len(jobs) - len(waiting)
     progress(done, len(jobs))
     count = 0
     for row in _rows(function, waiting, client, time.monotonic() + stop_after):
-        with whole_file(_row_file(folder, row["name"])) as file:
+        with whole_file(row_file(folder, row["name"])) as file:
             file.write_text(_json(row) + "\n", encoding="utf-8")
         count += 1
         progress(done + count, len(jobs))
@@ -109,18 +113,37 @@ def _json(row: Row) -> str:
     return json.dumps(plain, indent=1, allow_nan=False)
 
 
-def _failed_row(name: str, failed: BaseException) -> Row:
-    return {"name": name, "error": f"{type(failed).__name__}: {' '.join(str(failed).split())}"}
+def failed_row(name: str, failed: BaseException) -> Row:
+    """Return the row of a job that failed."""
+    words = f"{type(failed).__name__}: {' '.join(str(failed).split())}"
+    if (reason := refusal(failed)) is not None or type(failed).__module__.startswith("distributed"):
+        return {"name": name, "error": reason or words, "fault": ""}
+    return {"name": name, "error": words, "fault": fault_report(failed, sys.argv[1:])}
+
+
+def fault_words(row: Row, report: Path) -> str:
+    """Return the line for the user of a row whose job failed. report: file that holds its fault."""
+    if not row.get("fault"):
+        return str(row["error"])
+    kind = row["error"].partition(":")[0]
+    return f"internal error ({kind}), a fault of tendonfmu, not of its input; please send the report {report}"
+
+
+def refuse_if_all_failed(rows: Sequence[Row], what: str) -> None:
+    """Raise InputError if every job failed, or InternalError if tendonfmu is at fault for all of them."""
+    if all(row.get("error") for row in rows):
+        refused = next((row for row in rows if not row.get("fault")), None)
+        raise InternalError(rows[0]["fault"]) if refused is None else InputError(f"{what}; {refused['error']}")
 
 
 def call(function: Function, job: Job) -> Row:
     """Return the job's row. This runs where the job runs."""
     begin, begin_cpu = time.perf_counter(), time.process_time()
     try:
-        row = {"error": "", **function(*job.arguments), "name": job.name}
+        row = {"error": "", "fault": "", **function(*job.arguments), "name": job.name}
         _json(row)  # a value that is not allowed in a row is an error of the job
     except Exception as failed:  # the other jobs continue; the row reports the error
-        row = _failed_row(job.name, failed)
+        row = failed_row(job.name, failed)
     return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
 
 
@@ -171,7 +194,7 @@ def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], cli
 def _row_of(future: Any, job: Job) -> Row:
     """Return the row of a job, also for errors that `call` could not catch."""
     try:
-        return _failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
+        return failed_row(job.name, _first_of(future.exception())) if future.status == "error" else future.result()
     finally:
         future.release()  # otherwise dask computes it again when the worker that holds it dies
 

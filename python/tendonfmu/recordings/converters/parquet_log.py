@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tendonfmu.errors import InputError
+from tendonfmu.errors import InputError, is_without_memory
 from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import NUMBER, OTHER, ROWS, TEXT, TIME, Block, Field, Topic, as_numbers
 
@@ -56,8 +56,10 @@ def opened(file: Path) -> Any:
         raise cut_off(file, error) from None
 
 
-def cut_off(file: Path, error: Exception) -> InputError:
+def cut_off(file: Path, error: Exception) -> Exception:
     """Return the error of a file that cannot be read."""
+    if is_without_memory(error):
+        return error
     return InputError(
         f"{file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
         "nothing can be recovered: copy the file again, or write it again from its source"
