@@ -39,7 +39,7 @@ PACKAGES = (
 
 
 # the package itself, errors, and the compiled modules, each of which test_layering.py leaves to one file
-OF_ALL = {"", "arrays", "errors", "lazy_exports", "options", "_native", "_plant", "_estimation"}
+OF_ALL = {"", "arrays", "errors", "fault_report", "lazy_exports", "options", "_native", "_plant", "_estimation"}
 
 
 def package_of(module: Path) -> str:
