@@ -29,7 +29,6 @@ from tendonfmu.diagnosis.extension_fit import (
 )
 from tendonfmu.diagnosis.gain import OnlineError, measure_gain
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.model import native
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording

@@ -52,7 +52,8 @@ def compilers() -> list[str]:
 def exponentials(compiler: str, flags: str, folder: Path) -> str | None:
     """Return what the program prints; None where sources or program refuse the flags by name."""
     (folder / "print.c").write_text(PRINT_EXPONENTIALS)
-    command = [compiler, "-std=c11", "-O2", "-march=native", *flags.split(), f"-I{CORE}", "-o", "print", "print.c", "-lm"]
+    given = ["-std=c11", "-O2", "-march=native", *flags.split(), f"-I{CORE}"]
+    command = [compiler, *given, "-o", "print", "print.c", "-lm"]
     made = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if made.returncode:
         assert "TendonFMU cannot be compiled with -ffast-math or a part of it" in made.stderr, made.stderr

@@ -16,8 +16,8 @@ from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
 from tendonfmu.estimate.methods import Learned, learned_at
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, values_of
-from tendonfmu.model import Finger
-from tendonfmu.recordings import FitRecording, bias_settings
+from tendonfmu.model import Finger, number_of
+from tendonfmu.recordings import FitRecording
 
 CAUSES = {
     **CAUSES_OF_A_MOTION,
@@ -135,7 +135,7 @@ def with_known_numbers(finger: Finger, recordings: Sequence[FitRecording]) -> Fi
     structure = build_structure(finger, Choice())
     learned = learned_at(structure, recordings)
     numbers, matrix = number_slopes(structure, learned, finger)
-    noise = bias_settings(finger.data).noise
+    noise = number_of(finger.data, "bias.noise_std")
     return with_estimates(finger, numbers, matrix @ learned.covariance @ matrix.T, sizes_of(numbers, noise))
 
 

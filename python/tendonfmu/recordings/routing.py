@@ -144,8 +144,8 @@ def learn_routing(
         In the order of the tendons, without those that are slack or whose recordings are too short.
     """
     sides = [list(side) for side in (recordings, reference) if side]
-    for each in (each for side in sides for each in side):
-        each.require(finger.joints, finger.tendons, ())
+    for recording in (*recordings, *reference):
+        recording.require(finger.joints, finger.tendons, ())
     measured = [[each for each in side if "joint_position" in each.groups] for side in sides]
     if not all(measured):
         return _of_redundancy(finger, sides)
