@@ -149,7 +149,7 @@ def _recorded(hand: Any, seed: int, level: float | None) -> Recording:
 
 
 def _left(finger: Description, recording: Recording, kinematics: int) -> float:
-    return rms(run_recording(finger, recording.arrays(), kinematics)["compensated_torque"][SETTLED:])
+    return float(rms(run_recording(finger, recording.arrays(), kinematics)["compensated_torque"][SETTLED:]))
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
@@ -164,12 +164,10 @@ def _ratios(rows: Sequence[Row]) -> list[str]:
 def report(jaw: Sequence[Row], siblings: Sequence[Row]) -> str:
     """The jaw by numbers and planted factor, on runs of the half that constants were chosen on and of the other."""
     head = ["after/before: median", "90 %", "worst", f"above {LIMIT}"]
-    halves = {"even": lambda run: run in EVEN, "odd, 0.5 Hz": lambda run: run not in EVEN}
     sections = []
     for rows, keys in ((jaw, ("numbers", "factor")), (siblings, ("pretension", "judged"))):
         for row in rows:
-            of = row.get("fitted", row.get("seed"))
-            chosen = halves["even"](of) if isinstance(of, str) else of % 2 == 0
+            chosen = row["fitted"] in EVEN if "fitted" in row else row["seed"] % 2 == 0
             row["half"] = "chosen on" if chosen else "others"
         sections.append(tables.table([*keys, "half", *head], tables.by(rows, [*keys, "half"], _ratios), text_columns=3))
     return "\n\n".join(sections)
