@@ -57,20 +57,6 @@ class Case:
 # --- what a diagnosis says --------------------------------------------------------------------------------------------
 
 
-def causes_of(diagnosis: Diagnosis, too_small: bool = False) -> list[Cause]:
-    """The causes with a term in the extended model, as in diagnosis.json; or those that are too small to matter."""
-    return [
-        {
-            "effect": cause.effect,
-            "joint": cause.joint,
-            "tendon": cause.tendon,
-            "places": [{"joint": place.joint, "tendon": place.tendon} for place in cause.places],
-            "confusable_with": [vars(where) for where in cause.confusable_with],
-        }
-        for cause in (diagnosis.too_small if too_small else diagnosis.causes)
-    ]
-
-
 def leaves_unnamed(verdict: str, causes: Sequence[Cause]) -> bool:
     """Whether the diagnosis says that something is there that it cannot name."""
     return verdict in ALARMS or any(UNKNOWN in effects_of(cause) for cause in causes[:1])

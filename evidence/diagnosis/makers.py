@@ -34,12 +34,6 @@ class Plan:
         return replace(self.maker(self.seed, **self.arguments), seed=self.seed)
 
 
-def in_turn(kinds: Sequence[Sequence[Plan]]) -> list[Plan]:
-    """Each kind spread evenly over the whole, so that a run that is cut has some of each."""
-    order = [(rank / len(plans), number, rank) for number, plans in enumerate(kinds) for rank in range(len(plans))]
-    return [kinds[number][rank] for _, number, rank in sorted(order)]
-
-
 @dataclass(frozen=True)
 class Options:
     """What a matched case is made of."""

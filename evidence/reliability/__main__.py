@@ -1,4 +1,4 @@
-"""Makes the table of docs/evidence/reliability.md: python -m evidence.reliability [R7 R8 ...] [--scale 0.1]
+"""Makes the table of docs/evidence/reliability.md: python -m evidence.reliability [R16 R17 ...] [--scale 0.1]
 
 The page has what each row tries, its full number and what it leaves open; a row's measurement is made here. Its result
 is kept as WORK/ROW.json and not measured again, unless the row is named or --again is given. What is
@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from evidence import tables
-from evidence.reliability import binaries, by_tests, commands, fuzz
+from evidence.reliability import commands, fuzz
 from evidence.reliability.row import Measure, Outcome, Run, Unavailable
 from evidence.runner import ROOT, parser, say, write
 
 PAGE = ROOT / "docs" / "evidence" / "reliability.md"
-ROWS: dict[str, Measure] = {**fuzz.ROWS, **by_tests.ROWS, **binaries.ROWS, **commands.ROWS}
+ROWS: dict[str, Measure] = {**fuzz.ROWS, **commands.ROWS}
 
 
 def rows_of_the_page() -> dict[str, list[str]]:

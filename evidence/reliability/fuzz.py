@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from evidence.recordings.log_faults import FORMATS, sound, write
-from evidence.reliability.programs import CALIBRATED
 from evidence.reliability.row import Measure, Outcome, Run, Unavailable, called, spoken
-from evidence.runner import ROOT
+from evidence.runner import EXAMPLES, ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import read_recording
@@ -141,7 +140,8 @@ def numbers_of(tree: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
 
 def bad_descriptions(run: Run) -> tuple[int, list[str]]:
     """Each number replaced by what is none, and a misspelt key beside it: refused with its path."""
-    description = json.loads(CALIBRATED.read_text())
+    calibrated = EXAMPLES / "demo_recording" / "index_finger_calibrated.json"
+    description = json.loads(calibrated.read_text(encoding="utf-8"))
     chance, file, tried = random.Random(1), run.work / "bad.json", 0
     wrong: list[str] = []
     places = [path for path, _, _ in numbers_of(description)]

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import re
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from evidence.runner import ROOT
 
 
 class Unavailable(Exception):
@@ -58,21 +53,3 @@ def called(*command: str | Path, **options: Any) -> str:
 def with_wrong(result: str, wrong: Sequence[str]) -> str:
     """The result, and the first things that were wrong."""
     return "; ".join([f"{result}; {len(wrong)} wrong", *wrong[:4]])
-
-
-def by_pytest(what: str, result: str, *selected: str, environment: dict[str, str] | None = None) -> Measure:
-    """Measures a row by tests of the repository; selected: arguments of pytest."""
-
-    def measure(run: Run) -> Outcome:
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "", *selected]
-        settings = {**os.environ, **(environment or {})}
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=settings)
-        (run.work / "pytest.log").write_text(done.stdout + done.stderr, encoding="utf-8")
-        last = next((line for line in reversed(done.stdout.splitlines()) if re.search(r"\d+ \w+", line)), "no test ran")
-        counts = {word: int(count) for count, word in re.findall(r"(\d+) (passed|skipped|failed|error)", last)}
-        passed, skipped = counts.get("passed", 0), counts.get("skipped", 0)
-        failed = counts.get("failed", 0) + counts.get("error", 0) + (not passed)
-        number = f"{passed + failed} {what}" + (f"; {skipped} skipped" if skipped else "")
-        return Outcome(number, f"{passed} {result}", failed == 0)
-
-    return measure

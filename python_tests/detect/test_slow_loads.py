@@ -1,4 +1,4 @@
-"""What the bias filter takes of slow loads, held to what the equations say (docs/evidence/contact.md)."""
+"""What the bias filter takes of slow loads, held to what the equations say (docs/reference/detection.md#limits)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the learner knows after a million samples, and whether it is as far off as it says (row R18 of reliability)."""
+"""What the learner knows after a million samples, and whether it is as far off as it says."""
 
 from __future__ import annotations
 

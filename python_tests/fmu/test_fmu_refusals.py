@@ -1,7 +1,4 @@
-"""Numbers that are none, or that no step can take: refused with a message, no byte changed; and nothing is left behind.
-
-Rows R2, R3 and R8 of docs/evidence/reliability.md.
-"""
+"""Numbers that are none, or that no step can take: refused with a message, no byte changed; nothing is left behind."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import random
 import struct
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 from fmu_binary import COULOMB, ERROR, OK, STATIC, Instance, UnpackedFmu, motion
 from fmu_kinds import CALLS, MAKERS, Kind
 from plant_rigs import needs_plant
+from repetitions import repeated
 from repository_paths import SUPPORT
 
 FORCE = "tendon_force[1]"
@@ -273,15 +275,89 @@ def test_damaged_states_are_refused_and_change_nothing(kind: Kind) -> None:
             assert instance.restore(good) == OK
 
 
+def hash_of_bytes(data: bytes) -> int:
+    """FNV-1a."""
+    value = 0xCBF29CE484222325
+    for byte in data:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return value
+
+
+def hash_of_words(data: bytes) -> int:
+    """That of the core's own states (hash_bytes in bytes.c), whose length is a multiple of 8."""
+    value = 0xCBF29CE484222325 ^ len(data)
+    for (word,) in struct.iter_unpack("<Q", data):
+        value = (value ^ word) * 0x9E3779B97F4A7C15 % 2**64
+        value ^= value >> 29
+    value ^= value >> 32
+    value = value * 0xD6E8FEB86659FD93 % 2**64
+    return value ^ value >> 32
+
+
+def sealed(state: bytes | bytearray) -> bytes:
+    """The state of an FMU for fingers with the checksums that fit: of the core's state in it, and its own."""
+    changed = bytearray(state)
+    core = changed.find(b"TFMUSTA", 40)
+    if core >= 0:
+        changed[core + 24 : core + 32] = struct.pack("<Q", hash_of_words(changed[core + 32 :]))
+    changed[24:32] = struct.pack("<Q", hash_of_bytes(changed[32:]))
+    return bytes(changed)
+
+
 def with_number(state: bytes, index: int, value: float) -> bytes:
     """The state with another number and the checksum that belongs to it."""
     changed = bytearray(state)
     changed[40 + 8 * index : 48 + 8 * index] = struct.pack("<d", value)
-    checksum = 0xCBF29CE484222325
-    for byte in changed[32:]:
-        checksum = (checksum ^ byte) * 0x100000001B3 % 2**64
-    changed[24:32] = struct.pack("<Q", checksum)
+    changed[24:32] = struct.pack("<Q", hash_of_bytes(changed[32:]))
     return bytes(changed)
+
+
+def with_plain_zeros(state: bytes) -> bytes:
+    """The state with 0 for -0, under checksums that fit."""
+    words = struct.unpack_from(f"<{len(state) // 8}Q", state)
+    return sealed(struct.pack(f"<{len(words)}Q", *(0 if word == 1 << 63 else word for word in words)))
+
+
+def spoilt(state: bytes, chance: random.Random) -> bytes:
+    """The state with one bit changed, or one number that is none or far away."""
+    changed = bytearray(state)
+    if chance.random() < 0.5:
+        changed[chance.randrange(len(state))] ^= 1 << chance.randrange(8)
+    else:
+        at = 8 * chance.randrange(len(state) // 8)
+        changed[at : at + 8] = struct.pack("<d", chance.choice([NAN, math.inf, 1e300, -1.5]))
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("count", repeated([500, 20_000], 0))
+def test_a_spoilt_state_is_refused_or_a_sound_one(small_fmu: UnpackedFmu, count: int) -> None:
+    """Under the old checksums each is refused. Under those that fit it is refused with no byte changed; or it is what
+    the FMU then saves, and the next samples are finite or refused."""
+    chance, taken = random.Random(1), 0
+    with Instance(small_fmu) as instance:
+        instance.initialise(motion(small_fmu, 0.0))
+        MAKERS["friction"][1](small_fmu).advance(instance, 1, 200)
+        good = instance.save()
+        assert sealed(good) == good
+        for length in range(len(good) + 64):
+            assert (instance.restore(good[:length].ljust(length, b"\0")) == OK) == (length == len(good)), length
+        for number in range(count):
+            assert instance.restore(good) == OK
+            changed = spoilt(good, chance)
+            refused = instance.restore(changed) == ERROR and instance.save() == good
+            assert refused or changed == good, number
+            offered = sealed(changed)
+            if instance.restore(offered) == ERROR:
+                assert instance.save() == good, number
+                continue
+            taken += offered != good  # what was done to a checksum is mended
+            assert with_plain_zeros(instance.save()) == with_plain_zeros(offered), number
+            for k in range(201, 221):
+                inputs = motion(small_fmu, 0.001 * k)
+                if instance.set_real(inputs) != OK or instance.step(0.001 * k) != OK:
+                    break
+                assert all(map(math.isfinite, instance.outputs())), number
+    assert 0.1 * count < taken < count
 
 
 # Numbers from byte 40. Life: 0 phase, 1 whether there is a stop time, 2 start time; then inputs from 5 on, and of the

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from evidence.recordings.log_faults import (
 )
 from repetitions import repeated
 
-PLACES = int(os.environ.get("TENDONFMU_CUTS", "300"))  # at which a log is cut off, at most
+PLACES = 300  # at which a log is cut off, at most
 REFUSED = {
     "shuffled": ["time goes back", '"disorder": "sort"', "Divide the log"],
     "NaN": ["row 5", '"missing": "leave out"'],

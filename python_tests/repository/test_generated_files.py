@@ -1,5 +1,4 @@
-"""What follows from the tables in runtime/description is what tools/tables/generate.py makes of them; and the page of
-all messages is that of the sources."""
+"""What follows from the tables in runtime/description is what tools/tables/generate.py makes of them."""
 
 from __future__ import annotations
 
@@ -33,12 +32,6 @@ def test_the_generated_files_are_those_of_the_tables() -> None:
     command = [sys.executable, str(TABLES / "generate.py"), "--check"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", ""), "run python tools/tables/generate.py"
-
-
-def test_the_page_of_messages_is_that_of_the_sources() -> None:
-    command = [sys.executable, str(ROOT / "tools" / "messages.py"), "--check"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", ""), "run python tools/messages.py, review its page"
 
 
 def test_each_generated_file_says_so_in_its_first_line(generator: ModuleType) -> None:
