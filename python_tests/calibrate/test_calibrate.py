@@ -116,6 +116,7 @@ def test_the_command_goes_on_where_the_folder_ends(
     assert verdict(report)[1] in answer.out
 
 
+@pytest.mark.long
 def test_what_is_unchanged_is_not_done_again(
     call: Call, calibrated: tuple[Calibration, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

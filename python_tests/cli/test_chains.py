@@ -2,7 +2,7 @@
 
 All pairs of a writer and a reader are generated (support/chains.py), each with some variations of the recordings and
 kinematics sources, so that every writer and every reader meets all of them. A seeded sample in which each writer and
-each reader is once runs in `./test`; `./test --all python_tests/cli/test_chains.py` runs all.
+each reader is once runs in `./test`; `./test -m "" python_tests/cli/test_chains.py` runs all.
 """
 
 from __future__ import annotations

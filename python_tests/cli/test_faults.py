@@ -20,6 +20,7 @@ import pytest
 import tendonfmu
 from command import Call
 from fmu_binary import FINGER
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.cli.console import reader_may_leave
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
@@ -155,7 +156,7 @@ def test_too_little_memory_is_said_and_no_fault(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of Unix")
-@pytest.mark.parametrize("megabytes", [150, 250, 350, 450, 500, 550])
+@pytest.mark.parametrize("megabytes", repeated([150, 250, 350, 450, 500, 550], 1, 4))
 def test_under_a_limit_a_lack_of_memory_is_one_line(tmp_path: Path, megabytes: int) -> None:
     """It was "interrupted" (130), a text of OpenBLAS (1), "not a whole Parquet file", or an abort, by its size."""
     demo = ROOT / "examples" / "demo_recording"

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, pdtr
 
 from command import Call
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.cli import main
 from tendonfmu.detect.alarm_level import allowed_alarms, cells_of, count_alarms, least_hours, level_for, rate_limit
@@ -134,7 +135,9 @@ def test_bounds_keep_a_known_rate() -> None:
     assert np.median(true) > 0.3 * WISHED, "bounds far higher than the rate asks for"
 
 
-@pytest.mark.parametrize(("size", "given", "expected"), [(3.0, None, 1.0), (3.0, 3.0, 3.0), (0.003, None, None)])
+@pytest.mark.parametrize(
+    ("size", "given", "expected"), repeated([(3.0, None, 1.0), (3.0, 3.0, 3.0), (0.003, None, None)], 0)
+)
 def test_an_uncertainty_larger_than_the_residual_does_not_hide_pushes(
     size: float, given: float | None, expected: float | None
 ) -> None:
@@ -257,6 +260,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     return folder, out.getvalue(), err.getvalue()
 
 
+@pytest.mark.long
 def test_presliding_counts_as_held_while_it_stands() -> None:
     """Where the description has it, and with the short time that presliding leaves to be held."""
     data = json.loads(INDEX.read_text())
@@ -428,6 +432,7 @@ def test_bad_input_is_named_and_leaves_nothing(
     assert not Path("t.json").exists()
 
 
+@pytest.mark.long
 def test_a_bias_without_a_time_constant_needs_one() -> None:
     data = json.loads(INDEX.read_text())
     data["bias"]["drift_variance"] = 0.0

@@ -179,6 +179,7 @@ def numbers_of(contact: Mapping[str, Any]) -> list[Any]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["innovation", "cusum", "threshold"])
 def test_random_free_motion_is_tuned_or_refused(method: str) -> None:
     assert sum(check(seed, method, 40.0) for seed in FEW) >= (1 - REFUSED_AT_MOST) * len(FEW)

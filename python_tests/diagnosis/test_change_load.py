@@ -127,6 +127,7 @@ def test_a_load_is_told_as_contact_and_not_as_friction(rest: float) -> None:
     assert found.gain.value == 0.0  # the bias takes it up at run time
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("zeroed", repeated([0.0, 0.0128], 1), ids=["shown", "zeroed away"])
 def test_the_mean_of_a_change_is_no_load(zeroed: float) -> None:
     """A weight pulls with 12.8 mN·m in the mean of its recording, unless the sensors were zeroed under it."""

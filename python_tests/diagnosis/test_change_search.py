@@ -155,6 +155,7 @@ def growing(order: tuple[int, ...] = (0, 1, 2), seed: int = 0) -> Diagnosis:
     return diagnose(finger(), [now[k] for k in order], reference=then, kinematics=3, seed=seed)
 
 
+@pytest.mark.long
 def test_several_recordings_show_how_it_grows() -> None:
     (cause,) = growing().causes
     assert cause.where.effect == "joint_friction" and cause.changed is not None

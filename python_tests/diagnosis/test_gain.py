@@ -110,6 +110,7 @@ def test_the_interval_covers_the_true_gain() -> None:
     assert naive / cases < 0.85
 
 
+@pytest.mark.long
 def test_the_interval_covers_a_gain_that_differs_from_recording_to_recording() -> None:
     """Two recordings show by how much, as far as their blocks do not explain it."""
     rng, covered, cases = np.random.default_rng(8), np.zeros(2), 60

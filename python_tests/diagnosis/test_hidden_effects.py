@@ -134,6 +134,7 @@ def test_a_diagnosis_names_measures_and_extends() -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("effect", "number"), [("preload_friction", "coulomb"), ("friction_drift", "amplitude")])
 def test_friction_that_builds_up_has_its_own_size(effect: str, number: str) -> None:
     """What acts on friction is found by how the friction of its place builds up, not by the sign of motion."""

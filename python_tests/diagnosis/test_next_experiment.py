@@ -165,6 +165,7 @@ def test_a_menu_has_what_a_finger_can_do() -> None:
     assert combined(loop, entry, recorded) == []
 
 
+@pytest.mark.long
 def test_a_tendon_that_a_load_holds() -> None:
     """One pulling tendon against a known load: no pretension, the load changes in size and keeps its side."""
     jaw = {

@@ -57,13 +57,16 @@ def test_noise_is_not_unknown(seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("signal", "strength", "groups"),
-    [
-        (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
-        (product, 1.0, {"angle"}),
-        (creep, 2.0, {"memory of angle"}),
-        (memory, 4.0, {"memory of speed"}),
-        (oscillation, 0.3, {"line"}),
-    ],
+    repeated(
+        [
+            (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
+            (product, 1.0, {"angle"}),
+            (creep, 2.0, {"memory of angle"}),
+            (memory, 4.0, {"memory of speed"}),
+            (oscillation, 0.3, {"line"}),
+        ],
+        2,
+    ),
 )
 def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strength: float, groups: set[str]) -> None:
     series = make_series(7)
@@ -86,6 +89,7 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
         assert "3.7 Hz" in found.description
 
 
+@pytest.mark.long
 def test_a_strong_line_in_smooth_signals_is_found() -> None:
     """A filter that whitens smooth signals leaves nothing of a strong sine, but shows a weak one where no noise is."""
     series = make_series(5)
@@ -102,6 +106,7 @@ def test_a_strong_line_in_smooth_signals_is_found() -> None:
     assert found[0].line.frequency == pytest.approx(1.5, abs=0.02)
 
 
+@pytest.mark.long
 def test_the_map_is_over_what_is_followed() -> None:
     series = make_series(7)
     nuisance = nuisance_of(series)
@@ -117,6 +122,7 @@ def test_the_map_is_over_what_is_followed() -> None:
     assert np.corrcoef(found.torque[known], wave[known])[0, 1] > 0.6
 
 
+@pytest.mark.long
 def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
     series = make_series(3, seconds=40.0)
     nuisance = nuisance_of(series)

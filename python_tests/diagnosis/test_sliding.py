@@ -129,6 +129,7 @@ def test_a_calibration_fits_the_friction_of_a_finger_that_sticks(tmp_path: Path)
 # --- whole diagnoses --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_finger_that_sticks_gets_its_true_friction_and_no_false_cause(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 3)
     (said,) = (text for text in found.warnings if re.search(r"in 2\d % of the samples", text))

@@ -66,6 +66,7 @@ def named(*, turns: bool) -> dict[str, Any]:
     return {cause["effect"]: cause for cause in found.report["causes"]}
 
 
+@pytest.mark.long
 def test_the_inertia_that_varies_is_named_with_its_size() -> None:
     cause = named(turns=True)["inertia_variation"]
     assert cause["joint"] == 1 and cause["gain"]["interval"][0] > 0.5

@@ -89,6 +89,7 @@ def test_every_bias_option(name: str) -> None:
     Pair(description, groups(description)).run(recording, 3, recording["external_torque"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", repeated([0, 7], 1))
 @pytest.mark.parametrize("bias", repeated([{}, {"noise_time": 0.02}, {"initial_torque": [0.02, -0.01]}], 1), ids=str)
 def test_left_out_samples_foretell_and_do_not_teach(first: int, bias: Description) -> None:

@@ -84,6 +84,7 @@ def test_torques_and_friction_by_formula(seed: int) -> None:
         assert (np.abs(found - wanted) / scale)[kept][..., columns].max() < ROUNDING
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", repeated(FINGERS, 5))  # these have all effects
 def test_all_numbers_by_differences(seed: int) -> None:
     """But for samples at which the step turns a decision (a threshold, a play, a neighbour in time)."""

@@ -314,6 +314,7 @@ def test_laws_that_share_start_from_their_mean() -> None:
     assert fit.start_.data["tendons"][2]["pulley_friction"][0]["coulomb"] == pytest.approx((0.01 + 3 * 0.02) / 4)
 
 
+@pytest.mark.long
 def test_two_sides_are_told_apart() -> None:
     recording = made_recording(duration=60.0, asymmetric=True)
     fit = shared(sides="asymmetric", only=["joints[*]"], share=[]).fit(recording)
@@ -354,6 +355,7 @@ def test_an_initial_bias_of_zero_is_known_where_its_error_is_small_beside_the_no
     assert bias["identified"]
 
 
+@pytest.mark.long
 def test_several_recordings_have_a_bias_each() -> None:
     """A step of the bias between recordings says nothing about friction."""
     other = made_recording(seed=2)

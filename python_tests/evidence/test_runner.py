@@ -36,6 +36,7 @@ def test_a_case_with_a_row_is_not_run_again_and_a_failed_one_is(tmp_path: Path) 
     assert files == [f"case_{number}.json" for number in (1, 2, 3, 4)]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_same_rows_come_from_workers(tmp_path: Path) -> None:
     cases = {f"case_{number}": (number, 10) for number in (20, 30)}

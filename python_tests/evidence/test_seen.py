@@ -16,6 +16,8 @@ from evidence.fingers.foreign import Array
 from evidence.judge import Truth
 from optional_parts import needs
 
+pytestmark = pytest.mark.long  # they test cases of evidence
+
 FAMILIES = ["dahl", "lugre", pytest.param("pulleys", marks=needs("mujoco"))]
 THERE_AND_BACK = np.concatenate([np.linspace(0.0, 0.01, 2000), np.linspace(0.01, 0.0, 2000)])[:, None]  # m
 

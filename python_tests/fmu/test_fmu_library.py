@@ -151,6 +151,7 @@ def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
     return unpack(folder / "other.fmu", folder / "unpacked")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("second", ["friction", pytest.param("plant", marks=needs_plant)])
 def test_two_fmus_in_a_process_that_shares_all_symbols(second: str, request: pytest.FixtureRequest) -> None:
     """They have functions of the same names inside."""

@@ -182,7 +182,7 @@ def test_a_finger_without_columns_is_its_row(tmp_path: Path, call: Call) -> None
     assert belongs == {"index": True, "ring": False}
 
 
-@pytest.mark.parametrize("kind", [(), ("--history",)])
+@pytest.mark.parametrize("kind", [(), pytest.param(("--history",), marks=pytest.mark.long)])
 def test_an_internal_error_of_one_finger_is_its_row(
     tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch, kind: tuple[str, ...]
 ) -> None:

@@ -164,7 +164,7 @@ def test_messages_name_what_was_given(frame: pd.DataFrame) -> None:
     tendons = {"tendon_force": np.zeros((9, 3)), "tendon_position": np.zeros((9, 3))}
     few = tf.Recording.from_arrays(np.arange(9.0), **tendons, name="mine")
     for refused, words in {
-        lambda: tf.calibrate(FINGER, frame.iloc[:300]): "DataFrame: 0.",
+        lambda: tf.calibrate(FINGER, frame.iloc[:300]): "DataFrame: no sample to measure the gain on",
         lambda: tf.calibrate(FINGER, [frame, frame]): "DataFrame 2: given twice, as DataFrame 1; expected each",
         lambda: tf.calibrate(FINGER, frame, test=frame): "DataFrame: a test, but trained on as well, as DataFrame; ",
         lambda: tf.calibrate(FINGER, few): "mine: 3 columns tendon_force[...], expected 4",

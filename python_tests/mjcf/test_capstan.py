@@ -46,6 +46,7 @@ def sustained(holds: Any, steps: int) -> Any:
     return np.convolve(holds, np.ones(steps))[: len(holds)] > steps - 0.5
 
 
+@pytest.mark.long
 def test_a_sliding_tendon_loses_what_its_wrap_angle_says() -> None:
     """The force behind the pulley is what moves the load: by the motion, not by what the script applies."""
     from capstan import Capstan
@@ -189,6 +190,7 @@ def test_the_plugin_does_the_same_in_the_engine(tmp_path: Path) -> None:
     assert (waved(model, data, rest, 300) == states).all()
 
 
+@pytest.mark.long
 def test_a_description_takes_the_losses_along(tmp_path: Path, call: Call) -> None:
     """While all tendons slide, the core with the laws by `add_edges.py --capstan` loses what the path loses."""
     from capstan import Capstan

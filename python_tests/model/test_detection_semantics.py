@@ -15,6 +15,7 @@ import pytest
 
 from analytic_cases import ARM, ASYMMETRIC, LAW, NO_UPDATE, V_MIN, Array, Outputs, close, finger, law_value, one_edge
 from analytic_cases import recording as at_times
+from repetitions import repeated
 from runners import Runner
 
 DT = 0.125
@@ -278,7 +279,7 @@ CLOCKS: dict[str, Callable[[int, float], Array]] = {
 
 
 @pytest.mark.parametrize("key", ["hold_time", "release_time"])
-@pytest.mark.parametrize("h", [0.001, 0.003, 0.01])
+@pytest.mark.parametrize("h", repeated([0.001, 0.003, 0.01], 1))
 def test_no_rounding_of_a_clock_changes_a_contact(runner: Runner, h: float, key: str) -> None:
     """Pushes of two samples every hundred; held for 25 samples exactly, or with a bias that moves after as many."""
     contact: dict[str, Any] = {"threshold": [0.04], key: 25 * h}

@@ -48,6 +48,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_the_small_finger_is_sound_and_can_be_pretensioned(folder: Path) -> None:
     finger = read_finger(folder / "two_joints.json")
     assert (len(finger.joint_names), len(finger.tendon_names)) == (2, 3)

@@ -82,7 +82,6 @@ def without_angles(recording: Recording) -> Recording:
             (DEMO / "two_joints.json", "two_joints_training"),
             (DEMO / "two_joints.json", "two_joints_unseen"),
         ],
-        2,
         4,
     ),
 )
@@ -341,11 +340,11 @@ def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound:
     "arguments",
     [
         ("fit", FREE, "?", "-o", "f.json"),
-        ("diagnose", FREE, "?", "-o", "out"),
-        ("tune", FREE, "?", "-o", "t.json"),
+        pytest.param(("diagnose", FREE, "?", "-o", "out"), marks=pytest.mark.long),
+        pytest.param(("tune", FREE, "?", "-o", "t.json"), marks=pytest.mark.long),
         ("calibrate", FREE, "?", "-o", "out"),
-        ("fit", FREE, "--compare", "?", "-o", "f.json"),
-        ("diagnose", FREE, "--test", "?", "-o", "out"),
+        pytest.param(("fit", FREE, "--compare", "?", "-o", "f.json"), marks=pytest.mark.long),
+        pytest.param(("diagnose", FREE, "--test", "?", "-o", "out"), marks=pytest.mark.long),
     ],
     ids=lambda arguments: " ".join(map(str, arguments[::2])),
 )

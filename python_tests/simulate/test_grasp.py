@@ -48,6 +48,7 @@ def fmus(package: Path) -> tuple[Path, Path]:
     return resources / "TendonFinger.fmu", resources / "friction.fmu"
 
 
+@pytest.mark.long
 def test_compensation_stops_gently_and_holds_the_force(example: Any, fmus: tuple[Path, Path]) -> None:
     """On the way the finger pauses and turns back; while it holds 1 N the plate moves by 3 mm, friction with it."""
     grasp, task = example("grasp"), example("controller").Task(**SHORT)

@@ -51,6 +51,7 @@ def fake_sundials(folder: Path, version: str) -> Path:
     return folder
 
 
+@pytest.mark.long
 @needs_cmake
 def test_everything_but_the_finger_is_configured_without_sundials(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
@@ -65,6 +66,7 @@ def test_everything_but_the_finger_is_configured_without_sundials(tmp_path: Path
     assert "tendonfmu_description" in built
 
 
+@pytest.mark.long
 @needs_cmake
 def test_finger_and_estimation_can_be_switched_off(tmp_path: Path) -> None:
     said = configure(tmp_path, "-DTENDONFMU_PLANT=OFF", "-DTENDONFMU_ESTIMATION=OFF")
@@ -97,6 +99,7 @@ def test_an_unusable_installation_is_refused_with_its_version(tmp_path: Path, ve
     assert re.search(rf"{MISSING}.*; SUNDIALS {re.escape(version)} in {re.escape(str(root))}\S* {reason}", said)
 
 
+@pytest.mark.long
 @needs_cmake
 @pytest.mark.parametrize(
     ("content", "reason"), repeated([(None, "does not exist"), (b"no archive", "could not be unpacked")], 1)

@@ -96,6 +96,7 @@ def test_a_scheduler_that_is_not_there_is_refused_by_its_address(monkeypatch: py
         pass
 
 
+@pytest.mark.long
 def test_a_scheduler_without_workers_and_workers_of_another_version_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -169,6 +170,7 @@ def test_a_function_that_workers_cannot_import_is_an_error_of_each_job(
     assert ["only_here" in row["error"] for row in rows_of(some, tmp_path)] == [True, True], rows_of(some, tmp_path)
 
 
+@pytest.mark.long
 def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Path) -> None:
     jobs = noting(8, 0.2, tmp_path / "log")
     output = tmp_path / "out"

@@ -22,8 +22,9 @@ _ROOM = 20  # rows for each coefficient, at least
 CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
 FEWEST = 20  # pairs of a lag; lags with fewer are not used
 # Noise is forgotten within LASTING. What lasts longer is an error of the model, which counts as new with every stroke;
-# what returns LATER, with strokes that are alike, counts as new every RETURN (docs/evidence/recalibration.md).
-LASTING, LATER, RETURN = 0.1, 1.0, 10.0  # s
+# what returns LATER, with strokes that are alike, counts as new with every second cycle (docs/evidence/recalibration.md).
+LASTING, LATER = 0.1, 1.0  # s
+RETURN = 4.0  # strokes
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,7 @@ def sample_weights(standardised: Numbers, step: float, stroke: float) -> Numbers
         time, correlations, chance = _correlation(column)
         if time > 1.0:
             lasting, returning = _shares(correlations, chance, step)
-            share, new = (returning, RETURN) if returning > lasting else (lasting, stroke)
+            share, new = (returning, RETURN * stroke) if returning > lasting else (lasting, stroke)
             new = min(max(new / step, time), float(np.sum(~np.isnan(column))))
             time = max(time, (1.0 - share) * time + share * new)
         weights.append(1.0 / time)
