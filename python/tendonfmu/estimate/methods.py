@@ -39,7 +39,7 @@ CHANGE = 0.02  # of a number that was estimated before: what wear, temperature a
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 _GUESS = 1.0  # of a number that nobody has estimated
 _SPREADS = np.geomspace(1e-3, _GUESS, 31)
-_CLEARLY = 0.5  # by which the log likelihood must rise before numbers leave where they were
+_CLEARLY = 2.0  # by which the log likelihood must rise before numbers leave where they were (Edwards 1972: support)
 
 
 @dataclass(frozen=True)
