@@ -20,8 +20,8 @@ enum { ERROR_BYTES = 400 };
 #define LARGEST_SQUARE 1e300
 
 /* Beyond this, in magnitude, no input is a measurement; below it no product in a step overflows for sane parameters. */
-#define LARGEST_INPUT 1e12
-#define LARGEST_TIME  1e15 /* s */
+#define LARGEST_INPUT  1e12
+#define LARGEST_TIME   1e15 /* s */
 #define CLOCK_ROUNDING 0.01 /* of a step: times so near are equal (docs/reference/semantics.md#clocks) */
 
 /* Numbers of the description that are neither per joint nor per tendon. */
