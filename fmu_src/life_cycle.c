@@ -41,7 +41,7 @@ static model* create_model(const log_target* log, const void* resource, size_t s
   }
   model_guid(resource, size, expected);
   if (!identifier || strcmp(identifier, expected) != 0) {
-    log_text reason = {.length = 0};
+    log_text reason = {.bytes = ""};
     log_append(&reason, this_fmi.identifier);
     log_append(&reason, " is not that of this FMU: expected ");
     log_append(&reason, expected);

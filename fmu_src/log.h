@@ -10,7 +10,6 @@ enum { LOG_TEXT_BYTES = 512 };
 
 typedef struct log_text {
   char bytes[LOG_TEXT_BYTES];
-  size_t length;
 } log_text;
 
 /* Appends; too long a line is cut. Numbers have a decimal point in every locale. */

@@ -124,7 +124,7 @@ static FILE* open_in(const char* location, const char* name, int is_uri, int dec
 }
 
 void* resource_read(const char* location, const char* name, size_t* size, const char* argument, log_text* reason) {
-  reason->length = 0;
+  reason->bytes[0] = 0;
   if (!location || !*location) {
     log_append(reason, argument);
     log_append(reason, " is NULL or empty: expected where the folder resources is");

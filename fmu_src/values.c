@@ -113,7 +113,7 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
 
 static int refuse_fixed(component* c, fmu_function function, const variable* found) {
   log_text reason;
-  reason.length = 0;
+  reason.bytes[0] = 0;
   log_append(&reason, "a fixed parameter is written before ");
   log_append(&reason, call_name(CALL_EXIT_INITIALIZATION_MODE));
   log_append(&reason, " only");

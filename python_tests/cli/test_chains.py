@@ -23,7 +23,7 @@ from repetitions import repeated
 
 Pair = tuple[str, str, str, int]  # writer, reader, variation, kinematics
 # of Python, not of a user's language
-_CODE = re.compile(r"\b\w+(Error|Exception)\b|object at 0x|<class|\bNoneType\b")
+_CODE = re.compile(r"Traceback|\b\w+(Error|Exception)\b|object at 0x|<class|\bNoneType\b")
 
 
 def all_pairs() -> list[Pair]:
@@ -86,8 +86,8 @@ def faults_of(pair: Pair, finger: Path, recordings: Path, folder: Path) -> Itera
             if answer.status not in (0, 1, 2):
                 reports = [file.read_text() for file in Path().glob("tendonfmu-error-*.txt")]
                 yield f"{told}: {answer.status}: {answer.err}\n{''.join(reports)}"
-            if "Traceback" in answer.err or (answer.status and _CODE.search(answer.err)):
-                yield f"{told}: not in plain words: {answer.err}"
+            if _CODE.search(answer.out + answer.err):
+                yield f"{told}: not in plain words: {answer.out}{answer.err}"
             if answer.status == 2:
                 last = answer.err.strip().splitlines()[-1]
                 if not any(str(word) in last for word in command[1:] if Path(str(word)).suffix):

@@ -100,10 +100,10 @@ def pointer(value: object) -> object:
 BAD_CALLS: dict[str, tuple[Callable[[Instance], int], str]] = {
     "second of two inputs": (lambda i: i.set_real({FORCE: 1.0, "tendon_force[2]": NAN}), "tendon_force[2] = nan"),
     "output written": (lambda i: i.set_real({OUTPUT: 1.0}), "compensated_torque[1]: an output is not written"),
-    "parameter below range": (lambda i: i.set_real({COULOMB: -1.0}), f"{COULOMB} = -1: expected 0 to 1000000000 1"),
+    "parameter below range": (lambda i: i.set_real({COULOMB: -1.0}), f"{COULOMB} = -1: expected 0 to 1e+09 1"),
     "parameter at open end": (
         lambda i: i.set_real({"joints[1].friction.stribeck_velocity": 0.0}),
-        "joints[1].friction.stribeck_velocity = 0: expected above 0 and at most 1000000000 rad/s",
+        "joints[1].friction.stribeck_velocity = 0: expected above 0 and at most 1e+09 rad/s",
     ),
     "fixed parameter": (lambda i: i.set_real({ARM: 0.01}), f"{ARM}: a fixed parameter is written before"),
     "fixed integer": (lambda i: i.set_integer(SOURCE, 2), "kinematics_source: a fixed parameter is written before"),

@@ -71,3 +71,13 @@ def test_no_flag_gives_other_exponentials(compiler: str, flags: str, tmp_path: P
     assert plain is not None and plain.count("\n") == 2000
     assert other in (None, plain)
     assert other is None or flags not in SEEN_BY_ALL
+
+
+@pytest.mark.parametrize("compiler", compilers())
+@pytest.mark.parametrize("flags", ["", *SEEN_BY_ALL])
+def test_the_simulated_finger_refuses_such_flags_too(compiler: str, flags: str) -> None:
+    header = ROOT / "runtime" / "plant" / "elementary.h"
+    command = [compiler, "-x", "c++", "-std=c++17", "-O2", "-fsyntax-only", *flags.split(), str(header)]
+    made = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ("cannot be compiled with -ffast-math" in made.stderr) == bool(flags), made.stderr
+    assert (made.returncode != 0) == bool(flags), made.stderr

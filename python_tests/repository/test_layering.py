@@ -309,13 +309,14 @@ def test_the_fmu_knows_fmi_and_the_c_interface_only() -> None:
     folder = ROOT / "fmu_src"
     own = {file.name for file in folder.glob("*.h")}
     outside = {"fmi2Functions.h", "fmi3Functions.h", "tendonfmu.h", "variable_table.h"}
+    formatter = {("log.c", "message.h")}  # the one inner header of the core: numbers in lines, without the heap
     sources = sorted(folder.glob("*.[ch]"))
     assert len(sources) > 10
     wrong = [
         f"{file.name}: {name}"
         for file in sources
         for angle, name in includes_of(file)
-        if not angle and name not in own | outside
+        if not angle and name not in own | outside and (file.name, name) not in formatter
     ]
     assert wrong == []
 

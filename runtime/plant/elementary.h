@@ -7,6 +7,12 @@
 #include <cstdint>
 #include <cstring>
 
+/* the plant shares nothing with the core, whose floating_point.h refuses the same */
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || \
+    (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "TendonFMU cannot be compiled with -ffast-math or a part of it: exponentials would be wrong"
+#endif
+
 namespace tendonfmu::plant {
 
 constexpr double pi = 3.14159265358979323846;
