@@ -60,6 +60,7 @@ def test_nothing_is_named_where_nothing_has_changed(how: How) -> None:
     assert found.gain.value == 0.0 and found.extended == found.nominal
     assert found.extended_data == found.nominal_data and not found.unexplained.unknown
     assert found.repeated == int(how == REPEAT)
+    assert not any("can be compared" in text for text in found.warnings)  # of 60 s
     assert found.references == ("then.parquet",) and found.recordings == ("now.parquet",)
 
 

@@ -226,6 +226,8 @@ def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], o
     check_given_once(given_free, tests, "a test")
     check_given_once(given_free, pushes, "one with pushes")
     read, others, touched = ([read_recording(path) for path in group] for group in recordings)
+    for recording in (*read, *others, *touched):
+        recording.require(finger.joints, finger.tendons, ())
     for recording in (*read, *others):
         require_no_contact(recording)
     held = None if tests else HELD

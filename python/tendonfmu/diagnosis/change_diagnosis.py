@@ -260,7 +260,8 @@ class _Changes:
         folds, judged = self._search.folds, self._search.judged
         now = int(judged.sum())
         warnings = []
-        if now < 4 or folds.folds - now < 4:
+        # a motion that the reference has exactly is compared with it sample by sample
+        if now < 4 or (folds.folds - now < 4 and not self._search.repeated):
             warnings.append(
                 "less than 16 s then or now can be compared, without contact and at like loads: a change has to be "
                 "large to be certain; record a minute of the same motion then and now"

@@ -116,7 +116,7 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
         "their values, and at most half of what was known before."
     )
     if kept:
-        yield f"{counted(kept, 'number')} {are(kept)} kept from the earlier estimate: these recordings tell no more."
+        yield f"{counted(kept, 'number')} {are(kept)} known from the earlier estimate more than from these recordings."
     if count + kept < of:
         yield f"What would identify the other {of - count - kept} is listed below."
     yield from sums_known(picture.fitted)
