@@ -147,11 +147,19 @@ def test_friction_that_builds_up_has_its_own_size(effect: str, number: str) -> N
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("effect", ["force_offset", "gravity", "moment_arm"])
+@pytest.mark.parametrize("effect", ["force_offset", "gravity"])
 def test_absorbed_is_told_to_be_invisible(effect: str) -> None:
-    """A constant or slow torque goes into the bias. What is left of an arm that is off goes down in the noise."""
+    """A constant or slow torque goes into the bias."""
     diagnosis = makers.absorbed(1, replace(SHORT, presliding=True), effect).diagnosed()
     listed = [entry for entry in diagnosis.invisible if entry.where.effect == effect]
     assert listed and all(entry.experiment for entry in listed)
     assert all(entry.absorbed or (entry.ordinary_gain or 0.0) < diagnosis.least_gain for entry in diagnosis.invisible)
     assert not any(cause.where.effect == effect for cause in diagnosis.causes)
+
+
+@pytest.mark.long
+def test_an_arm_that_the_torque_hides_shows_in_the_positions() -> None:
+    """What is left of its torque goes down in the noise; encoders and tendons disagree by all of it."""
+    case = makers.absorbed(1, replace(SHORT, presliding=True), "moment_arm")
+    (cause,) = case.diagnosed().causes
+    assert cause.where.effect == "moment_arm" and cause.gain.low > 0.9

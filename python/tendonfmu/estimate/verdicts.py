@@ -100,7 +100,8 @@ def judge_numbers(
     for k, (number, given) in enumerate(zip(numbers, structure.numbers, strict=True)):
         verdict = verdicts[columns[k]]
         cover = by_path[number.effect.path] if number.effect is not None else None
-        kept = "kept" if error[k] > NARROWED * before[k] else ""
+        was_known = before[k] < NARROWED * abs(given.value)  # else a guess, of which a value may move away
+        kept = "kept" if was_known and error[k] > NARROWED * before[k] else ""
         cause = _cause(verdict, cover) if error[k] > LIMIT * size[k] else kept
         judged.append(
             Fitted(
