@@ -160,7 +160,7 @@ void fixed_step_integrator::step(const commands& inputs, double time, double siz
   middle_ = state_;
   move_motors(inputs, middle, half);
   if (!find_middle(inputs, middle, half)) {
-    // at a stop Newton's method may go to and fro across the kink: two shorter steps instead
+    // at a stop Newton's method may jump back and forth across the kink: two shorter steps instead
     forget();
     if (divisions < most_divisions) {
       step(inputs, time, half, divisions + 1);
