@@ -7,10 +7,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 output=$(realpath -m "${1:-build/site}")
 environment=build/site-venv
 
-if [ "$(cat "$environment/requirements" 2>/dev/null)" != "$(cat requirements-site.lock)" ]; then
+if [ "$(cat "$environment/requirements" 2>/dev/null)" != "$(cat locks/site.lock)" ]; then
   "${PYTHON:-python3}" -m venv --clear "$environment"
-  "$environment/bin/python" -m pip install --disable-pip-version-check --no-input --quiet --require-hashes -r requirements-site.lock
-  cp requirements-site.lock "$environment/requirements"
+  "$environment/bin/python" -m pip install --disable-pip-version-check --no-input --quiet --require-hashes -r locks/site.lock
+  cp locks/site.lock "$environment/requirements"
 fi
 # A notice of the theme about other software is no finding of this build.
 export NO_MKDOCS_2_WARNING=1

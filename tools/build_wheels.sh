@@ -66,7 +66,7 @@ EOF
 }
 
 # The pinned versions without their hashes, which pip takes for requirements but not for what a build needs.
-make_constraints() { sed -nE 's/^([a-z0-9-]+==[^ ]+( ; [^\\]+)?) \\$/\1/p' requirements.lock >"$output/constraints.txt"; }
+make_constraints() { sed -nE 's/^([a-z0-9-]+==[^ ]+( ; [^\\]+)?) \\$/\1/p' locks/test.lock >"$output/constraints.txt"; }
 
 build_source() {
   # Every file of a source distribution has the same time, so ninja would take objects of other sources for these.

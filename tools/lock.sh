@@ -11,10 +11,6 @@ compile() {
     --no-annotate --no-header --output-file "$output" "$@"
 }
 
-compile requirements.lock pyproject.toml --group build --group test
-compile requirements-portable.lock --group portable --constraints requirements.lock
-compile requirements-wheel.lock --group wheel --constraints requirements.lock --constraints requirements-portable.lock
-compile requirements-coupling.lock --group coupling --constraints requirements.lock
-compile requirements-foreign.lock --group foreign --constraints requirements.lock
-compile requirements-viewers.lock --group viewers --constraints requirements.lock
-compile requirements-site.lock --group site
+compile locks/test.lock pyproject.toml --group build --group test
+for group in interop wheel; do compile "locks/$group.lock" --group "$group" --constraints locks/test.lock; done
+compile locks/site.lock --group site

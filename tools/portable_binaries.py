@@ -92,7 +92,7 @@ PLATFORMS = tuple(dict.fromkeys(target.platform for target in TARGETS))
 
 def zig_command() -> list[str]:
     if importlib.util.find_spec("ziglang") is None:
-        raise BuildError("ziglang: not installed; expected the packages of requirements-portable.lock")
+        raise BuildError("ziglang: not installed; expected the packages of locks/wheel.lock")
     return [sys.executable, "-m", "ziglang", "cc"]
 
 

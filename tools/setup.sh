@@ -199,20 +199,20 @@ download_package() {
 
 set_up_python() {
   local python stamp=.venv/.tendonfmu-requirements wanted
-  wanted="$(digest <requirements.lock) $PWD"
+  wanted="$(digest <locks/test.lock) $PWD"
   if is_stamped "$stamp" "$wanted" && .venv/bin/python -c '' 2>/dev/null; then return; fi
   python=$(find_python) || die "no Python >= 3.10 with venv and headers found: set PYTHON to one"
   quietly "making .venv with $("$python" --version)" "$python" -m venv --clear .venv
-  quietly "installing the locked Python packages" install_locked requirements.lock
+  quietly "installing the locked Python packages" install_locked locks/test.lock
   printf '%s\n' "$wanted" >"$stamp"
 }
 
-# An extra, such as `portable`, `coupling` or `foreign`, into the same environment.
+# What locks/interop.lock or locks/wheel.lock lists, into the same environment.
 set_up_extra() {
   local stamp=.venv/.tendonfmu-requirements-$1 wanted
-  wanted=$(digest <"requirements-$1.lock")
+  wanted=$(digest <"locks/$1.lock")
   if is_stamped "$stamp" "$wanted"; then return; fi
-  quietly "installing the Python extra $1" install_locked "requirements-$1.lock"
+  quietly "installing the Python extra $1" install_locked "locks/$1.lock"
   printf '%s\n' "$wanted" >"$stamp"
 }
 

@@ -19,10 +19,10 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-LOCKS = sorted(ROOT.glob("requirements*.lock"))
+LOCKS = sorted((ROOT / "locks").glob("*.lock"))
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 # A file or folder of the repository in a page, between backticks; `*` stands for any name.
-FOLDERS = "bench|cmake|docs|evidence|examples|fmu_src|modelDescription|python|python_tests|runtime|tools"
+FOLDERS = "cmake|docs|evidence|examples|fmu_src|locks|modelDescription|python|python_tests|runtime|tools"
 NAMED = re.compile(rf"`(?:python )?((?:{FOLDERS})/[\w./*-]*)")
 # Home and working folders of machines, and hosts of package registries (written apart, to be no match itself).
 MACHINE = re.compile(r"(?<![\w.~}>/-])/(?:work|root|home/[a-z]\w*|Users/[a-z]\w*)/")
@@ -76,15 +76,15 @@ def test_the_lock_holds_what_pyproject_asks_for() -> None:
     wanted = (
         PYPROJECT["project"]["dependencies"] + PYPROJECT["build-system"]["requires"] + groups["build"] + groups["test"]
     )
-    assert {name_of(requirement) for requirement in wanted} <= set(locked(ROOT / "requirements.lock"))
-    for group in ("portable", "foreign", "site", "viewers"):
-        assert {name_of(r) for r in groups[group]} <= set(locked(ROOT / f"requirements-{group}.lock"))
+    assert {name_of(requirement) for requirement in wanted} <= set(locked(ROOT / "locks/test.lock"))
+    for group in ("interop", "site", "wheel"):
+        assert {name_of(r) for r in groups[group]} <= set(locked(ROOT / f"locks/{group}.lock"))
 
 
 def test_the_environment_is_the_locked_one() -> None:
     versions = {
         name: {version for entry in entries for version in re.findall(r"==([\w.]+)(?= )", entry.split(";")[0])}
-        for name, entries in locked(ROOT / "requirements.lock").items()
+        for name, entries in locked(ROOT / "locks/test.lock").items()
     }
     for requirement in PYPROJECT["project"]["dependencies"]:
         assert metadata.version(name_of(requirement)) in versions[name_of(requirement)]

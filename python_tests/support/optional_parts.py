@@ -62,20 +62,20 @@ def _file(untested: str, path: Path, source: str) -> Part:
 
 
 PARTS = {
-    "mujoco": _package("fingers of MuJoCo", "mujoco", "requirements-foreign.lock"),
-    "rerun": _package("runs in the viewer Rerun", "rerun", "requirements-viewers.lock"),
-    "ecos": _package("our FMUs in ecos", "ecospy", "requirements-coupling.lock and the library libtbb12"),
-    "libcosim": _package("our FMUs in libcosim", "libcosimpy", "requirements-coupling.lock"),
-    "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "requirements-coupling.lock"),
-    "pythonfmu3": _package("FMUs of pythonfmu3", "pythonfmu3", "requirements-coupling.lock"),
-    "fmutool": _program("our FMUs in the FMU Manipulation Toolbox", "requirements-coupling.lock", "fmutool"),
+    "mujoco": _package("fingers of MuJoCo", "mujoco", "locks/interop.lock"),
+    "rerun": _package("runs in the viewer Rerun", "rerun", "locks/wheel.lock"),
+    "ecos": _package("our FMUs in ecos", "ecospy", "locks/interop.lock and the library libtbb12"),
+    "libcosim": _package("our FMUs in libcosim", "libcosimpy", "locks/interop.lock"),
+    "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "locks/interop.lock"),
+    "pythonfmu3": _package("FMUs of pythonfmu3", "pythonfmu3", "locks/interop.lock"),
+    "fmutool": _program("our FMUs in the FMU Manipulation Toolbox", "locks/interop.lock", "fmutool"),
     "fmi-sim": _program(
         "our FMUs in fmi-sim", "cargo install fmi-sim", os.environ.get("TENDONFMU_FMI_SIM") or "fmi-sim"
     ),
     "java": _program("our FMUs in programs in Java", "a Java runtime", "java"),
     "fmi4j": _file("our FMUs in FMI4j", FMI4J, "tools/nightly fetches it with Maven"),
     "maestro": _file("our FMUs in Maestro and VDMCheck", MAESTRO, "tools/nightly fetches it with Maven"),
-    "zig": _package("portable binaries", "ziglang", "requirements-portable.lock"),
+    "zig": _package("portable binaries", "ziglang", "locks/wheel.lock"),
     "davinci data": _file("the da Vinci tools", DATA / "davinci_tool", RECORDINGS),
     "emps data": _file("the carriage EMPS", DATA / "emps", RECORDINGS),
     "psm data": _file("the surgical arm PSM", DATA / "psm", RECORDINGS),

@@ -1,0 +1,384 @@
+"""Mutants: small wrong changes of the product. Tests that reach one have to notice it.
+
+    python tools/mutants.py draw build/mutants              200 mutants -> mutants.jsonl, by seed
+    python tools/mutants.py run build/mutants               every mutant: build, test, one line of results.jsonl
+    python tools/mutants.py run build/mutants --noticed OLD/results.jsonl     only those that were noticed then
+
+A mutant of Python is run by the tests that reach its lines (coverage, by test), a mutant of C and C++ by ctest and then by
+the Python tests of what is compiled of it: the quickest first, at most LIMIT seconds of them. One that does not compile is
+drawn again, that is its neighbour is taken. Needs pytest-cov, and what ./test has set up.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import queue
+import random
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LIMIT = 60.0  # s, of the tests of one mutant, by their time without it
+SHARE = {  # folders -> share of the mutants, and the Python tests of what is compiled
+    "runtime/core": (0.2, ("model", "fmu", "estimate")),
+    "runtime/estimation": (0.15, ("estimate",)),
+    "fmu_src": (0.15, ("fmu", "simulate")),
+    "python/tendonfmu/detect": (0.125, ()),
+    "python/tendonfmu/estimate": (0.125, ()),
+    "python/tendonfmu/diagnosis": (0.125, ()),
+    "python/tendonfmu/recordings": (0.125, ()),
+}
+KINDS = ("operator", "constant", "comparison", "statement")
+SWAPS = {"+": "-", "-": "+", "*": "/", "/": "*", "&&": "||", "||": "&&"}
+COMPARISONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
+NOT_CODE = re.compile(
+    r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|^[ \t]*#(?:\\\n|[^\n])*', re.S | re.M
+)
+C_TOKENS = {
+    "operator": re.compile(r"(?<= )(?:[-+*/]|&&|\|\|)(?= )"),
+    "constant": re.compile(r"(?<![\w.])\d+(?:\.\d*)?(?:e-?\d+)?(?![\w.])"),
+    "comparison": re.compile(r"(?<= )(?:[<>]=?|[=!]=)(?= )"),
+    "statement": re.compile(r"(?<=[;{}]\n)[ \t]+(?:[\w.*>\[\]-]+ [-+*/|&]?= [^;{]*|\w+\([^;{]*\))(?=;\n)"),
+}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change of whole lines of one file."""
+
+    name: str
+    group: str
+    kind: str
+    file: str
+    line: int  # from 1
+    old: str
+    new: str
+
+
+def is_compiled(mutant: Mutant) -> bool:
+    return not mutant.file.startswith("python/")
+
+
+# --- drawing ----------------------------------------------------------------------------------------------------------
+
+
+def changes_of_c(text: str) -> Iterator[tuple[str, int, int, str]]:
+    """Kind, begin, end and replacement of every change of a C or C++ source."""
+    code = NOT_CODE.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    for kind, pattern in C_TOKENS.items():
+        for match in pattern.finditer(code):
+            found = match[0]
+            if kind == "statement":
+                yield kind, match.start(), match.end(), ""
+            else:
+                yield kind, match.start(), match.end(), {**SWAPS, **COMPARISONS}.get(found) or other_number(found)
+
+
+def other_number(text: str) -> str:
+    return (
+        str(2 * (ast.literal_eval(text.lstrip("0") or "0")) or 1) if "." in text or "e" in text else str(int(text) + 1)
+    )
+
+
+def changes_of_python(text: str) -> Iterator[tuple[str, int, int, str]]:
+    """The same of a Python source."""
+    starts = [0]
+    for line in text.encode().splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+
+    def place(node: ast.expr | ast.stmt) -> tuple[int, int]:  # columns of ast count bytes
+        ends = starts[node.lineno - 1] + node.col_offset, starts[node.end_lineno - 1] + node.end_col_offset  # type: ignore
+        return tuple(len(text.encode()[:end].decode()) for end in ends)  # type: ignore[return-value]
+
+    tree = ast.parse(text)
+    typed = {id(inner) for node in ast.walk(tree) for hint in hints_of(node) for inner in ast.walk(hint)}
+    swaps = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And}
+    order = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+             ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}  # fmt: skip
+    for node in ast.walk(tree):
+        if id(node) in typed:
+            continue
+        if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in swaps:
+            node.op, kept = swaps[type(node.op)](), node.op
+            yield "operator", *place(node), f"({ast.unparse(node)})"
+            node.op = kept
+        elif isinstance(node, ast.Constant) and type(node.value) in (int, float, bool):
+            value = not node.value if isinstance(node.value, bool) else 2 * node.value or 1
+            yield "constant", *place(node), repr(value)
+        elif isinstance(node, ast.Compare) and type(node.ops[0]) in order:
+            kept = node.ops[0]
+            node.ops[0] = order[type(kept)]()
+            yield "comparison", *place(node), f"({ast.unparse(node)})"
+            node.ops[0] = kept
+        elif isinstance(node, ast.AugAssign) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)):
+            yield "statement", *place(node), "pass"
+
+
+def hints_of(node: ast.AST) -> list[ast.expr]:
+    """What is a type and never runs."""
+    found = [getattr(node, "annotation", None), getattr(node, "returns", None)]
+    return [hint for hint in found if isinstance(hint, ast.expr)]
+
+
+def mutants_of(folder: str) -> dict[str, list[Mutant]]:
+    """Every mutant of the folder by kind, in the order of the sources."""
+    found: dict[str, list[Mutant]] = defaultdict(list)
+    for path in sorted((ROOT / folder).rglob("*")):
+        if path.suffix not in (".c", ".h", ".cpp", ".py") or "fuzz" in path.parts:
+            continue
+        text, file = path.read_text(encoding="utf-8"), str(path.relative_to(ROOT))
+        every = changes_of_python(text) if path.suffix == ".py" else changes_of_c(text)
+        for kind, begin, end, instead in sorted(every, key=lambda each: each[1]):
+            first = text.rfind("\n", 0, begin) + 1
+            last = text.find("\n", end)
+            old, new = text[first:last], text[first:begin] + instead + text[end:last]
+            line = text.count("\n", 0, first) + 1
+            found[kind].append(Mutant(f"{file}:{line}:{kind}:{begin - first}", folder, kind, file, line, old, new))
+    return found
+
+
+def draw(number: int, seed: int) -> list[Mutant]:
+    """Evenly over the folders, kinds and lines."""
+    chance, drawn = random.Random(seed), []
+    for folder, (share, _) in SHARE.items():
+        pools, count = mutants_of(folder), round(share * number)
+        for index in range(count):
+            pool, of_kind = pools[KINDS[index % 4]], -(-count // 4)
+            drawn.append(pool[int((index // 4 + chance.random()) / of_kind * len(pool))])
+    return drawn
+
+
+# --- running ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tests:
+    """What coverage knows: which tests reach a line, and how long each takes."""
+
+    seconds: dict[str, float]  # of every test
+    reaching: dict[str, dict[int, set[str]]]  # file of the package -> line -> tests
+
+    def of(self, mutant: Mutant) -> list[str]:
+        if not is_compiled(mutant):
+            lines = self.reaching.get(mutant.file.removeprefix("python/"), {})
+            inside = range(mutant.line, mutant.line + mutant.old.count("\n") + 1)
+            names = set().union(*(lines.get(line, set()) for line in inside))
+            names = names or set().union(*lines.values())  # run at import: the tests that reach the file
+        else:
+            folders = SHARE[mutant.group][1]
+            names = {name for name in self.seconds if name.split("/")[1] in folders}
+        chosen, time_left = [], LIMIT
+        for name in sorted(names, key=lambda name: self.seconds.get(name, 0.0)):
+            time_left -= self.seconds.get(name, 0.0)
+            if time_left < 0.0:
+                break
+            chosen.append(name)
+        return chosen
+
+
+def measure_tests(folder: Path) -> Tests:
+    """Runs the quick tests once under coverage, or takes what a run before has kept."""
+    kept, log = folder / "coverage", folder / "tests.log"
+    if not kept.is_file():
+        settings = folder / "coveragerc"
+        settings.write_text(f"[run]\nsource_pkgs = tendonfmu\ndata_file = {kept}\nparallel = True\n", encoding="utf-8")
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-n2",
+            "--dist=loadfile",
+            "--durations=0",
+            "-vv",
+            "--cov=tendonfmu",
+        ]
+        command += [f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
+        with log.open("w", encoding="utf-8") as output:
+            subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, check=False)
+    import coverage
+
+    data = coverage.CoverageData(str(kept))
+    data.read()
+    reaching: dict[str, dict[int, set[str]]] = {}
+    for file in data.measured_files():
+        lines = {
+            line: {name.split("|")[0] for name in names if name}
+            for line, names in data.contexts_by_lineno(file).items()
+        }
+        reaching["tendonfmu" + file.rpartition("/tendonfmu")[2]] = lines
+    every = {name for lines in reaching.values() for names in lines.values() for name in names}
+    seconds = dict.fromkeys(every, 0.005)  # pytest names those that take longer
+    for taken, name in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(\S.*)$", log.read_text("utf-8"), re.M):
+        seconds[name] = seconds.get(name, 0.0) + float(taken)
+    return Tests(seconds, reaching)
+
+
+class Workshop:
+    """A copy of the sources with a build of its own, where one mutant after another is made."""
+
+    def __init__(self, folder: Path, tests: Tests) -> None:
+        self.source, self.site, self.build = folder / "source", folder / "site", folder / "build"
+        self.tests = tests
+        for name in git("ls-files"):
+            if (ROOT / name).is_file():
+                (self.source / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(ROOT / name, self.source / name)
+        (self.source / "build").mkdir(exist_ok=True)
+        if not (self.source / "build/sundials").exists():
+            (self.source / "build/sundials").symlink_to(ROOT / "build/sundials")
+        shutil.copytree(self.source / "python/tendonfmu", self.site / "tendonfmu", dirs_exist_ok=True)
+        options = [f"-DTENDONFMU_{name}=ON" for name in ("PYTHON", "BUILD_FMU", "BUILD_TESTS")]
+        self.call("cmake", "-S", self.source, "-B", self.build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", *options)
+        if not self.compiles():
+            raise RuntimeError(f"{folder}: the sources do not compile without a mutant")
+
+    def call(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
+        places = {"PYTHONPATH": str(self.site), "CCACHE_BASEDIR": str(self.source), "PYTHONDONTWRITEBYTECODE": "1"}
+        try:
+            return subprocess.run(
+                [*map(str, command)], cwd=self.source, env=os.environ | places, stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", timeout=20.0 * LIMIT,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return subprocess.CompletedProcess(command, 1, "(Failed) no end\nFAILED no end\n")
+
+    def compiles(self) -> bool:
+        built = self.call("cmake", "--build", self.build, "--parallel", "1").returncode == 0
+        return built and self.call("cmake", "--install", self.build, "--prefix", self.site).returncode == 0
+
+    def judge(self, mutant: Mutant) -> tuple[str, str]:
+        """`noticed` and by which test, `survived`, or `does not compile`."""
+        compiled = is_compiled(mutant)
+        path = self.source / mutant.file if compiled else self.site / mutant.file.removeprefix("python/")
+        original = path.read_text(encoding="utf-8")
+        where = nearest(original, mutant)
+        if where is None:
+            return "gone", ""
+        path.write_text(original[:where] + mutant.new + original[where + len(mutant.old) :], encoding="utf-8")
+        try:
+            if compiled and not self.compiles():
+                return "does not compile", ""
+            by = (self.failing_ctest() if compiled else "") or self.failing_pytest(mutant)
+            return ("noticed", by) if by else ("survived", "")
+        finally:
+            path.write_text(original, encoding="utf-8")
+
+    def failing_ctest(self) -> str:
+        ran = self.call("ctest", "--test-dir", self.build, "--stop-on-failure", "--timeout", "120")
+        found = re.search(r"- (.+) \((?:Failed|Timeout|SEGFAULT|.*exception.*|Subprocess .*)\)", ran.stdout)
+        return "" if ran.returncode == 0 else found[1] if found else "ctest"
+
+    def failing_pytest(self, mutant: Mutant) -> str:
+        chosen = self.tests.of(mutant)
+        if not chosen:
+            return ""
+        listed = self.source / "chosen.txt"
+        listed.write_text("\n".join(chosen), encoding="utf-8")
+        ran = self.call(
+            sys.executable, "-m", "pytest", "-x", "-q", "-n0", "--tb=no", "-p", "no:cacheprovider", f"@{listed}"
+        )
+        found = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", ran.stdout, re.M)
+        return (
+            ""
+            if ran.returncode == 0
+            else found[1]
+            if found
+            else f"pytest ended with {ran.returncode}: {ran.stdout[-300:]}"
+        )
+
+
+def nearest(text: str, mutant: Mutant) -> int | None:
+    """Where the lines of the mutant stand today: the place nearest to where they stood."""
+    starts = [match.start() for match in re.finditer(rf"^{re.escape(mutant.old)}$", text, re.M)]
+    return min(starts, key=lambda start: abs(text.count("\n", 0, start) + 1 - mutant.line), default=None)
+
+
+def git(*arguments: str) -> list[str]:
+    return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+def run(folder: Path, number: int, seed: int, workers: int, noticed: Path | None) -> None:
+    """Every mutant that has no result yet; compiled ones first."""
+    if noticed:
+        rows = [json.loads(line) for line in noticed.read_text("utf-8").splitlines()]
+        names = {field.name for field in fields(Mutant)}
+        mutants = [Mutant(**{name: row[name] for name in names}) for row in rows if row["status"] == "noticed"]
+    else:
+        mutants = draw(number, seed)
+    results, lock = folder / "results.jsonl", threading.Lock()
+    done = (
+        {json.loads(line)["drawn"] for line in results.read_text("utf-8").splitlines()} if results.is_file() else set()
+    )
+    waiting: queue.Queue[Mutant] = queue.Queue()
+    for mutant in sorted(mutants, key=is_compiled, reverse=True):
+        if mutant.name not in done:
+            waiting.put(mutant)
+    tests = measure_tests(folder)
+
+    def work(index: int) -> None:
+        shop, changed = Workshop(folder / str(index), tests), False
+        while True:
+            try:
+                drawn = mutant = waiting.get_nowait()
+            except queue.Empty:
+                return
+            compiled, began = is_compiled(mutant), time.monotonic()
+            if changed and not compiled:
+                shop.compiles()
+            changed = compiled
+            status, by = shop.judge(mutant)
+            while status == "does not compile":
+                mutant = neighbour(mutant)
+                status, by = shop.judge(mutant)
+            row = {
+                **asdict(mutant),
+                "drawn": drawn.name,
+                "status": status,
+                "by": by,
+                "seconds": time.monotonic() - began,
+            }
+            with lock, results.open("a", encoding="utf-8") as output:
+                output.write(json.dumps(row) + "\n")
+                print(f"{status:9} {mutant.name}  {by}", flush=True)
+
+    threads = [threading.Thread(target=work, args=(index,)) for index in range(workers)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def neighbour(mutant: Mutant) -> Mutant:
+    """The next of its kind in the folder."""
+    pool = mutants_of(mutant.group)[mutant.kind]
+    return pool[(pool.index(mutant) + 1) % len(pool)]
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("folder", type=Path)
+    options.add_argument("--number", type=int, default=200)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--workers", type=int, default=2)
+    options.add_argument(
+        "--noticed", type=Path, metavar="RESULTS", help="only the mutants that RESULTS says were noticed"
+    )
+    given = options.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    run(given.folder.resolve(), given.number, given.seed, given.workers, given.noticed)
+
+
+if __name__ == "__main__":
+    main()
