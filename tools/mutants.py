@@ -1,12 +1,11 @@
-"""Mutants: small wrong changes of the product. Tests that reach one have to notice it.
+"""Mutants: small wrong changes of the product, which its tests have to notice.
 
-    python tools/mutants.py draw build/mutants              200 mutants -> mutants.jsonl, by seed
-    python tools/mutants.py run build/mutants               every mutant: build, test, one line of results.jsonl
-    python tools/mutants.py run build/mutants --noticed OLD/results.jsonl     only those that were noticed then
+    python tools/mutants.py build/mutants                                  one line of results.jsonl for each mutant
+    python tools/mutants.py build/after --noticed build/mutants/results.jsonl     only those that were noticed then
 
-A mutant of Python is run by the tests that reach its lines (coverage, by test), a mutant of C and C++ by ctest and then by
-the Python tests of what is compiled of it: the quickest first, at most LIMIT seconds of them. One that does not compile is
-drawn again, that is its neighbour is taken. Needs pytest-cov, and what ./test has set up.
+A mutant of Python is run by the tests that reach its lines (coverage by test), one of C and C++ by ctest, and then by
+the Python tests of what is compiled of it: the quickest first, LIMIT seconds of them. For one that does not compile the
+next of its kind is taken. A call goes on where another ended. Needs what ./test has set up.
 """
 
 from __future__ import annotations

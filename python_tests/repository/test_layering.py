@@ -15,7 +15,10 @@ from repository_paths import ROOT
 PACKAGE = ROOT / "python" / "tendonfmu"
 RUNTIME = ROOT / "runtime"
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-C_LIBRARY = {f"{name}.h" for name in "assert errno float limits math stddef stdint stdio stdlib string".split()}
+C_LIBRARY = {
+    f"{name}.h"
+    for name in ["assert", "errno", "float", "limits", "math", "stddef", "stdint", "stdio", "stdlib", "string"]
+}
 # what a kernel or a platform needs beyond C, and the only files that may
 BEYOND_C = {
     "processor.h": {"cpuid.h", "intrin.h"},
