@@ -55,11 +55,11 @@ def read_contents(data: bytes) -> Contents:
     """Contents of a shared library. Raises ValueError for anything else."""
     lief.logging.disable()
     library = lief.parse(data)
-    if isinstance(library, lief.ELF.Binary):
+    if isinstance(library, lief.ELF.Binary) and library.header.identity_class == lief.ELF.Header.CLASS.ELF64:
         return _elf(library)
     if isinstance(library, lief.PE.Binary) and library.optional_header.magic == lief.PE.PE_TYPE.PE32_PLUS:
         return _pe(library)
-    if isinstance(library, lief.MachO.Binary):
+    if isinstance(library, lief.MachO.Binary) and library.header.is_64bit:
         return _mach_o(library)
     raise ValueError(f"starts with {data[:4]!r}; expected a 64-bit ELF, PE or Mach-O shared library")
 

@@ -11,6 +11,7 @@ next of its kind is taken. A call goes on where another ended. Needs what ./test
 from __future__ import annotations
 
 import argparse
+import filecmp
 import json
 import os
 import queue
@@ -190,9 +191,10 @@ class Workshop:
         self.source, self.site, self.build = folder / "source", folder / "site", folder / "build"
         self.tests = tests
         for name in git("ls-files"):
-            if (ROOT / name).is_file():
-                (self.source / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(ROOT / name, self.source / name)
+            copy = self.source / name
+            if (ROOT / name).is_file() and not (copy.is_file() and filecmp.cmp(ROOT / name, copy, shallow=False)):
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / name, copy)  # a new time: what an ended call left changed is compiled again
         (self.source / "build").mkdir(exist_ok=True)
         if not (self.source / "build/sundials").exists():
             (self.source / "build/sundials").symlink_to(ROOT / "build/sundials")
