@@ -1,1 +1,7 @@
-"""What the project's figures come from: each module holds the cases of one bench and writes its table."""
+"""What the project's figures come from: each file asks one question."""
+
+import sys
+from pathlib import Path
+
+# Fingers that tests use as well.
+sys.path.append(str(Path(__file__).resolve().parent.parent / "python_tests" / "support"))
