@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from evidence import tables
-from evidence.fingers.mjcf_models import ARMS, fixed_model
 from evidence.runner import parser
+from mjcf_models import ARMS, fixed_model
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import write_table
 from tendonfmu.mjcf import ImportSettings, export_numbers, import_finger

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import matched_rig
 from evidence import tables
-from evidence.fingers import matched_rig
-from evidence.fingers.matched_physics import read_finger
 from evidence.runner import EXAMPLES, parser
 from evidence.tables import Row
+from matched_physics import read_finger
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import write_table
 from tendonfmu.model.native import run_recording
