@@ -68,7 +68,7 @@ def test_the_same_seed_gives_the_same_case(module: str, number: int) -> None:
     )
 
 
-@pytest.mark.parametrize(("module", "number"), repeated(BEDS, 0, 5, 7, 10, 14, 20, 21))
+@pytest.mark.parametrize(("module", "number"), repeated(BEDS, 0, 4, 6, 8, 11, 16, 17))
 def test_a_case_is_sound(module: str, number: int) -> None:
     case = bed(module).make(number, SECONDS, 1.0)
     truth, inside, arms = case.truth, case.inside, np.array([row["moment_arms"] for row in case.nominal["tendons"]])
