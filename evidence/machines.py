@@ -141,7 +141,7 @@ def psm_finger(joints: Sequence[int]) -> dict[str, Any]:
 def psm(*joints: int) -> Machine:
     first, second, another = ([psm_run(name, joints) for name in names] for names in (FIRST, SECOND, ANOTHER))
     judged = {"other excitations": second, "another identification": another}
-    units = tuple("mN" if joint == 3 else "mN·m" for joint in joints)
+    units = tuple("N" if joint == 3 else "mN·m" for joint in joints)
     return Machine(psm_finger(joints), first, judged, units)
 
 
