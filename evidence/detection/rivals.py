@@ -28,8 +28,8 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import held_sign
 from evidence.runner import digest, plain
+from matched_physics import held_sign
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import DetectionScore, score_detection
 from tendonfmu.detect.counting import stretches

@@ -16,8 +16,8 @@ import pytest
 
 import diagnosis_examples as examples
 from command import Call
-from evidence.diagnosis.hidden_effects import hide
-from evidence.fingers.matched_rig import random_hand, record
+from hidden_effects import hide
+from matched_rig import random_hand, record
 from repository_paths import ROOT
 from tendonfmu.cli.command import several_values
 from tendonfmu.diagnosis.effects import CANDIDATES

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evidence.diagnosis.hidden_effects import hide
-from evidence.fingers.matched_rig import Hand, Made, random_hand, record
-from evidence.fingers.matched_strength import group
+from hidden_effects import hide
+from matched_rig import Hand, Made, random_hand, record
+from matched_strength import group
 from tendonfmu.model import native
 
 Array = NDArray[Any]

@@ -1,6 +1,6 @@
 """`tendonfmu check FINGER.json RECORDING`: signs, order and units of columns, clocks and sensors.
 
-The systematic table is `evidence/recordings/check.py`.
+How often it is right: docs/evidence/logs.md.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""Friction fitted on recordings made in MuJoCo and written back into a model, against the model that moved.
-
-python -m evidence.fit.mujoco_friction [--seeds 1 2 3 4]
-"""
+"""Friction fitted on recordings made in MuJoCo and written back into a model, against the model that moved."""
 
 from __future__ import annotations
 
 import json
-import tempfile
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from evidence import tables
-from evidence.fingers.mjcf_models import ARMS, fixed_model
-from evidence.runner import parser
+from mjcf_models import ARMS, fixed_model
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import write_table
 from tendonfmu.mjcf import ImportSettings, export_numbers, import_finger
@@ -107,25 +101,3 @@ def recover(folder: Path, seed: int) -> list[Recovered]:
 def number(model: Any, attribute: str, joint: str) -> float:
     """A number of a joint as MuJoCo has compiled it."""
     return float(getattr(model, f"dof_{attribute}")[model.joint(joint).dofadr[0]])
-
-
-def main() -> None:
-    options = parser(__doc__, output=None)
-    options.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4], help="one recording each")
-    seeds = options.parse_args().seeds
-    runs = []
-    for seed in seeds:
-        with tempfile.TemporaryDirectory() as folder:
-            runs.append(recover(Path(folder), seed))
-    lines, inside = [], 0
-    for values in zip(*runs, strict=True):
-        unit = "mN·m" if values[0].attribute == "frictionloss" else "mN·m·s/rad"
-        cells = [f"{1e3 * value.value:.2f} ± {1e3 * value.error:.2f}" for value in values]
-        lines.append([f"`{values[0].attribute}` of {values[0].joint}, {unit}", f"{1e3 * values[0].true:g}", *cells])
-        inside += sum(abs(value.value - value.true) <= 1.96 * value.error for value in values)
-    print(tables.table(["", "true", *(f"recording {seed}" for seed in seeds)], lines))
-    print(f"\n{inside} of {sum(map(len, runs))} within 1.96 standard errors.")
-
-
-if __name__ == "__main__":
-    main()

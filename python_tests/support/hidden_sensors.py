@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from evidence.fingers.matched_physics import Array, Finger, Motion
-from evidence.fingers.matched_rig import Hand, Hidden
+from matched_physics import Array, Finger, Motion
+from matched_rig import Hand, Hidden
 
 Random = np.random.Generator
 CROSSING = 0.03  # s in which the drive crosses the play at a reversal

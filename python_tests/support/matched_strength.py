@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from evidence.fingers.matched_physics import (
+from matched_physics import (
     Array,
     Finger,
     Motion,
@@ -23,7 +23,7 @@ from evidence.fingers.matched_physics import (
     read_finger,
     values_of,
 )
-from evidence.fingers.matched_rig import Hand, Made
+from matched_rig import Hand, Made
 
 BLOCK = 0.01  # s, over which series are averaged
 KNOTS = 2.0  # s, of the slow bias, which looks like a slow effect

@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 from scipy.signal import lfilter
 
-from evidence.fingers.matched_physics import (
+from matched_physics import (
     Array,
     Description,
     Finger,

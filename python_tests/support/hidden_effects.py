@@ -1,4 +1,4 @@
-"""What the matched rig can hide: every effect that `diagnose` may name, and three kinds it may not.
+"""What the matched rig can hide: every effect that `diagnose` may name, and two that it may not.
 
 Each builder takes the effect out of both descriptions at a random place and says how the true finger differs by one
 magnitude; `hide` scales it to a strength. Formulas are physics written here. Places count from 0, in `Hidden` from 1.
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from evidence.diagnosis.hidden_sensors import SENSORS, Random
-from evidence.fingers.matched_physics import Array, Description, Effect, Finger, Motion, build_up, held_sign
-from evidence.fingers.matched_rig import Hand, Hidden, Unreachable, record
-from evidence.fingers.matched_strength import look, residual, surviving
+from hidden_sensors import SENSORS, Random
+from matched_physics import Array, Description, Effect, Finger, Motion, build_up, held_sign
+from matched_rig import Hand, Hidden, Unreachable, record
+from matched_strength import look, residual, surviving
 
 Builder = Callable[[Hand, Random], tuple[Hand, Hidden]]
 CLOSE = 0.05  # in its logarithm, of the strength asked for
@@ -294,25 +294,6 @@ def drift(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
 # --- not on the list of effects: the right answer is `unknown` --------------------------------------------------------
 
 
-def rubbing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
-    """Two neighbouring tendons rub on each other before a joint: friction by their relative velocity."""
-    m, n = len(hand.truth["tendons"]), len(hand.truth["joints"])
-    i, j = int(rng.integers(m)), int(rng.integers(n))
-    other = (i + 1) % m
-
-    def change(finger: Finger, motion: Motion, magnitude: float) -> None:
-        sign = held_sign(motion.tendon[:, i, j] - motion.tendon[:, other, j], finger.tendon_threshold)
-
-        def torque(motion: Motion, force: Array) -> Array:
-            drag = magnitude * np.sqrt(np.abs(force[:, i] * force[:, other])) * sign
-            return at_joints(motion, slice(j, None), drag[:, None] * (finger.arms[i, j:] - finger.arms[other, j:]))
-
-        finger.extras.append(torque)
-
-    note = f"tendons {i + 1} and {other + 1} before joint {j + 1}"
-    return hand, Hidden("rubbing", joint=j + 1, tendon=i + 1, magnitude=0.02, note=note, finger=change)
-
-
 def periodic(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
     """A torque that comes and goes in time alone, such as the cogging of a motor that turns by itself; half beat."""
     j = int(rng.integers(len(hand.truth["joints"])))
@@ -351,7 +332,7 @@ def ageing(hand: Hand, rng: Random) -> tuple[Hand, Hidden]:
     return hand, Hidden("ageing", tendon=i + 1, magnitude=0.5, note=f"memory {memory:.1f} s", finger=change)
 
 
-UNKNOWN: dict[str, Builder] = {"rubbing": rubbing, "periodic": periodic, "ageing": ageing}
+UNKNOWN: dict[str, Builder] = {"periodic": periodic, "ageing": ageing}
 
 BUILDERS: dict[str, Builder] = {
     "viscous_friction": at_a_law("viscous_friction", "viscous", 0.2, 3),
@@ -385,7 +366,7 @@ def hide(
 ) -> tuple[Hand, dict[str, Any]]:
     """The hand with an effect hidden in it, and its label.
 
-    strength: of the recording of `motion` that lasts `seconds` (see strength.py); None: the usual magnitude.
+    strength: of the recording of `motion` that lasts `seconds` (matched_strength.py); None: the usual magnitude.
     Raises Unreachable where no magnitude within a factor 300 of the usual one has that strength.
     """
     hand, hidden = placed(hand, effect, seed)
