@@ -141,7 +141,7 @@ def psm_finger(joints: Sequence[int]) -> dict[str, Any]:
 def psm(*joints: int) -> Machine:
     first, second, another = ([psm_run(name, joints) for name in names] for names in (FIRST, SECOND, ANOTHER))
     judged = {"other excitations": second, "another identification": another}
-    units = tuple("mN" if joint == 3 else "mN·m" for joint in joints)
+    units = tuple("N" if joint == 3 else "mN·m" for joint in joints)
     return Machine(psm_finger(joints), first, judged, units)
 
 
@@ -198,6 +198,12 @@ def wire_contact(_folder: Path, _workers: int) -> Figures:
         "minutes": report["free_minutes"],
         "delay": float(np.median([event["delay_s"] for event in events])) - SMEAR,
     }
+
+
+def wire_table(figures: Figures) -> str:
+    cells = [f"{figures['found']} of {figures['events']}", f"{figures['false_alarms']} in {figures['minutes']:.1f} min"]
+    head = ["threshold, mN·m", "contacts found", "false alarms", "median delay, s"]
+    return table.table(head, [[f"{figures['threshold']:g}", *cells, f"{figures['delay']:.1f}"]])
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
@@ -329,10 +335,29 @@ NEEDS = ("../shared/data",)
 PARTS = {
     "models": Part(
         models,
+        minutes=3.0,
         needs=NEEDS,
+        headlines={
+            "da Vinci jaw.rows.0.errors.2": (0.0, 8.0),  # mN·m, odd loads
+            "EMPS carriage.rows.0.errors.2": (0.0, 1.9),  # N, pulses
+            "PSM joints 1 and 2.rows.0.errors.2": (0.0, 130.0),  # mN·m
+            "two wires.rows.0.errors.2": (0.0, 1.7),  # mN·m
+        },
         tables={"errors": error_table, "causes": cause_table},
     ),
-    "published": Part(published, needs=NEEDS, tables={"errors": published_table, "numbers": number_table}),
-    "wire_contact": Part(wire_contact, needs=NEEDS),
-    "so101": Part(unsigned, needs=NEEDS, headlines={"named": (18, 18)}),
+    "published": Part(
+        published,
+        minutes=0.1,
+        needs=NEEDS,
+        headlines={"errors.symmetric.0": (4.0, 4.1), "errors.with its causes.1": (0.0, 2.75)},
+        tables={"errors": published_table, "numbers": number_table},
+    ),
+    "wire_contact": Part(
+        wire_contact,
+        minutes=0.1,
+        needs=NEEDS,
+        headlines={"found": (18, 21), "false_alarms": (0, 2)},
+        tables={"contacts": wire_table},
+    ),
+    "so101": Part(unsigned, minutes=0.1, needs=NEEDS, headlines={"named": (18, 18)}),
 }
