@@ -1,237 +1,179 @@
-"""Makes every table of docs/evidence/ again: python -m evidence -o FOLDER
-
-The commands are the shell blocks (```sh) of the pages, run as they stand there. What each prints and writes as Markdown
-goes to FOLDER/NAME.md, what else it says to FOLDER/NAME.log, its files to FOLDER/work. A table whose file is there is
-not made again. Tables that need recordings of ../shared, or packages, that are not there are skipped, and it says so.
-The first line of a block is a comment with its time and needs:
-
-    # 20 min of one core; needs requirements-foreign.lock, ../shared/data
-    # time not measured
+"""Runs parts of the evidence, keeps their results, and checks that the pages say what was measured.
 
     python -m evidence --list
-    python -m evidence -o FOLDER --only recalibration emps --again
+    python -m evidence fit.recalibration logs.faults -o FOLDER [--workers N] [--keep]
+    python -m evidence --check
 
-Exit status: 0 all made or skipped, 1 a command failed.
+A part prints one JSON: its figures, command, commit, processor and seconds of processor time. It works in FOLDER/PART,
+and a second call goes on there. With --keep the JSON becomes evidence/results/PART.json, and the marked blocks of
+docs/evidence are written from it. --check fails where a headline figure left the interval that its part states, where a
+result is missing, and where a block is not what the result gives.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import itertools
+import argparse
+import importlib
+import json
 import os
+import pkgutil
+import platform
 import re
-import resource
 import subprocess
 import sys
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from evidence.runner import ROOT, parser, say, write
+import evidence
+from evidence import table
+from evidence.cases import ROOT, is_there, plain, say, write
+from evidence.part import Figures, Part
 
-PACKAGES = {
-    "requirements-foreign.lock": ("mujoco",),
-}
-LINKED = ("evidence", "docs", "examples", "python_tests")  # that commands of the pages name
-RUNNER = "python -m evidence -o"
-UNITS = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
+RESULTS = ROOT / "evidence" / "results"
+PAGES = ROOT / "docs" / "evidence"
 
-_KNOWN = re.compile(r"# (?:(?P<time>[\d.]+) (?P<unit>s|min|h) of one core|time not measured)(?:; needs (?P<needs>.+))?")
-_HEADING = re.compile(r"(?P<level>#+) (?P<text>.+)")
-
-
-# --- the shell blocks of the pages ------------------------------------------------------------------------------------
+Result = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Block:
-    """Commands of a page."""
-
-    name: str  # of the file that its tables go to
-    page: Path
-    section: str
-    line: int  # from 0
-    commands: str
-    known: bool  # time and needs are said
-    minutes: float | None  # of one core; None: not measured
-    needs: tuple[str, ...]  # what has to be installed or there
+def all_parts() -> dict[str, Part]:
+    """By QUESTION.NAME."""
+    names = [module.name for module in pkgutil.iter_modules(evidence.__path__) if module.name != "__main__"]
+    parts = {name: getattr(importlib.import_module(f"evidence.{name}"), "PARTS", {}) for name in names}
+    return {f"{question}.{name}": part for question, own in parts.items() for name, part in own.items()}
 
 
-def pages() -> list[Path]:
-    every = sorted((ROOT / "docs" / "evidence").glob("*.md"))
-    return [page for page in every if page.name != "README.md"]  # README.md is the index
-
-
-def blocks_of(page: Path) -> list[Block]:
-    """All blocks of shell commands, without those that make all tables."""
-    lines = page.read_text(encoding="utf-8").splitlines()
-    blocks: list[Block] = []
-    heading, begin = "", None
-    for number, line in enumerate(lines):
-        if begin is None and (match := _HEADING.fullmatch(line)):
-            heading = match["text"] if len(match["level"]) > 1 else ""
-        elif line == "```sh":
-            begin = number + 1
-        elif line == "```" and begin is not None:
-            commands = "\n".join(lines[begin:number])
-            if RUNNER not in commands:
-                blocks.append(_block(page, heading, begin, commands))
-            begin = None
-    return blocks
-
-
-def _block(page: Path, heading: str, line: int, commands: str) -> Block:
-    known = _KNOWN.fullmatch(commands.splitlines()[0])
-    short = re.sub(r"\W+", "_", re.split(r"[:,]", heading)[0].lower())
-    return Block(
-        name="_".join(part for part in (page.stem, short.strip("_")) if part),
-        page=page,
-        section=heading,
-        line=line,
-        commands=commands,
-        known=known is not None,
-        minutes=float(known["time"]) * UNITS[known["unit"]] if known and known["time"] else None,
-        needs=tuple(known["needs"].split(", ")) if known and known["needs"] else (),
-    )
-
-
-# --- running them -----------------------------------------------------------------------------------------------------
-
-
-def shared_folder() -> Path | None:
-    """The folder with `data` and `foreign`: beside the repository, or that of $TENDONFMU_DATA."""
-    given = os.environ.get("TENDONFMU_DATA")
-    places = [Path(given).resolve().parent] if given else []
-    return next((place for place in (*places, ROOT.parent / "shared") if place.is_dir()), None)
-
-
-def missing(block: Block, shared: Path | None) -> list[str]:
-    """What the block needs and is not there."""
-
-    def is_there(need: str) -> bool:
-        if need in PACKAGES:
-            return all(importlib.util.find_spec(name) for name in PACKAGES[need])
-        return shared is not None and (shared / need.removeprefix("../shared/")).is_dir()
-
-    return [need for need in block.needs if not is_there(need)]
-
-
-def work_folder(folder: Path, block: Block, shared: Path | None) -> Path:
-    """Where the block's commands run: what they name by relative paths is linked."""
-    work = folder / "work" / block.page.stem
+def measure(name: str, part: Part, folder: Path, workers: int) -> Result:
+    work = folder / name
     work.mkdir(parents=True, exist_ok=True)
-    links = {work / name: ROOT / name for name in LINKED}
-    if shared is not None:
-        links[work.parent / "shared"] = shared
-    for link, target in links.items():
-        if not link.exists():
-            link.symlink_to(target, target_is_directory=True)
-    return work
+    before = _processor_time()
+    figures = plain(part.run(work, workers))
+    return {
+        "part": name,
+        "figures": figures,
+        "command": f"python -m evidence {name} -o FOLDER",
+        "commit": _commit(),
+        "processor": _processor(),
+        "seconds": round(_processor_time() - before, 1),
+    }
 
 
-def run(block: Block, folder: Path, shared: Path | None) -> str | None:
-    """Runs the block's commands, writes NAME.md and NAME.log, returns the time it took. None: a command failed."""
-    work = work_folder(folder, block, shared)
-    programs = (
-        f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # `python` and `tendonfmu` of this Python
+def _processor_time() -> float:
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def _commit() -> str:
+    """With -dirty where anything but results and pages differs from it."""
+    head = ["git", "rev-parse", "--short=12", "HEAD"]
+    changed = ["git", "status", "--porcelain", "--untracked-files=no", "--", ".", ":!evidence/results", ":!docs"]
+    commit, changes = (
+        subprocess.run(c, cwd=ROOT, capture_output=True, text=True).stdout.strip() for c in (head, changed)
     )
-    environment = os.environ | {"PATH": programs, "COLUMNS": "200"}
-    if shared is not None:
-        environment |= {"TENDONFMU_DATA": str(shared / "data")}
-    began, clock, before = time.time(), time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    log = folder / f"{block.name}.log"
-    with log.open("w", encoding="utf-8") as messages:
-        ended = subprocess.run(
-            ["bash", "-euo", "pipefail", "-c", block.commands],
-            cwd=work, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages, text=True,
-        )  # fmt: skip
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    took = f"{spoken(time.monotonic() - clock)}, processor time {spoken(processor)}"
-    if ended.returncode:
-        with log.open("a", encoding="utf-8") as messages:
-            messages.write(f"{ended.stdout}\nended with status {ended.returncode}\n")
-        return None
-    # the tables that they wrote; where they wrote none, what they printed
-    written = [path for path in sorted(work.glob("**/*.md")) if path.stat().st_mtime >= began - 1.0]
-    texts = [path.read_text(encoding="utf-8").strip() for path in written] or [as_markdown(ended.stdout)]
-    head = f"# {block.section or block.page.stem}\n\n```sh\n{block.commands}\n```\n\n{took}"
-    write(folder / f"{block.name}.md", "\n\n".join([head, *texts]) + "\n")
-    return took
+    return f"{commit}-dirty" if changes else commit
 
 
-def as_markdown(printed: str) -> str:
-    """Tables of Markdown as they are, all else as it was printed."""
-    parts = []
-    for is_table, lines in itertools.groupby(printed.strip().splitlines(), lambda line: line.startswith("|")):
-        text = "\n".join(lines).strip("\n")
-        if text:
-            parts.append(text if is_table else f"```\n{text}\n```")
-    return "\n\n".join(parts)
+def _processor() -> str:
+    known = Path("/proc/cpuinfo")
+    names = re.findall(r"model name\s*: (.+)", known.read_text(encoding="utf-8")) if known.is_file() else []
+    return f"{next(iter(names), platform.machine())}, {os.cpu_count()} cores"
 
 
-def make(blocks: Sequence[Block], folder: Path, again: bool) -> int:
-    """Makes what is not there, one after another. Returns how many failed."""
-    shared = shared_folder()
-    failed = 0
-    for block in blocks:
-        if lacks := missing(block, shared):
-            say(f"SKIPPED: {block.name}: needs {', '.join(lacks)}, which is not there")
-        elif (folder / f"{block.name}.md").is_file() and not again:
-            say(f"{block.name}: there already")
-        else:
-            say(f"{block.name}: begins; {known_time(block)}")
-            took, log = run(block, folder, shared), folder / f"{block.name}.log"
-            failed += took is None
-            for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
-                if "SKIPPED" in line:  # by the command itself
-                    say(f"{block.name}: {line}")
-            say(f"FAILED: {block.name}: see {log}" if took is None else f"{block.name}: {took}")
-    return failed
+def keep(result: Result, part: Part, results: Path = RESULTS, pages: Path = PAGES) -> None:
+    """Store the result, and write its tables into its page."""
+    write(results / f"{result['part']}.json", as_text(result))
+    page = _page_of(result["part"], pages)
+    if page.is_file():
+        texts = {name: make(result["figures"]) for name, make in part.tables.items()}
+        write(page, table.with_blocks(page.read_text(encoding="utf-8"), result["part"], texts))
 
 
-def known_time(block: Block) -> str:
-    return "time not measured" if block.minutes is None else f"{spoken(60.0 * block.minutes)} of one core"
+def as_text(result: Result) -> str:
+    """JSON whose innermost lists stand on one line each."""
+    text = json.dumps(result, indent=1, ensure_ascii=False) + "\n"
+    return re.sub(r"\[\n[^\[\]{}]*\n\s*\]", lambda match: re.sub(r"\n\s*", " ", match[0]), text)
 
 
-def spoken(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
+def _page_of(name: str, pages: Path) -> Path:
+    return pages / f"{name.split('.')[0]}.md"
 
 
-def listing(blocks: Sequence[Block]) -> str:
-    """A line for each block, and the time of all."""
-    width = max(len(block.name) for block in blocks)
+def faults(parts: Mapping[str, Part], results: Path = RESULTS, pages: Path = PAGES) -> list[str]:
+    """What is wrong with results and pages, a line each."""
+    lines: list[str] = []
+    blocks: dict[tuple[str, str], str] = {}
+    for page in pages.glob("*.md"):
+        blocks |= table.blocks(page.read_text(encoding="utf-8"))
+    for name, part in parts.items():
+        file = results / f"{name}.json"
+        if not file.is_file():
+            lines.append(f"{name}: no result {file.name}; run it with --keep")
+            continue
+        own = {block: text for (of, block), text in blocks.items() if of == name}
+        try:
+            lines += _faults_of(name, part, json.loads(file.read_text(encoding="utf-8"))["figures"], own)
+        except (KeyError, IndexError) as missing:
+            lines.append(f"{name}: {file.name} has no {missing}")
+    return lines + [
+        f"{name}: no such part, but a page has its block {block}" for name, block in blocks if name not in parts
+    ]
+
+
+def _faults_of(name: str, part: Part, figures: Figures, blocks: Mapping[str, str]) -> list[str]:
     lines = []
-    for block in blocks:
-        needs = f"; needs {', '.join(block.needs)}" if block.needs else ""
-        lines.append(f"{block.name:{width}}  {known_time(block)}{needs}  ({block.page.relative_to(ROOT)})")
-    unknown = sum(block.minutes is None for block in blocks)
-    total = spoken(60.0 * sum(block.minutes or 0.0 for block in blocks))
-    return "\n".join([*lines, f"all: {total} of one core, and {unknown} whose time is not measured"])
+    for path, (low, high) in part.headlines.items():
+        value = table.at(figures, path)
+        if value is None or not low <= value <= high:
+            lines.append(f"{name}: {path} is {value}; the page states {low:g} to {high:g}")
+    for block, make in part.tables.items():
+        if blocks.get(block) != make(figures):
+            lines.append(f"{name}: the block {block} of the page is not what the result gives")
+    return lines + [
+        f"{name}: the page has a block {block}, which is no table" for block in blocks if block not in part.tables
+    ]
 
 
-def main() -> None:
-    options = parser(__doc__, output=None)
-    options.add_argument("-o", "--output", type=Path, metavar="FOLDER")
-    options.add_argument("--only", nargs="+", metavar="NAME", help="only these (--list has the names)")
-    options.add_argument("--again", action="store_true", help="make tables that are there once more")
-    options.add_argument("--list", action="store_true", help="names, known times and needs")
+def listing(parts: Mapping[str, Part]) -> str:
+    """A line for each part: its time of one core, and what it needs."""
+    lines = []
+    for name, part in parts.items():
+        time = "time not measured" if part.minutes is None else f"{part.minutes:g} min"
+        needs = [need if is_there(need) else f"{need} (MISSING)" for need in part.needs]
+        lines.append(f"{name:28} {time:18} {', '.join(needs)}".rstrip())
+    return "\n".join(lines)
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("parts", nargs="*", metavar="PART")
+    options.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="of everything that parts write")
+    options.add_argument("--workers", type=int, default=1, help="processes that run cases")
+    options.add_argument("--keep", action="store_true", help="store results, and write the pages' blocks")
+    options.add_argument("--list", action="store_true", help="names, minutes of one core, and needs")
+    options.add_argument("--check", action="store_true", help="compare results with headlines and pages")
     given = options.parse_args()
-    blocks = [block for page in pages() for block in blocks_of(page)]
-    unknown = set(given.only or ()) - {block.name for block in blocks}
-    if unknown:
-        options.error(f"--only {min(unknown)}: no such table; --list has the names")
-    chosen = [block for block in blocks if not given.only or block.name in given.only]
+    parts = all_parts()
     if given.list:
-        print(listing(chosen))
-        return
-    if given.output is None:
-        options.error("-o FOLDER is missing")
-    folder = given.output.resolve()
-    folder.mkdir(parents=True, exist_ok=True)
-    sys.exit(1 if make(chosen, folder, given.again) else 0)
+        print(listing(parts))
+        return 0
+    if given.check:
+        lines = faults(parts)
+        print("\n".join(lines) or f"{len(parts)} parts: results, headlines and pages agree")
+        return 1 if lines else 0
+    if unknown := set(given.parts) - set(parts):
+        options.error(f"{min(unknown)}: no such part; --list has the names")
+    if not given.parts or given.output is None:
+        options.error("expected PART and -o FOLDER, --list or --check")
+    for name in given.parts:
+        if missing := [need for need in parts[name].needs if not is_there(need)]:
+            say(f"SKIPPED: {name}: needs {', '.join(missing)}, which is not there")
+            continue
+        result = measure(name, parts[name], given.output.resolve(), given.workers)
+        if given.keep:
+            keep(result, parts[name])
+        print(as_text(result), end="")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -20,6 +20,6 @@ class Part:
     run: Callable[[Path, int], Figures]  # folder of what it keeps (a second call goes on there), number of workers
     minutes: float | None = None  # of one core; None: not measured
     needs: tuple[str, ...] = ()  # "../shared/data", "../shared/foreign", or the name of a package
-    # Figures that a reader relies on: "jaw.left" (path in the figures) -> lowest and highest value that the page states.
+    # Figures that a reader relies on, by path ("jaw.left"): lowest and highest value that the page states.
     headlines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[Figures], str]] = field(default_factory=dict)  # name of the marked block -> Markdown

@@ -1,0 +1,141 @@
+"""How well does a fit find the friction?"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from evidence.cases import EXAMPLES
+from evidence.fit.paper_figures import paper
+from evidence.fit.recalibration import LIMIT, recalibration
+from evidence.fit.recovery import SETTINGS, levers, recovery
+from evidence.part import Figures, Part
+from evidence.table import of_cells, table
+
+SEEDS = (1, 2, 3, 4)  # of recordings made in MuJoCo
+RATIOS = ("after/before: median", "90 %", "worst", "above 1.05")
+
+
+def virtual_hand(folder: Path, workers: int) -> Figures:
+    """The table that the example prints, and of it the fit to varied tension with the paper's bias, in %."""
+    program = [sys.executable, str(EXAMPLES / "rigs" / "virtual_hand.py"), "-o", str(folder)]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines()[2:]]
+    best = next(line for line in lines if line[:3] == ["of the paper", "varied", "symmetric"])
+    return {"lines": lines, "left": [float(cell.split()[0].strip("*")) for cell in best[4:]]}
+
+
+def written_back(folder: Path, workers: int) -> Figures:
+    """Friction fitted on recordings made in MuJoCo and written back into a model, against the model that moved."""
+    from mujoco_friction import recover
+
+    runs = []
+    for seed in SEEDS:
+        (folder / f"{seed}").mkdir(exist_ok=True)
+        runs.append(recover(folder / f"{seed}", seed))
+    lines, inside = [], 0
+    for values in zip(*runs, strict=True):
+        first = values[0]
+        unit = "mN·m" if first.attribute == "frictionloss" else "mN·m·s/rad"
+        cells = [f"{1e3 * value.value:.2f} ± {1e3 * value.error:.2f}" for value in values]
+        lines.append([f"`{first.attribute}` of {first.joint}, {unit}", f"{1e3 * first.true:g}", *cells])
+        inside += sum(abs(value.value - value.true) <= 1.96 * value.error for value in values)
+    return {"inside": inside, "of": sum(map(len, runs)), "lines": lines}
+
+
+def contact_table(figures: Figures) -> str:
+    """Figure 8 of the paper, in numbers."""
+    names = {"fitted": "fitted as in the paper, its rule", "calibrated": "calibrated"}
+    lines = [
+        [
+            name,
+            ", ".join(f"{error:.1f}" for error in figures["8"][key]["error"]),
+            f"{figures['8'][key]['reported']} of {figures['8'][key]['pushes']}",
+            f"{100 * figures['8'][key]['false_share']:.1f} %",
+        ]
+        for key, name in names.items()
+    ]
+    return table(["description", "error by joint, mN·m rms", "pushes with contact", "alarm without a push"], lines)
+
+
+def prediction_table(figures: Figures) -> str:
+    """Figures 6 and 7 of the paper, in numbers."""
+    lines = [
+        [name, str(joint + 1), *(f"{figures[number][key][joint]:.1f}" for key in ("torque", "residual", "error"))]
+        for number, name in (("6", "10 N, trained"), ("7", "40 N, not trained"))
+        for joint in range(2)
+    ]
+    return table(["mN·m rms, 60 s", "joint", "torque", "residual", "error against the true friction"], lines)
+
+
+PARTS = {
+    "recovery": Part(
+        recovery,
+        headlines={
+            f"{setting}.{figure}": interval
+            for setting in SETTINGS
+            for figure, interval in {
+                "identifiable, least": (0.7, 1.0),
+                "batch: within 3 standard errors": (0.99, 1.0),
+                "batch: mean square": (0.8, 1.25),
+                "not converged": (0, 0),
+            }.items()
+        },
+        tables={"recovery": of_cells("lines", ["", *SETTINGS])},
+    ),
+    "levers": Part(
+        levers,
+        headlines={"numbers": (472, 472), "usual": (0.78, 0.84), "worst": (0.1, 0.25)},
+        tables={"levers": of_cells("lines", ["", "identifiable of 472", ""])},
+    ),
+    "recalibration": Part(
+        recalibration,
+        minutes=2.0,
+        needs=("../shared/data",),
+        headlines={"jaw.above": (0, 12), "jaw.worst": (0.95, 1.2), "fingers.worst": (0.9, LIMIT)},
+        tables={
+            "jaw": of_cells("jaw.lines", ["numbers", "factor", *RATIOS], 2),
+            "fingers": of_cells("fingers.lines", ["pretension", "judged", *RATIOS], 2),
+        },
+    ),
+    "virtual_hand": Part(
+        virtual_hand,
+        headlines={"left.0": (10, 20), "left.1": (10, 25), "left.2": (10, 20), "left.3": (10, 25)},
+        tables={
+            "residual": of_cells(
+                "lines",
+                [
+                    "bias",
+                    "training",
+                    "sides",
+                    "numbers",
+                    "excite, 10 N",
+                    "excite, 40 N",
+                    "strokes, 10 N",
+                    "strokes, 40 N",
+                ],
+                3,
+            )
+        },
+    ),
+    "written_back": Part(
+        written_back,
+        minutes=0.1,
+        needs=("mujoco",),
+        headlines={"inside": (15, 16), "of": (16, 16)},
+        tables={"numbers": of_cells("lines", ["", "true", *(f"recording {seed}" for seed in SEEDS)])},
+    ),
+    "paper": Part(
+        paper,
+        minutes=0.3,
+        headlines={
+            "2b.largest_difference": (0.0, 1e-15),
+            "6.residual.0": (2.3, 2.9),
+            "7.residual.0": (7.4, 9.1),
+            "8.calibrated.reported": (11, 11),
+            "8.calibrated.false_share": (0.0, 0.12),
+        },
+        tables={"prediction": prediction_table, "contact": contact_table},
+    ),
+}

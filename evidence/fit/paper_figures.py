@@ -1,16 +1,10 @@
-"""Draws figures 2b, 5, 6, 7 and 8 of the paper again, on data whose truth is known, and prints the numbers beside them.
-
-    python -m evidence.fit.paper_figures [-o docs/figures]        # 2 min of one core
-
-The simulated finger knows its true friction and external torques. Writes paper_2b.png ... paper_8.png.
-"""
+"""Draws figures 2b, 5, 6, 7 and 8 of the paper again, on data whose truth is known: docs/reference/paper.md."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from evidence import tables
-from evidence.runner import EXAMPLES, INDEX_FINGER, parser
+from evidence.cases import EXAMPLES, INDEX_FINGER
+from evidence.part import Figures
+from evidence.table import rms
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import stretches
 from tendonfmu.estimate import FrictionFit
@@ -73,8 +68,8 @@ def run_joint(speed: Numbers) -> dict[str, Numbers]:
     return run_recording(one_joint(), signals | joint, 3)
 
 
-def figure_2b(folder: Path) -> None:
-    """T = T_eff − b_eff over the velocity: 0 up to v_min, eq. (1) beyond."""
+def figure_2b(folder: Path) -> Figures:
+    """T = T_eff − b_eff over the velocity: 0 up to v_min, eq. (1) beyond; the largest difference, N·m."""
     speed = np.linspace(-0.6, 0.6, 1201)
     outputs = run_joint(speed)
     friction = (outputs["friction_torque"] - outputs["bias_torque"])[:, 0]
@@ -85,11 +80,11 @@ def figure_2b(folder: Path) -> None:
     axis.axvspan(-THRESHOLD, THRESHOLD, color="#f0e6d0", label="|v| ≤ v_min: the bias holds the friction")
     axis.set(xlabel="joint velocity (rad/s)", ylabel="friction (mN·m)")
     finish(figure, [axis], folder / "paper_2b.png")
-    row("2b", "largest difference from eq. (1), N·m", f"{np.abs(friction - expected).max():.1e}")
+    return {"largest_difference": float(np.abs(friction - expected).max())}
 
 
-def figure_5(folder: Path) -> None:
-    """A fast reversal, and one with a rest of 0.5 s: the first is undone, the second forgotten by e^(−αt)."""
+def figure_5(folder: Path) -> Figures:
+    """A fast reversal, and one with a rest of 0.5 s: the first is undone, the second forgotten by e^(−αt); N·m."""
     fast = np.concatenate([np.full(200, 0.3), np.linspace(0.3, -0.3, 20), np.full(280, -0.3)])
     rest = np.concatenate([np.linspace(-0.3, 0.0, 20), np.zeros(500), np.linspace(0.0, 0.3, 20), np.full(260, 0.3)])
     speed = np.concatenate([fast, rest])
@@ -108,19 +103,15 @@ def figure_5(folder: Path) -> None:
     slow = np.abs(speed) <= THRESHOLD
     steps = np.abs(np.diff(total))
     enters, leaves = np.flatnonzero(~slow[:-1] & slow[1:]), np.flatnonzero(slow[:-1] & ~slow[1:])
-    row("5", "steps of T_eff on coming to rest, N·m", ", ".join(f"{step:.1e}" for step in steps[enters]))
     twice = 2.0 * float(law(np.array([THRESHOLD]))[0])
+    figures: Figures = {"steps_to_rest": steps[enters].tolist()}
     for name, enter, leave, change in (
-        ("fast reversal", enters[0], leaves[0], bias[450] - bias[150]),
-        ("reversal with a rest", enters[1], leaves[1], bias[-1] - bias[450]),
+        ("fast", enters[0], leaves[0], bias[450] - bias[150]),
+        ("with_rest", enters[1], leaves[1], bias[-1] - bias[450]),
     ):
         span = (leave - enter - 1) / RATE  # s between the first and the last sample at rest
-        forgotten = 1.0 - np.exp(-FORGET * span)
-        row(
-            "5",
-            f"{name}, {span:.3f} s: |change of the bias|, N·m",
-            f"{abs(change):.6f}; by eq. {twice * forgotten:.6f}",
-        )
+        figures[name] = {"at_rest": span, "change": abs(change), "formula": twice * (1.0 - np.exp(-FORGET * span))}
+    return figures
 
 
 # --- figures 6 to 8: the simulated index finger -----------------------------------------------------------------------
@@ -130,7 +121,7 @@ def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
     """The recording's file, itself, and the truth at the same times."""
     recording, truth = folder / f"{rig}.parquet", folder / f"{rig}_truth.parquet"
     words = ["simulate", str(EXAMPLES / "rigs" / f"{rig}.json"), "-o", str(recording), "--truth", str(truth)]
-    subprocess.run([sys.executable, "-m", "tendonfmu.cli", *words], check=True)
+    subprocess.run([sys.executable, "-m", "tendonfmu.cli", *words], check=True, stdout=subprocess.DEVNULL)
     return recording, read_recording(recording), pd.read_parquet(truth)
 
 
@@ -139,8 +130,8 @@ def joints_of(truth: pd.DataFrame, name: str) -> Numbers:
     return np.asarray(truth[[column for column in truth.columns if column.startswith(f"{name}[")]])
 
 
-def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:
-    """Joint torques and predicted friction of the first two joints, as figs. 6 and 7."""
+def prediction(number: int, fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> Figures:
+    """Joint torques and predicted friction of the first two joints, as figs. 6 and 7; mN·m rms of each joint."""
     file, recording, truth = case
     predicted = fit.predict(file)
     torque = joints_of(truth, "joint_torque")
@@ -156,33 +147,33 @@ def prediction(number: str, fit: FrictionFit, case: tuple[Path, Recording, pd.Da
     axes[-1].set(xlabel="time (s)")
     finish(figure, axes, folder / f"paper_{number}.png")
     known = ~np.isnan(predicted).any(axis=1)
-    for joint in JOINTS:
-        error = tables.rms(predicted[known, joint] - friction[known, joint])
-        missed = tables.rms(predicted[known, joint] - torque[known, joint])
-        moved = tables.rms(torque[known, joint])
-        numbers = f"{1e3 * moved:.1f}, {1e3 * missed:.2f} ({missed / moved:.0%}), {1e3 * error:.2f}"
-        row(number, f"joint {joint + 1}: torque, residual, error against the true friction, mN·m rms", numbers)
+    return {
+        "torque": [1e3 * rms(torque[known, joint]) for joint in JOINTS],
+        "residual": [1e3 * rms((predicted - torque)[known, joint]) for joint in JOINTS],
+        "error": [1e3 * rms((predicted - friction)[known, joint]) for joint in JOINTS],
+    }
 
 
-def figure_8(fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> None:
+def figure_8(fit: FrictionFit, case: tuple[Path, Recording, pd.DataFrame], folder: Path) -> Figures:
     """Joint torques, compensated torques, sensed force and detected contact during motion with pushes."""
     _, recording, truth = case
     external, force = joints_of(truth, "external_torque"), np.linalg.norm(joints_of(truth, "contact_force"), axis=1)
     pushed = truth["contact"].to_numpy() > 0
-    fitted = {"fitted, the paper's rule": fit.description_.data}
-    described = fitted | {"calibrated": json.loads(CALIBRATED.read_text(encoding="utf-8"))}
+    described = {"fitted": fit.description_.data, "calibrated": json.loads(CALIBRATED.read_text(encoding="utf-8"))}
     runs = {name: run_recording(data, recording.arrays()) for name, data in described.items()}
     draw_8(recording.time, joints_of(truth, "joint_torque"), runs["calibrated"], external, force, folder)
+    figures: Figures = {}
     for name, outputs in runs.items():
-        error = [
-            tables.rms(outputs["compensated_torque"][pushed, j] - external[pushed, j]) for j in range(external.shape[1])
-        ]
-        numbers = ", ".join(f"{1e3 * value:.1f}" for value in error)
-        row("8", f"{name}: error of the external torque in contact by joint, mN·m rms", numbers)
+        missed = (outputs["compensated_torque"] - external)[pushed]
         alarm = outputs["contact"].astype(bool).reshape(-1)
         reported = [bool(alarm[first : last + 1].any()) for first, last in stretches(recording.time, pushed)]
-        row("8", f"{name}: pushes with contact reported, of all", f"{sum(reported)} of {len(reported)}")
-        row("8", f"{name}: time in alarm without a push", f"{np.mean(alarm[~pushed]):.1%}")
+        figures[name] = {
+            "error": [1e3 * rms(column) for column in missed.T],  # mN·m rms in contact
+            "reported": sum(reported),
+            "pushes": len(reported),
+            "false_share": float(np.mean(alarm[~pushed])),
+        }
+    return figures
 
 
 def draw_8(
@@ -204,11 +195,7 @@ def draw_8(
     finish(figure, axes, folder / "paper_8.png")
 
 
-# --- both -------------------------------------------------------------------------------------------------------------
-
-
-def row(figure: str, what: str, value: str) -> None:
-    print(f"| {figure} | {what} | {value} |", flush=True)
+# --- all --------------------------------------------------------------------------------------------------------------
 
 
 def finish(figure: Any, axes: Any, file: Path) -> None:
@@ -221,23 +208,14 @@ def finish(figure: Any, axes: Any, file: Path) -> None:
     plt.close(figure)
 
 
-def main() -> None:
-    options = parser(__doc__, output=None)
-    options.add_argument("-o", "--output", type=Path, default=Path("."), help="folder")
-    output = options.parse_args().output
-    output.mkdir(parents=True, exist_ok=True)
-    print("| figure | number | value |\n| --- | --- | --- |")
-    figure_2b(output)
-    figure_5(output)
-    with tempfile.TemporaryDirectory() as folder:
-        low, high, pushes = (
-            simulated(rig, Path(folder)) for rig in ("index_finger", "index_finger_x4", "index_finger_pushes")
-        )
-        fit = FrictionFit(INDEX_FINGER, uncertainty=False).fit([low[0]])
-        prediction("6", fit, low, output)
-        prediction("7", fit, high, output)
-        figure_8(fit, pushes, output)
-
-
-if __name__ == "__main__":
-    main()
+def paper(folder: Path, workers: int) -> Figures:
+    """The figures as paper_*.png in the folder, and their numbers."""
+    low, high, pushes = (simulated(rig, folder) for rig in ("index_finger", "index_finger_x4", "index_finger_pushes"))
+    fit = FrictionFit(INDEX_FINGER, uncertainty=False).fit([low[0]])
+    return {
+        "2b": figure_2b(folder),
+        "5": figure_5(folder),
+        "6": prediction(6, fit, low, folder),
+        "7": prediction(7, fit, high, folder),
+        "8": figure_8(fit, pushes, folder),
+    }

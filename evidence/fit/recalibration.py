@@ -1,19 +1,11 @@
-"""Fingers fitted again on 20 s under one load or pretension, judged under the others.
-
-    python -m evidence.fit.recalibration
-
-The da Vinci jaw needs the recordings in ../shared/data or $TENDONFMU_DATA. Prints the tables of
-docs/evidence/recalibration.md.
-"""
+"""Does a plain fit to 20 s under one load or pretension keep a good model good under the others?"""
 
 from __future__ import annotations
 
 import copy
 import json
-import sys
-import tempfile
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,33 +13,51 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from evidence import tables
-from evidence.fingers import matched_rig
-from evidence.fingers.matched_physics import read_finger
-from evidence.runner import EXAMPLES, parser
-from evidence.tables import Row
+import matched_rig
+from evidence.cases import run_cases
+from evidence.machines import EVEN, FAST, HERE, ODD, jaw_run
+from evidence.part import Figures
+from evidence.table import Row, by, column, rms
+from matched_physics import read_finger
 from tendonfmu.estimate import FitWarning, FrictionFit
-from tendonfmu.files import write_table
 from tendonfmu.model.native import run_recording
-from tendonfmu.recordings import Recording, convert_file
-from tendonfmu.recordings import read_recording as read_file
-
-sys.path.insert(0, str(EXAMPLES / "davinci"))
-from jaw_recordings import FAST, FAULT, SLOW, data_folder, rms, torque_error
+from tendonfmu.recordings import Recording
 
 Description = Mapping[str, Any]
 
-STRUCTURE = EXAMPLES / "davinci" / "jaw_extended.json"
-EVEN = ("00", "02", "04", "06", "08")
-PLANTED = (1.0, 1.3, 0.7)  # times the joint's Coulomb friction
-COULOMB = "joints[1].friction.coulomb"
-PRETENSION = 13.0  # N; as in docs/evidence/davinci.md
+FACTORS = (1.0, 1.3, 0.7)  # times the joint's Coulomb friction, before the fit
 LIMIT = 1.05  # of the error before
 HANDS = range(1, 13)
-STARTS = 4  # of each finger, its numbers off by up to OFF
-OFF, SECONDS = 0.3, 20.0
+STARTS, OFF = 4, 0.3  # of each finger, every number off by up to OFF
+SECONDS = 20.0
 LEVELS = (1.0, 2.0, 4.0)  # times the pretension
 SETTLED = 50  # samples; the bias begins with the first one
+
+
+def recalibration(folder: Path, workers: int) -> Figures:
+    """Errors after over before, of the jaw and of fingers whose truth is known."""
+    starts = {
+        f"jaw_{numbers}_{factor:g}": (numbers, factor) for numbers in ("guessed", "estimated") for factor in FACTORS
+    }
+    jaw = run_cases(jaw_rows, starts, folder, workers)
+    fingers = run_cases(finger_rows, {f"finger_{seed:02d}": (seed,) for seed in HANDS}, folder, workers)
+    return {
+        "jaw": _summary(jaw, ("numbers", "factor")),
+        "fingers": _summary(fingers, ("pretension", "judged")),
+    }
+
+
+def _summary(cases: Sequence[Row], keys: Sequence[str]) -> Figures:
+    rows = [row for case in cases for row in case["rows"]]
+    ratio = column(rows, "ratio")
+    above = {"worst": float(ratio.max()), "above": int(np.sum(ratio > LIMIT)), "of": len(ratio)}
+    return above | {"lines": by(rows, keys, _ratios)}
+
+
+def _ratios(rows: Sequence[Row]) -> list[str]:
+    ratio = column(rows, "ratio")
+    values = [np.median(ratio), np.quantile(ratio, 0.9), ratio.max()]
+    return [*(f"{value:.2f}" for value in values), f"{np.sum(ratio > LIMIT)} of {len(ratio)}"]
 
 
 def fitted(finger: Any, recordings: Sequence[Recording], kinematics: int = 1) -> dict[str, Any]:
@@ -58,20 +68,24 @@ def fitted(finger: Any, recordings: Sequence[Recording], kinematics: int = 1) ->
     return dict(json.loads(fit.description_text()))
 
 
-# --- the jaw ----------------------------------------------------------------------------------------------------------
+# --- the da Vinci jaw -------------------------------------------------------------------------------------------------
 
 
-def read_runs(folder: Path) -> dict[str, Recording]:
-    """By name, as `tendonfmu convert davinci --pretension 13` writes them, up to the fault of run 07."""
-    runs = {}
-    for name in (*SLOW, *FAST):
-        file = folder / f"{name}.parquet"
-        write_table(file, convert_file("davinci", data_folder() / f"{name}.TXT", {"pretension": PRETENSION}))
-        whole = read_file(file)
-        end = int(np.searchsorted(whole.time, FAULT.get(name, np.inf), side="right"))
-        groups = {group: np.ascontiguousarray(values[:end]) for group, values in whole.groups.items()}
-        runs[name] = Recording(file, np.ascontiguousarray(whole.time[:end]), groups)
-    return runs
+def jaw_rows(numbers: str, factor: float) -> Row:
+    """One start, fitted to each run and judged on each other one."""
+    runs = {name: jaw_run(name) for name in (*EVEN, *ODD, *FAST)}
+    file = HERE / "davinci" / "extended.json"
+    start = {key: value for key, value in json.loads(file.read_text(encoding="utf-8")).items() if key != "estimated"}
+    if numbers == "estimated":
+        start = fitted(start, [runs[name] for name in EVEN])
+    finger = planted(start, factor)
+    before = _errors(finger, runs)
+    rows = []
+    for run in runs:
+        after = _errors(fitted(finger, [runs[run]]), runs)
+        about = {"numbers": numbers, "factor": f"× {factor:g}"}
+        rows += [about | {"ratio": after[other] / before[other]} for other in runs if other != run]
+    return {"rows": rows}
 
 
 def planted(finger: Description, factor: float) -> dict[str, Any]:
@@ -84,54 +98,33 @@ def planted(finger: Description, factor: float) -> dict[str, Any]:
     return data
 
 
-def jaw_rows(only: Sequence[str] = (*SLOW, *FAST), factors: Sequence[float] = PLANTED) -> list[Row]:
-    """Each start, each run: rms in N·m on each other run."""
-    rows = []
-    with tempfile.TemporaryDirectory() as scratch:
-        runs = read_runs(Path(scratch))
-        guess = {key: value for key, value in json.loads(STRUCTURE.read_text()).items() if key != "estimated"}
-        known = fitted(guess, [runs[name] for name in EVEN])
-        for numbers, start in (("guessed", guess), ("estimated", known)):
-            for factor in factors:
-                finger = planted(start, factor)
-                before = _errors(finger, runs)
-                for run in only:
-                    after = _errors(fitted(finger, [runs[run]]), runs)
-                    rows += [
-                        {"numbers": numbers, "factor": f"× {factor:g}", "fitted": run, "judged": other}
-                        | {"before": before[other], "after": after[other], "ratio": after[other] / before[other]}
-                        for other in runs
-                        if other != run
-                    ]
-    return rows
-
-
 def _errors(finger: Description, runs: Mapping[str, Recording]) -> dict[str, float]:
-    return {name: rms(torque_error(run, run_recording(finger, run.arrays()))) for name, run in runs.items()}
+    """[N·m] rms of the compensated torque less what the sensor at the jaw felt, of each run."""
+    outputs = {name: run_recording(finger, run.arrays()) for name, run in runs.items()}
+    return {name: rms(outputs[name]["compensated_torque"] - runs[name].groups["external_torque"]) for name in runs}
 
 
 # --- fingers whose truth is known -------------------------------------------------------------------------------------
 
 
-def sibling_rows(seeds: Iterable[int] = HANDS, starts: int = STARTS) -> list[Row]:
-    """Each finger, each start: fitted to one pretension, or to one that varies, and judged at several."""
+def finger_rows(seed: int) -> Row:
+    """One finger, each start: fitted to one pretension, or to one that varies, and judged at several."""
+    hand = matched_rig.random_hand(
+        seed, joints=2 + seed % 2, presliding=True, source=1 if seed % 3 else 2, rate=500.0, cutoff=20.0
+    )
+    hand = replace(hand, noise=replace(hand.noise, tendon_step=1e-7))
+    training = {"one": _recorded(hand, 100 + seed, 1.0), "varied": _recorded(hand, 500 + seed, None)}
+    judged = {f"× {level:g}": _recorded(hand, 200 + seed + 100 * k, level) for k, level in enumerate(LEVELS)}
     rows = []
-    for seed in seeds:
-        hand = matched_rig.random_hand(
-            seed, joints=2 + seed % 2, presliding=True, source=1 if seed % 3 else 2, rate=500.0, cutoff=20.0
-        )
-        hand = replace(hand, noise=replace(hand.noise, tendon_step=1e-7))
-        training = {"one": _recorded(hand, 100 + seed, 1.0), "varied": _recorded(hand, 500 + seed, None)}
-        judged = {f"× {level:g}": _recorded(hand, 200 + seed + 100 * k, level) for k, level in enumerate(LEVELS)}
-        for k in range(starts):
-            start = matched_rig.off_start(np.random.default_rng([seed, k, 9]), hand.truth, OFF)
-            before = {level: _left(start, recording, hand.source) for level, recording in judged.items()}
-            for pretension, recording in training.items():
-                finger = fitted(start, [recording], hand.source)
-                for level, other in judged.items():
-                    ratio = _left(finger, other, hand.source) / before[level]
-                    rows.append({"seed": seed, "pretension": pretension, "judged": level, "ratio": ratio})
-    return rows
+    for k in range(STARTS):
+        start = matched_rig.off_start(np.random.default_rng([seed, k, 9]), hand.truth, OFF)
+        before = {level: _left(start, recording, hand.source) for level, recording in judged.items()}
+        for pretension, recording in training.items():
+            finger = fitted(start, [recording], hand.source)
+            for level, other in judged.items():
+                ratio = _left(finger, other, hand.source) / before[level]
+                rows.append({"pretension": pretension, "judged": level, "ratio": ratio})
+    return {"rows": rows}
 
 
 def _recorded(hand: Any, seed: int, level: float | None) -> Recording:
@@ -149,34 +142,5 @@ def _recorded(hand: Any, seed: int, level: float | None) -> Recording:
 
 
 def _left(finger: Description, recording: Recording, kinematics: int) -> float:
-    return float(rms(run_recording(finger, recording.arrays(), kinematics)["compensated_torque"][SETTLED:]))
-
-
-# --- tables -----------------------------------------------------------------------------------------------------------
-
-
-def _ratios(rows: Sequence[Row]) -> list[str]:
-    ratio = tables.column(rows, "ratio")
-    values = [np.median(ratio), np.quantile(ratio, 0.9), ratio.max()]
-    return [*(f"{value:.2f}" for value in values), f"{np.sum(ratio > LIMIT)} of {len(ratio)}"]
-
-
-def report(jaw: Sequence[Row], siblings: Sequence[Row]) -> str:
-    """The jaw by numbers and planted factor, on runs of the half that constants were chosen on and of the other."""
-    head = ["after/before: median", "90 %", "worst", f"above {LIMIT}"]
-    sections = []
-    for rows, keys in ((jaw, ("numbers", "factor")), (siblings, ("pretension", "judged"))):
-        for row in rows:
-            chosen = row["fitted"] in EVEN if "fitted" in row else row["seed"] % 2 == 0
-            row["half"] = "chosen on" if chosen else "others"
-        sections.append(tables.table([*keys, "half", *head], tables.by(rows, [*keys, "half"], _ratios), text_columns=3))
-    return "\n\n".join(sections)
-
-
-def main() -> None:
-    parser(__doc__, output=None).parse_args()
-    print(report(jaw_rows(), sibling_rows()))
-
-
-if __name__ == "__main__":
-    main()
+    """[N·m] rms of the compensated torque."""
+    return rms(run_recording(finger, recording.arrays(), kinematics)["compensated_torque"][SETTLED:])

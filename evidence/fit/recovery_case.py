@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from evidence.fit.made_data import model_alone, noise_scale
-from evidence.runner import INDEX_FINGER
+from evidence.cases import INDEX_FINGER
+from evidence.table import Row
+from fit_data import model_alone, noise_scale
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.estimate import Estimator
+from tendonfmu.estimate.estimation import Learner
 from tendonfmu.excite import read_subject
 from tendonfmu.excite.excitation import Excitation, Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, find_ranges
@@ -159,3 +161,50 @@ def identifiable(case: Case, scale: Scale) -> Flags:
     _, _, information = known.evaluate(known.start)
     covariance = np.asarray(np.linalg.inv(information + np.diag((NEARLY_NOTHING * known.scale) ** -2.0)), dtype=float)
     return np.asarray(scale.standard_errors(covariance) < LIMIT * np.abs(scale.value))
+
+
+# --- both fits of a case ---------------------------------------------------------------------------------------------
+
+FAR = 3.0  # standard errors
+PRIOR = 0.3  # of a number's size: about as far as the starts are off
+EKF_PASSES = 3  # each but the first linearised where the one before arrived; the first is the paper's filter
+
+
+def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, prior: float = PRIOR) -> Row:
+    """One case: made, judged, fitted both ways."""
+    made = make_case(seed, duration, rate)
+    scale = Scale(made.truth)
+    known = identifiable(made, scale)
+    row: Row = {
+        "seed": seed,
+        "samples": len(made.recording["time"]),
+        "numbers": len(known),
+        "identifiable": int(known.sum()),
+    }
+    estimator = Estimator(image(made.start))
+    estimator.add_recording(made.recording, external_torque=made.recording["external_torque"])
+    fit = estimator.fit(prior_std=prior)
+    z, errors = fit.z, scale.standard_errors(fit.covariance)
+    row["converged"] = int(fit.converged)
+    row |= {f"batch_{key}": value for key, value in judge(scale, known, z, fit.covariance).items()}
+    passes = list(_ekf(made, prior))
+    row |= {f"ekf_first_{key}": value for key, value in judge(scale, known, *passes[0]).items()}
+    row |= {f"ekf_{key}": value for key, value in judge(scale, known, *passes[-1]).items()}
+    apart = (scale.difference(passes[-1][0], z) / errors)[known]
+    return row | {"apart_rms": float(np.sqrt(np.mean(apart**2))), "apart_most": float(np.abs(apart).max())}
+
+
+def _ekf(made: Case, prior: float) -> Iterator[tuple[Numbers, Numbers]]:
+    """What each pass finds."""
+    learner = Learner(image(made.start), prior_std=prior)
+    for number in range(EKF_PASSES):
+        if number > 0:
+            learner.begin_pass()
+        learner.run(made.recording, external_torque=made.recording["external_torque"])
+        yield learner.z, learner.covariance
+
+
+def judge(scale: Scale, known: Flags, z: Numbers, covariance: Numbers) -> dict[str, Any]:
+    """Of the identifiable numbers: how many lie beyond 3 standard errors of the fit, and the mean square."""
+    distance = (scale.difference(z, scale.unknowns) / scale.standard_errors(covariance))[known]
+    return {"far": int(np.sum(np.abs(distance) > FAR)), "variance": float(np.mean(distance**2))}

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evidence.recordings.log_faults import FORMATS, sound, write
 from evidence.reliability.row import Measure, Outcome, Run, Unavailable, called, spoken
 from evidence.runner import EXAMPLES, ROOT
+from made_logs import FORMATS, sound, write
 from tendonfmu.errors import InputError
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import read_recording

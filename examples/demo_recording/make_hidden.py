@@ -1,6 +1,7 @@
 """Make the recordings of the two-joint finger that lacks something, and say what was hidden: see README.md.
 
-Usage: python make_hidden.py [-o FOLDER]   (needs numpy, scipy and pyarrow; physics: ../../evidence/fingers)
+Usage: python make_hidden.py [-o FOLDER]   (needs numpy, scipy and pyarrow)
+Physics: ../../python_tests/support/matched_rig.py
 
 The demo reads the description and the two recordings; what was hidden is in two_joints_hidden.json, which it does not
 read and which the package does not have.
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 HERE = Path(__file__).parent
-sys.path.append(str(HERE.parents[1]))
+sys.path.append(str(HERE.parents[1] / "python_tests" / "support"))
 
 NAME = "two_joints"
 RECORDINGS = {f"{NAME}_training": (3, 60.0), f"{NAME}_unseen": (4, 40.0)}  # seed of the motion, s
@@ -31,8 +32,8 @@ FORCE_STEP, POSITION_STEP = 1e-4, 1e-7  # N, m; of the sensors
 
 def true_hand() -> tuple[Any, dict[str, Any]]:
     """The finger (`matched_rig.Hand`) with the effect in it, and what is hidden."""
-    from evidence.diagnosis.hidden_effects import hide
-    from evidence.fingers.matched_rig import random_hand
+    from hidden_effects import hide
+    from matched_rig import random_hand
 
     hand = random_hand(SEED, joints=2, presliding=True, source=1, rate=RATE, cutoff=CUTOFF)
     hand = replace(hand, noise=replace(hand.noise, tendon_step=POSITION_STEP))
@@ -43,7 +44,7 @@ def true_hand() -> tuple[Any, dict[str, Any]]:
 
 def recorded(hand: Any, name: str) -> dict[str, NDArray[Any]]:
     """The columns of one of `RECORDINGS`."""
-    from evidence.fingers.matched_rig import record
+    from matched_rig import record
 
     seed, seconds = RECORDINGS[name]
     columns = record(hand, seed=seed, seconds=seconds).columns

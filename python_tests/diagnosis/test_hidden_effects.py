@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evidence.diagnosis import makers
-from evidence.diagnosis.makers import Options
+import matched_cases as makers
+from matched_cases import Options
 from tendonfmu.diagnosis.result import Diagnosis
 
 SHORT = Options(joints=1, seconds=40.0, rate=250.0)

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from evidence.fingers import sticking_finger
+import sticking_finger
 from tendonfmu.calibration.fit import fit_all
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings

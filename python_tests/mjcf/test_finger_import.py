@@ -17,7 +17,7 @@ require("mujoco")
 import mujoco
 
 from command import Answer, Call
-from evidence.fingers.mjcf_models import ARMS, BOWSTRING, fixed_model
+from mjcf_models import ARMS, BOWSTRING, fixed_model
 from tendonfmu.mjcf.finger_import import ImportedFinger, ImportSettings, import_finger
 
 BOTH = ("mcp", "pip")

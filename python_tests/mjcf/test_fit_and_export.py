@@ -11,7 +11,7 @@ from optional_parts import require
 
 require("mujoco")
 
-from evidence.fit.mujoco_friction import guess, machine, record, recover
+from mujoco_friction import guess, machine, record, recover
 from tendonfmu.mjcf import ImportSettings, export_numbers, import_finger
 
 INTERVAL = 1.96  # standard errors; 95 %

@@ -17,7 +17,7 @@ import mujoco
 from lxml import etree
 
 from command import Call
-from evidence.fingers.mjcf_models import fixed_model
+from mjcf_models import fixed_model
 from tendonfmu.errors import InputError
 from tendonfmu.mjcf.finger_import import ImportSettings, import_finger
 from tendonfmu.mjcf.number_export import Export, export_numbers

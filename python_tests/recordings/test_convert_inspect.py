@@ -124,7 +124,7 @@ def test_faults_are_listed(call: Call, tmp_path: Path) -> None:
 
 
 def test_joint_states_are_found_by_name(call: Call, tmp_path: Path) -> None:
-    from evidence.recordings.log_faults import FORMATS, sound, write
+    from made_logs import FORMATS, sound, write
 
     write(tmp_path, FORMATS["ROS 2 bag, MCAP"], sound())
     answer = call("convert", "inspect", "bag", "-o", "map.json")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evidence.recordings.log_faults import (
+from made_logs import (
     FAULTS,
     FORMATS,
     ROWS,

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from command import Call
-from evidence.recordings.log_faults import FORMATS, START, TYPE, header, ros_store, sound, truth, write
+from made_logs import FORMATS, START, TYPE, header, ros_store, sound, truth, write
 from map_cases import LOG, SMALL, VALIDATOR, edited, written
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_blocks, write_table

@@ -24,7 +24,6 @@ from tendonfmu.recordings.converters.one_joint import central_velocity, starting
 from tendonfmu.recordings.converters.table import convert_table
 
 EXAMPLE = ROOT / "examples" / "one_joint"
-MEASURED = (ROOT / "docs" / "evidence" / "one_joint.md").read_text(encoding="utf-8")
 EMPS = DATA / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
@@ -208,21 +207,23 @@ def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
     assert len(causes[5]) == 1 and causes[5][0]["effect"] in ("joint_friction", "preload_friction")
 
 
-# --- the page ---------------------------------------------------------------------------------------------------------
+# --- measured ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.long
 @needs("emps data")
-def test_the_measured_machine_of_the_page(call: Call, tmp_path: Path) -> None:
-    """Its own lines: half against half nothing has changed; 2 N put in by hand are found, to 10 %."""
+def test_a_measured_machine_from_its_owners_log(call: Call, tmp_path: Path) -> None:
+    """The carriage in halves: nothing has changed; 2 N put in by hand are found, to 10 %."""
     script = EXAMPLE / "make_carriage.py"
     subprocess.run([sys.executable, script, EMPS], cwd=tmp_path, check=True)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    for line in MEASURED.splitlines():
-        if line.startswith("tendonfmu "):
-            assert call(*line.split()[1:]).status == 0, line
+    for part in ("then", "now", "worn"):
+        convert = f"convert table {part}.csv --map {EXAMPLE}/carriage_map.json -o {part}.parquet"
+        assert call(*convert.split(), *(("--finger", "carriage.json") if part == "then" else ())).status == 0
+    assert call(*["fit", "carriage.json", "then.parquet", "--kinematics", "3", "-o", "fitted.json"]).status == 0
     found = {}
     for name in ("now", "worn"):
+        diagnose = f"diagnose fitted.json {name}.parquet --reference then.parquet --kinematics 3 -o {name}"
+        assert call(*diagnose.split()).status == 0
         found[name] = json.loads((tmp_path / name / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
         shutil.rmtree(tmp_path / name)
     assert found["now"] == []

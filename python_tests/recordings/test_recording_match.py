@@ -1,6 +1,6 @@
 """`tendonfmu check FINGER.json RECORDING`: signs, order and units of columns, clocks and sensors.
 
-The systematic table is `evidence/recordings/check.py`.
+How often it is right: docs/evidence/logs.md.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def test_what_to_write_into_the_map(finger: Finger, sound: Recording, name: str)
 
 def test_units_without_any_redundancy() -> None:
     """One tendon, one joint, no measured angle: nothing to compare with, but no joint turns by 500 rad."""
-    finger = read_finger(EXAMPLES / "davinci" / "jaw_start.json")
+    finger = read_finger(ROOT / "evidence" / "machine_data" / "davinci" / "two_laws.json")
     time = np.arange(5000) / 500
     angle = 0.5 * np.sin(time)
     force = 20.0 * np.tanh(5.0 * np.cos(time)) + 0.02 * np.random.default_rng(1).standard_normal(len(time))

@@ -22,7 +22,7 @@ _ROOM = 20  # rows for each coefficient, at least
 CHANCE = 3.0  # standard deviations of ρ_k of white noise (1/√pairs); at a lag, one of 740 white series exceeds it
 FEWEST = 20  # pairs of a lag; lags with fewer are not used
 # Noise is forgotten within LASTING. What lasts longer is an error of the model, which counts as new with every stroke;
-# what returns LATER, with strokes that are alike, counts as new every second cycle (docs/evidence/recalibration.md).
+# what returns LATER, with strokes that are alike, counts as new every second cycle (docs/evidence/fit.md).
 LASTING, LATER = 0.1, 1.0  # s
 RETURN = 4.0  # strokes
 

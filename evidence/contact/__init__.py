@@ -1,0 +1,364 @@
+"""Which pushes are found without a touch sensor, where on the finger, and is a failing sensor told from a push?
+
+On the product's own virtual hand (hand.py), and on fingers in MuJoCo, which share no code with the product.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+import tendonfmu as tf
+from evidence import table
+from evidence.cases import INDEX_RIG, run_cases, write
+from evidence.contact import hand
+from evidence.contact.sensor_faults import fault_table, sensor_faults
+from evidence.part import Figures, Part
+from evidence.table import Row
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.detect import score_detection
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings import read_recording, run_parts
+
+# --- the virtual hand -------------------------------------------------------------------------------------------------
+
+# Of a push: the largest ratio of its torque in a joint to the rms of that joint's free residual.
+SIZES = {"3–4": (3.0, 4.0), "4–6": (4.0, 6.0), "≥ 6": (6.0, np.inf)}
+
+
+def scored(folder: Path, take: hand.Take, alarm: Flags) -> Row:
+    """Which pushes an alarm finds in a recording, their torques, and what it does while nothing touches."""
+    recording = hand.recording(folder, take)
+    label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
+    score = score_detection(recording.time, label, alarm)
+    torques = []
+    if score.events:
+        torque = np.abs(hand.truth(folder, take, "external_torque"))
+        starts = np.flatnonzero(label & ~np.r_[False, label[:-1]])
+        ends = np.flatnonzero(label & ~np.r_[label[1:], False])
+        torques = [torque[start : end + 1].max(axis=0) for start, end in zip(starts, ends, strict=True)]
+    return {
+        "kind": take.kind,
+        "pretension": take.pretension,
+        "found": [event.found for event in score.events],
+        "delay": [event.delay for event in score.events],
+        "torque": torques,
+        "seconds": score.free_seconds,
+        "alarms": len(score.false_alarms),
+    }
+
+
+def free_rms(folder: Path) -> dict[float, Numbers]:
+    """[n] N·m by pretension, of the fitted finger's residual before the bias update, without any detection."""
+    finger = hand.fitted(folder)
+    squares: dict[float, list[Numbers]] = {}
+    for take in hand.takes("free"):
+        inputs = hand.recording(folder, take).arrays()
+        every = np.ones(len(inputs["time"]), dtype=bool)
+        residual = np.nan_to_num(run_parts(finger.data, inputs, [slice(0, len(every))], every, 1).residual)
+        squares.setdefault(take.pretension, []).append(np.mean(residual**2, axis=0))
+    return {pretension: np.sqrt(np.mean(values, axis=0)) for pretension, values in squares.items()}
+
+
+def summary(rows: Sequence[Row], rms: Mapping[float, Numbers]) -> Figures:
+    """Pushes found by size, the largest by pretension; false alarms in 10 min; median delay of the largest, ms."""
+    pushes = [
+        {
+            "size": max(np.array(torque) / rms[row["pretension"]]),
+            "found": found,
+            "delay": delay,
+            "at": row["pretension"],
+        }
+        for row in rows
+        for torque, found, delay in zip(row["torque"], row["found"], row["delay"], strict=True)
+    ]
+
+    def of(size: str, pretensions: Iterable[float] = hand.PRETENSIONS) -> list[Row]:
+        low, high = SIZES[size]
+        return [push for push in pushes if low <= push["size"] < high and push["at"] in pretensions]
+
+    largest = of("≥ 6")
+    counted = {f"≥ 6, {pretension:g} N": of("≥ 6", [pretension]) for pretension in hand.PRETENSIONS}
+    counted |= {"4–6": of("4–6"), "3–4": of("3–4")}
+    alarms = {}
+    for name, free in (("free", True), ("between pushes", False)):
+        chosen = [row for row in rows if (row["kind"] == "free") == free]
+        alarms[name] = sum(row["alarms"] for row in chosen) / (sum(row["seconds"] for row in chosen) / 600.0)
+    return {
+        "found_share": float(np.mean([push["found"] for push in largest])),
+        "found": {name: [sum(push["found"] for push in group), len(group)] for name, group in counted.items()},
+        "false_alarms": alarms,
+        "delay": 1e3 * float(np.median([push["delay"] for push in largest if push["found"]])),
+    }
+
+
+def found_table(detectors: Mapping[str, Figures]) -> str:
+    """A line for each detector, by its `summary`."""
+    lines = []
+    for name, figures in detectors.items():
+        counts = [f"{found}/{count}" for found, count in figures["found"].values()]
+        alarms = [f"{rate:.1f}" for rate in figures["false_alarms"].values()]
+        lines.append([name, *counts, *alarms, f"{figures['delay']:.0f}"])
+    head = ["", *(f"≥ 6, {pretension:g} N" for pretension in hand.PRETENSIONS), "4–6", "3–4"]
+    head += ["false alarms in 10 min: free", "between pushes", "median delay of ≥ 6, ms"]
+    return table.table(head, lines)
+
+
+def hand_case(folder: Path, take: hand.Take) -> Row:
+    outputs = run_recording(hand.tuned(folder).data, hand.recording(folder, take).arrays())
+    return scored(folder, take, outputs["contact"].ravel().astype(bool))
+
+
+def virtual_hand(folder: Path, workers: int) -> Figures:
+    every = hand.takes("free", *hand.PUSHED)
+    run_cases(hand.made, {f"made_{take.name}": (folder, take) for take in every}, folder, workers)
+    hand.tuned(folder)
+    cases = {take.name: (folder, take) for take in every}
+    return summary(run_cases(hand_case, cases, folder, workers), free_rms(folder))
+
+
+# --- where the finger is touched --------------------------------------------------------------------------------------
+
+STRENGTHS = {"0.5 to 1 N": (0.5, 1.0), "1 to 2 N": (1.0, 2.0)}
+NEAR_TIP = 0.8  # share of the last link's length from which a push is near the tip
+LAST = 4  # link
+
+
+def place_case(folder: Path, take: hand.Take) -> Row:
+    """All pushes of a recording, each in the middle of its hold, by a description that has the rig's links."""
+    physics = json.loads(INDEX_RIG.read_text(encoding="utf-8"))["physics"]
+    links = [{key: link[key] for key in ("axis", "offset") if key in link} for link in physics["links"]]
+    finger = {**hand.tuned(folder).data, "links": links, "tip": physics["tip"]}
+    recording, force = hand.recording(folder, take), hand.truth(folder, take, "contact_force")
+    outputs = run_recording(finger, recording.arrays())
+    rows = []
+    for push in hand.pushes_of(folder, take):
+        k = int(np.searchsorted(recording.time, push["start"] + push["rise"] + push["hold"] / 2))
+        tip, point = np.array(physics["tip"]), np.array(push["point"])
+        rows.append(
+            {
+                "pretension": take.pretension,
+                "strength": float(np.linalg.norm(force[k])),
+                "link": push["link"],
+                "near_tip": push["link"] == LAST and float(point @ tip / (tip @ tip)) >= NEAR_TIP,
+                "contact": bool(outputs["contact"].ravel()[k]),
+                "named": int(outputs["contact_link"][k]),
+                "error": float(np.linalg.norm(outputs["fingertip_force"][k] - force[k])),
+                "std": float(np.linalg.norm(outputs["fingertip_force_std"][k])),
+                "observable": bool(outputs["fingertip_force_observable"][k]),
+            }
+        )
+    return {"rows": rows}
+
+
+def _links(rows: Sequence[Row]) -> list[str]:
+    seen = [row for row in rows if row["contact"]]
+    named = [row for row in seen if row["named"] > 0]
+    last = [row for row in named if row["named"] == LAST]
+    return [
+        f"{len(seen)} of {len(rows)}",
+        table.percent(row["named"] < 0 for row in seen),
+        table.percent(row["link"] >= row["named"] for row in named),
+        table.percent(row["link"] == row["named"] for row in named),
+        f"{sum(row['link'] == LAST for row in last)} of {len(last)}",
+    ]
+
+
+def _forces(rows: Sequence[Row]) -> list[str]:
+    near = [row for row in rows if row["contact"] and row["near_tip"]]
+    known = [row for row in near if row["observable"]]
+    error, strength, std = (table.rms(table.column(known, key)) for key in ("error", "strength", "std"))
+    shares = [table.number(error / strength, ".0f", 100), table.number(error / std, ".1f")]
+    return [str(len(near)), str(len(known)), table.number(error), *shares]
+
+
+def place(folder: Path, workers: int) -> Figures:
+    hand.tuned(folder)
+    cases = {f"place_{take.name}": (folder, take) for take in hand.takes(*hand.PUSHED)}
+    rows = [row for case in run_cases(place_case, cases, folder, workers) for row in case["rows"]]
+    classed = [
+        row | {"class": name}
+        for name, (low, high) in STRENGTHS.items()
+        for row in rows
+        if low <= row["strength"] < high
+    ]
+    strong = [row for row in classed if row["class"] == "1 to 2 N"]
+    return {
+        "links": table.by(classed, ["pretension", "class"], _links),
+        "forces": table.by(strong, ["pretension"], _forces),
+    }
+
+
+# --- fingers in MuJoCo ------------------------------------------------------------------------------------------------
+
+FINGERS = (4, 6, 1, 3, 19)  # of evidence/fingers; a change is chosen on the odd ones, the even ones count
+
+
+def calibrated(folder: Path, number: int) -> Path:
+    """Folder of what `tendonfmu calibrate` made of a finger; `cpu.json` in it is the processor time, s."""
+    from evidence.contact import mujoco_pushes
+
+    into = folder / f"calibrated_{number:02d}"
+    if not (into / "cpu.json").exists():
+        mujoco_pushes.make(folder, number)
+        free, pushed = (
+            [
+                str(mujoco_pushes.place(folder, number, *one))
+                for one in itertools.product(kinds, mujoco_pushes.PRETENSIONS)
+            ]
+            for kinds in (mujoco_pushes.FREE, mujoco_pushes.PUSHED)
+        )
+        description = mujoco_pushes.description_file(folder, number)
+        command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(description), *free, "--pushes", *pushed]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([*command, "-o", str(into), "--no-progress"], check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        write(into / "cpu.json", json.dumps(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+    return into
+
+
+def mujoco_case(folder: Path, number: int) -> Row:
+    """What `calibrate` reports of a finger. Sizes are in multiples of the free residual's rms."""
+    into = calibrated(folder, number)
+    report = json.loads((into / "calibration.json").read_text(encoding="utf-8"))
+    pushes = report["pushes"]
+    sizes = {f"{size['from']:g}": [size["found"], size["events"]] for size in pushes["sizes"]}
+    return {
+        "finger": number,
+        "large": sizes.get("6", [0, 0]),
+        "small": sizes.get("3", [0, 0]),
+        "alarms": pushes["false_alarms"],
+        "promised": report["detection"]["held_out"]["limit"] * pushes["free_minutes"] / 60.0,
+        "minutes": pushes["free_minutes"],
+        "delay": 1e3 * pushes["median_delay_s"],
+        "cpu": json.loads((into / "cpu.json").read_text(encoding="utf-8")),
+    }
+
+
+def mujoco(folder: Path, workers: int) -> Figures:
+    cases = {f"mujoco_{number:02d}": (folder, number) for number in FINGERS}
+    rows = run_cases(mujoco_case, cases, folder, workers)
+    return {
+        "even_missed": sum(row["large"][1] - row["large"][0] for row in rows if row["finger"] % 2 == 0),
+        "rows": rows,
+    }
+
+
+def mujoco_table(figures: Figures) -> str:
+    lines = [
+        [
+            str(row["finger"]),
+            *("{}/{}".format(*row[size]) for size in ("large", "small")),
+            f"{row['alarms']} in {row['minutes']:.1f}",
+            f"{row['promised']:.1f}",
+            f"{row['delay']:.0f}",
+            f"{row['cpu']:.0f}",
+        ]
+        for row in figures["rows"]
+    ]
+    head = ["finger", "≥ 6 × rms", "3 to 6 × rms", "false alarms in min", "promised at most", "median delay, ms"]
+    return table.table([*head, "CPU time of `calibrate`, s"], lines)
+
+
+STRONG = 0.5  # N
+
+
+def slow_case(folder: Path, number: int) -> Row:
+    """Pushes that rise over 1 to 10 s, found with the rule for them (`contact.drift`) and without."""
+    from evidence.contact import mujoco_pushes
+
+    mujoco_pushes.make(folder, number, ("slow",))
+    finger = tf.read_finger(calibrated(folder, number) / "finger.json")
+    lines = []
+    for name, data in (("without", finger.replace({"contact.drift": None}).data), ("with", finger.data)):
+        found, strong, alarms, minutes = [], [], 0, 0.0
+        for pretension in mujoco_pushes.PRETENSIONS:
+            recording = read_recording(mujoco_pushes.place(folder, number, "slow", pretension))
+            pushes = mujoco_pushes.pushes_of(folder, number, pretension, "slow")
+            during = [(recording.time >= push.begin) & (recording.time <= push.end) for push in pushes]
+            alarm = run_recording(data, recording.arrays())["contact"].ravel()
+            score = score_detection(recording.time, np.any(during, axis=0), alarm)
+            found += [event.found for event in score.events]
+            strong += [abs(push.force) >= STRONG for push in pushes]
+            alarms, minutes = alarms + len(score.false_alarms), minutes + score.free_seconds / 60
+        of_strong = [hit for hit, is_strong in zip(found, strong, strict=True) if is_strong]
+        lines.append([f"{number}, {name}", table.count(found), table.count(of_strong), f"{alarms} in {minutes:.1f}"])
+    return {"lines": lines}
+
+
+def slow(folder: Path, workers: int) -> Figures:
+    rows = run_cases(slow_case, {f"slow_{number:02d}": (folder, number) for number in (3, 4)}, folder, workers)
+    return {"lines": [line for row in rows for line in row["lines"]]}
+
+
+# --- a held force -----------------------------------------------------------------------------------------------------
+
+
+def held_force(_folder: Path, _workers: int) -> Figures:
+    """What examples/mujoco/press.py prints: errors of a force that is held on a moving plate, by what feels it."""
+    from evidence.cases import EXAMPLES
+
+    program = [sys.executable, str(EXAMPLES / "mujoco" / "press.py")]
+    printed = subprocess.run(program, capture_output=True, text=True, check=True).stdout
+    return {"lines": [[cell.strip() for cell in line.strip("| ").split("|")] for line in printed.splitlines()[2:]]}
+
+
+LINK_HEAD = ["pretension, N", "push", "in contact", "not named (−1), %", "on `contact_link` or beyond, %"]
+LINK_HEAD += ["that very link, %", "`contact_link` 4: right"]
+FORCE_HEAD = [
+    "pretension, N",
+    "in contact near the tip",
+    "observable",
+    "error, N rms",
+    "% of the push",
+    "rms / rms of its std",
+]
+
+PARTS: dict[str, Part] = {
+    "hand": Part(
+        virtual_hand,
+        minutes=40.0,
+        headlines={"found_share": (0.98, 1.0), "false_alarms.free": (0.0, 1.0), "delay": (0.0, 40.0)},
+        tables={"found": lambda figures: found_table({"tuned": figures})},
+    ),
+    "place": Part(
+        place,
+        tables={
+            "links": table.of_cells("links", LINK_HEAD, 2),
+            "forces": table.of_cells("forces", FORCE_HEAD),
+        },
+    ),
+    "mujoco": Part(
+        mujoco,
+        minutes=14.0,
+        needs=("mujoco",),
+        headlines={"even_missed": (0, 1)},
+        tables={"fingers": mujoco_table},
+    ),
+    "slow": Part(
+        slow,
+        needs=("mujoco",),
+        tables={
+            "found": table.of_cells("lines", ["finger, rule", "found", "of 0.5 N and more", "false alarms in min"])
+        },
+    ),
+    "sensor_faults": Part(
+        sensor_faults,
+        needs=("mujoco",),
+        headlines={"share": (98.0, 100.0), "sound_faults": (0, 0)},
+        tables={"faults": fault_table},
+    ),
+    "held_force": Part(
+        held_force,
+        minutes=0.2,
+        needs=("mujoco",),
+        tables={"forces": table.of_cells("lines", ["felt by", "0.5 N wanted", "1 N wanted"], 3)},
+    ),
+}

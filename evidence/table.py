@@ -1,0 +1,159 @@
+"""Tables of Markdown, their cells (numbers, shares and rates with 95 % intervals), and their places in the pages.
+
+A page has `<!-- fit.recalibration: jaw -->`, the table `jaw` of that part, and `<!-- end -->`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from evidence.part import Figures
+from tendonfmu.statistics.intervals import Interval, quantile, rate, share
+
+NOTHING = "–"  # in a cell without a case
+SEED = 0  # of resampling
+
+Row = dict[str, Any]
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Any]], text_columns: int = 1) -> str:
+    """A table whose first columns hold text, and all others numbers."""
+    rule = ["---"] * text_columns + ["---:"] * (len(head) - text_columns)
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in (head, rule, *rows))
+
+
+def of_cells(path: str, head: Sequence[str], text_columns: int = 1) -> Callable[[Figures], str]:
+    """A table whose cells stand in the figures already, as a list of lines."""
+    return lambda figures: table(head, at(figures, path), text_columns)
+
+
+def at(figures: Figures, path: str) -> Any:
+    """What the figures have at `jaw.left`; a number stands for an item of a list."""
+    value: Any = figures
+    for key in path.split("."):
+        value = value[int(key)] if isinstance(value, list) else value[key]
+    return value
+
+
+# --- marked blocks of the pages ---------------------------------------------------------------------------------------
+
+_BLOCK = re.compile(r"<!-- (?P<part>[\w.]+): (?P<name>[^>]+?) -->\n(?P<text>.*?)<!-- end -->", re.DOTALL)
+
+
+def blocks(page: str) -> dict[tuple[str, str], str]:
+    """The texts of a page's marked blocks, by part and name."""
+    return {(match["part"], match["name"]): match["text"].strip() for match in _BLOCK.finditer(page)}
+
+
+def with_blocks(page: str, part: str, texts: Mapping[str, str]) -> str:
+    """The page with the part's blocks replaced."""
+
+    def replaced(match: re.Match[str]) -> str:
+        if match["part"] != part or match["name"] not in texts:
+            return match[0]
+        return f"<!-- {part}: {match['name']} -->\n\n{texts[match['name']]}\n\n<!-- end -->"
+
+    return _BLOCK.sub(replaced, page)
+
+
+# --- cells ------------------------------------------------------------------------------------------------------------
+
+
+def number(value: float | None, form: str = ".2f", scale: float = 1.0) -> str:
+    return NOTHING if value is None or math.isnan(value) else format(scale * value, form)
+
+
+def estimate(known: Interval, form: str = ".2f", scale: float = 1.0) -> str:
+    """A value with its interval."""
+    if math.isnan(known.low):
+        return number(known.value, form, scale)
+    return f"{number(known.value, form, scale)} ({number(known.low, form, scale)} to {number(known.high, form, scale)})"
+
+
+def percent(hits: Iterable[Any], form: str = ".0f") -> str:
+    """Share of the cases in percent, with its interval."""
+    answers = [bool(hit) for hit in hits]
+    return estimate(share(sum(answers), len(answers)), form, 100.0)
+
+
+def count(hits: Iterable[Any], with_interval: bool = False) -> str:
+    """How many of the cases, as `3/5`, or `3/5 (15 to 95 %)`."""
+    answers = [bool(hit) for hit in hits]
+    if not answers:
+        return NOTHING
+    text = f"{sum(answers)}/{len(answers)}"
+    known = share(sum(answers), len(answers))
+    return f"{text} ({100 * known.low:.0f} to {100 * known.high:.0f} %)" if with_interval else text
+
+
+def events(number_of_events: int, exposure: float, form: str = ".1f") -> str:
+    """Rate of events over an exposure, with its interval."""
+    return estimate(rate(number_of_events, exposure), form)
+
+
+def median(values: Iterable[float | None], form: str = ".2f", scale: float = 1.0, with_interval: bool = False) -> str:
+    """Median of the known values; NaN and None are left out."""
+    known = np.array(list(values), dtype=float)
+    known = known[~np.isnan(known)]
+    if with_interval:
+        return estimate(quantile(known, 0.5, SEED), form, scale)
+    return number(float(np.median(known)), form, scale) if len(known) else NOTHING
+
+
+def rms(values: Any) -> float:
+    """Root of the mean square; NaN without a value."""
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
+
+
+# --- rows -------------------------------------------------------------------------------------------------------------
+
+
+def column(rows: Iterable[Row], key: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Numbers of a column; NaN where a row has none."""
+    return np.array([row.get(key) for row in rows], dtype=float)
+
+
+def values_of(rows: Iterable[Row], key: str) -> list[Any]:
+    """The different values of a column, in the order of the rows."""
+    return list(dict.fromkeys(row[key] for row in rows))
+
+
+def where(rows: Iterable[Row], **wanted: Any) -> list[Row]:
+    """The rows that have these values."""
+    return list(filter(equal(**wanted), rows))
+
+
+def by(rows: Sequence[Row], keys: Sequence[str], cells: Callable[[Sequence[Row]], Sequence[str]]) -> list[list[str]]:
+    """Lines of a table: one for each combination of the keys' values that has rows, with the cells of those rows."""
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+    return [[*map(_word, group), *cells(members)] for group, members in groups.items()]
+
+
+def crossed(
+    rows: Sequence[Row],
+    lines: Mapping[str, Callable[[Row], Any]],
+    columns: Mapping[str, Callable[[Row], Any]],
+    cell: Callable[[list[Row]], str],
+) -> str:
+    """A table whose cells say something of the rows for which both the line and the column hold."""
+    cells = []
+    for name, in_line in lines.items():
+        members = [row for row in rows if in_line(row)]
+        cells.append([name, *(cell([row for row in members if in_column(row)]) for in_column in columns.values())])
+    return table(["", *columns], cells)
+
+
+def equal(**wanted: Any) -> Callable[[Row], bool]:
+    """Whether a row has these values."""
+    return lambda row: all(row.get(key) == value for key, value in wanted.items())
+
+
+def _word(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
