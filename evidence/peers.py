@@ -1,286 +1,273 @@
-"""What the detection campaign compares with: simpler models of friction, each with the product's bias filter and the
-paper's rule of contact in the C core, and each with the thresholds that suit it best.
+"""What simpler models, and the field's own, make of the same recordings.
 
-A rival is a description without friction that takes tendon forces from which the rival's own prediction has been
-removed: forces f' = f − R (Rᵀ R)⁻¹ p carry the torque Rᵀ f − p. Its predictors are linear in their coefficients, which
-are those that leave the least residual behind the bias filter, on the training recording (least squares).
+Contact on the virtual hand: each rival has the product's bias filter and the paper's rule in the C core, and the lowest
+thresholds with one false alarm in 10 min of free motion. It is a description without friction that takes tendon forces
+from which the rival's own prediction p has been removed: f' = f − R (Rᵀ R)⁻¹ p carries the torque Rᵀ f − p.
 
 - no model: the joint torque itself, with a constant bias, the mean over the free recordings
 - bias alone: the product's finger without friction, its bias filter and covers
-- joint Coulomb: per joint s, q̇, q
+- joint Coulomb: per joint s, q̇, q, where s = tanh(q̇/v0)
 - tension-proportional: per joint |r_ij| f_i s for every tendon, s, q̇, q
-- paper's rule: the product's description, thresholds chosen in the same way
-
-s is tanh(q̇/v0), or the direction in which the joint last moved; whichever fits the training recording better.
+- paper's rule: the product's fitted description
 """
 
 from __future__ import annotations
 
-import copy
-import itertools
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import nnls
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
-from evidence.runner import digest, plain
-from matched_physics import held_sign
+import tendonfmu as tf
+from evidence import table
+from evidence.cases import DATA, run_cases
+from evidence.contact import found_table, free_rms, hand, scored, summary
+from evidence.machines import ANOTHER, FIRST, SECOND
+from evidence.part import Figures, Part
+from evidence.table import Row
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect import DetectionScore, score_detection
-from tendonfmu.detect.counting import stretches
-from tendonfmu.model import moment_arms, native, number_of, without_friction
-from tendonfmu.recordings import Recording, run_parts
+from tendonfmu.detect import score_detection
+from tendonfmu.model import moment_arms, number_of, without_friction
+from tendonfmu.model.native import run_recording
+from tendonfmu.recordings import run_parts
 
 Description = dict[str, Any]
 
-NEVER = 1e9  # N·m
 SCALES = (0.01, 0.03, 0.1, 0.2, 0.4)  # rad/s, v0
 PER_SECOND = 1.0 / 600.0  # false alarms, 1 in 10 min
 TAIL = 1e-3  # part of the free samples beyond the thresholds whose shape over the pretension is taken
-FINER = 0.96  # from one scale of the thresholds to the next lower one
 MOST_SHARE = 0.01  # of free time in alarm: few alarms that never end are no low rate
+ROUNDS = 12  # of halving the range of the thresholds
 
 
 @dataclass(frozen=True)
-class Predictor:
-    """Friction torque of a joint: columns [N, c] times coefficients."""
-
-    tensions: bool  # with a column for each tendon
-    scale: float  # v0, rad/s; 0: the last direction
-    coefficients: list[Numbers]  # [n] arrays
-
-    def torque(self, moved: _Moved) -> Numbers:
-        """[N, n] N·m."""
-        return np.column_stack(
-            [_columns(moved, j, self.tensions, self.scale) @ c for j, c in enumerate(self.coefficients)]
-        )
-
-
-@dataclass(frozen=True)
-class Detector:
+class Rival:
     """A description for the C core, and what is removed from the tendon forces before it sees them."""
 
-    name: str
     description: Description
-    predictor: Predictor | None = None
+    tensions: bool = False  # the predictor has a column for each tendon
+    scale: float = 0.0  # v0 of the predictor
+    coefficients: tuple[Numbers, ...] = ()  # by joint; none: no predictor
 
-    @classmethod
-    def of_file(cls, name: str, file: Path) -> Detector:
-        return cls(name, json.loads(file.read_text(encoding="utf-8")))
-
-    def inputs(self, recording: Recording) -> dict[str, Numbers]:
-        """As `native.Instance.run` takes them."""
+    def inputs(self, recording: tf.Recording) -> dict[str, Numbers]:
         given = recording.arrays()
-        if self.predictor is None:
+        if not self.coefficients:
             return given
-        arms = moment_arms(self.description)
-        torque = self.predictor.torque(moved_by(self.description, recording))
-        return {**given, "tendon_force": given["tendon_force"] - torque @ np.linalg.pinv(arms)}
+        kinematics = _kinematics(self.description, given)
+        columns = [
+            _columns(self.description, given, kinematics, j, self.tensions, self.scale) @ coefficients
+            for j, coefficients in enumerate(self.coefficients)
+        ]
+        removed = np.column_stack(columns) @ np.linalg.pinv(moment_arms(self.description))
+        return {**given, "tendon_force": given["tendon_force"] - removed}
 
     def alarm(self, inputs: Mapping[str, Numbers]) -> Flags:
-        """[N] contact."""
-        return np.asarray(native.run_recording(self.description, inputs)["contact"], dtype=bool).ravel()
+        return run_recording(self.description, inputs)["contact"].ravel().astype(bool)
 
-    def score(self, recording: Recording) -> DetectionScore:
-        """By the recording's labels."""
-        label = np.zeros(len(recording.time), dtype=bool) if recording.contact is None else recording.contact
-        return score_detection(recording.time, label, self.alarm(self.inputs(recording)))
-
-    def residual(self, inputs: Mapping[str, Numbers]) -> Numbers:
-        """[N, n] N·m before the bias update, without any detection; 0 for the first sample."""
-        whole = np.ones(len(inputs["time"]), dtype=bool)
-        left = run_parts(self.description, inputs, [slice(0, len(whole))], whole, 1).residual
-        return np.nan_to_num(left)
-
-    @property
-    def digest(self) -> str:
-        """Of all that it depends on."""
-        return digest(to_json([self]))
-
-    def with_thresholds(self, constant: Numbers, per_force: Numbers) -> Detector:
-        changed = copy.deepcopy(self.description)
-        changed["contact"] = {"threshold": constant.tolist(), "threshold_per_force": per_force.tolist()}
-        return replace(self, description=changed)
+    def with_thresholds(self, constant: Numbers, per_force: Numbers) -> Rival:
+        contact = {"threshold": constant.tolist(), "threshold_per_force": per_force.tolist()}
+        return replace(self, description={**self.description, "contact": contact})
 
 
 # --- predictors -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Moved:
-    force: Numbers  # [N, m] N
-    angle: Numbers  # [N, n]
-    speed: Numbers
-    arms: Numbers  # [m, n] m
-    still: float  # rad/s, below which a joint keeps its direction
+def _kinematics(description: Description, inputs: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
+    """Angles and speeds as the C core takes them from tendon positions and forces."""
+    outputs = run_recording(without_friction(description, "cover"), inputs)
+    return outputs["joint_angle"], outputs["joint_speed"]
 
 
-def moved_by(description: Mapping[str, Any], recording: Recording) -> _Moved:
-    """Kinematics as the C core takes them from tendon positions and forces."""
-    run = native.run_recording(without_friction(description, "cover"), recording.arrays())
-    still = float((description.get("velocity_threshold") or {}).get("joint", 0.01))
-    force = recording.groups["tendon_force"]
-    return _Moved(force, run["joint_angle"], run["joint_speed"], moment_arms(description), still)
-
-
-def _direction(moved: _Moved, joint: int, scale: float) -> Numbers:
-    speed = moved.speed[:, joint]
-    if scale > 0:
-        return np.asarray(np.tanh(speed / scale))
-    return held_sign(speed, moved.still)
-
-
-def _columns(moved: _Moved, joint: int, tensions: bool, scale: float) -> Numbers:
+def _columns(
+    description: Description,
+    inputs: Mapping[str, Numbers],
+    kinematics: tuple[Numbers, Numbers],
+    joint: int,
+    tensions: bool,
+    scale: float,
+) -> Numbers:
     """[N, c]: what resists motion first, the angle last."""
-    direction = _direction(moved, joint, scale)
-    columns = [direction, moved.speed[:, joint]]
+    angle, speed = (values[:, joint] for values in kinematics)
+    direction = np.tanh(speed / scale)
+    columns = [direction, speed]
     if tensions:
-        columns += [abs(arm) * moved.force[:, i] * direction for i, arm in enumerate(moved.arms[:, joint]) if arm]
-    return np.column_stack([*columns, moved.angle[:, joint]])
+        arms = moment_arms(description)[:, joint]
+        columns += [abs(arm) * inputs["tendon_force"][:, i] * direction for i, arm in enumerate(arms) if arm]
+    return np.column_stack([*columns, angle])
 
 
-def fit_predictor(description: Mapping[str, Any], training: Recording, tensions: bool) -> tuple[Predictor, Numbers]:
-    """The best of all scales, and its rms [n] in N·m behind the bias filter. Friction coefficients are not negative."""
-    moved = moved_by(description, training)
-    passed = HighPass.of(description, training.time, moved.force)
-    torque = passed(moved.force @ moved.arms)
-    tried: list[tuple[float, Predictor, Numbers]] = []
-    for scale in (0.0, *SCALES):
-        coefficients, rms = [], []
+def fitted_rival(bare: Description, product: Description, training: tf.Recording, tensions: bool) -> Rival:
+    """The predictor of the least residual behind the bias filter; friction coefficients are not negative."""
+    inputs = training.arrays()
+    kinematics = _kinematics(bare, inputs)
+    gain = _bias_gain(product, inputs)
+    torque = _passed(inputs["tendon_force"] @ moment_arms(bare), gain)
+    tried: list[tuple[float, Rival]] = []
+    for scale in SCALES:
+        coefficients, left = [], 0.0
         for j in range(torque.shape[1]):
-            columns = passed(_columns(moved, j, tensions, scale))
+            columns = _passed(_columns(bare, inputs, kinematics, j, tensions, scale), gain)
             both = np.column_stack([columns, -columns[:, -1:]])  # the angle's coefficient may have either sign
             solved = nnls(both.T @ both, both.T @ torque[:, j])[0]
-            coefficient = np.append(solved[:-2], solved[-2] - solved[-1])
-            left = float(np.sqrt(np.mean((torque[:, j] - columns @ coefficient) ** 2)))
-            coefficients.append(coefficient)
-            rms.append(left)
-        tried.append((float(np.linalg.norm(rms)), Predictor(tensions, scale, coefficients), np.array(rms)))
-    _, predictor, best = min(tried, key=lambda fit: fit[0])
-    return predictor, best
+            coefficients.append(np.append(solved[:-2], solved[-2] - solved[-1]))
+            left += float(np.mean((torque[:, j] - columns @ coefficients[-1]) ** 2))
+        tried.append((left, Rival(bare, tensions, scale, tuple(coefficients))))
+    return min(tried, key=lambda one: one[0])[1]
 
 
-@dataclass(frozen=True)
-class HighPass:
-    """What the bias filter lets through, with its steady gain: r_k = y_k − y_k−1 + (1 − K) r_k−1."""
-
-    gain: float
-
-    @classmethod
-    def of(cls, description: Mapping[str, Any], time: Numbers, force: Numbers) -> HighPass:
-        """Of the bias settings at a recording's mean force. The root of P² = q (P + R)."""
-        settings, step = description.get("bias") or {}, float(np.median(np.diff(time)))
-        base, per_force = (number_of(description, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
-        noise = (base + per_force * float(np.abs(force).mean())) ** 2
-        if settings.get("noise_time") is not None:
-            noise *= settings["noise_time"] / step
-        drift = number_of(description, "bias.drift_variance") * step
-        known = 0.5 * (drift + np.sqrt(drift**2 + 4 * drift * noise))
-        return cls(float(known / (known + noise)))
-
-    def __call__(self, signals: Numbers) -> Numbers:
-        """[N, c], from rest at the first sample's values."""
-        return np.asarray(lfilter([1.0, -1.0], [1.0, self.gain - 1.0], signals - signals[0], axis=0))
+def _bias_gain(description: Description, inputs: Mapping[str, Numbers]) -> float:
+    """Steady gain of the bias filter at a recording's mean force: the root of P² = q (P + R)."""
+    step = float(np.median(np.diff(inputs["time"])))
+    base, per_force = (number_of(description, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
+    noise = (base + per_force * float(np.abs(inputs["tendon_force"]).mean())) ** 2
+    noise *= float(description["bias"].get("noise_time") or step) / step
+    drift = number_of(description, "bias.drift_variance") * step
+    known = 0.5 * (drift + np.sqrt(drift**2 + 4 * drift * noise))
+    return float(known / (known + noise))
 
 
-# --- descriptions -----------------------------------------------------------------------------------------------------
+def _passed(signals: Numbers, gain: float) -> Numbers:
+    """[N, c] what the bias filter lets through: r_k = y_k − y_k−1 + (1 − K) r_k−1, from rest."""
+    return np.asarray(lfilter([1.0, -1.0], [1.0, gain - 1.0], signals - signals[0], axis=0))
 
 
-def constant_bias(description: Mapping[str, Any], torque: Numbers) -> Description:
-    """Without friction and covers, with a bias that stays at torque [n], N·m."""
-    bare = without_friction(description)
-    bare["bias"] = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": torque.tolist()}
-    return bare
-
-
-def make_rivals(product: Mapping[str, Any], training: Recording, free: Sequence[Recording]) -> list[Detector]:
-    """Without thresholds of their own yet. product: the description whose bias filter all of them have."""
-    arms = moment_arms(product)
-    mean = np.mean([(recording.groups["tendon_force"] @ arms).mean(axis=0) for recording in free], axis=0)
+def rivals(folder: Path) -> dict[str, Rival]:
+    """Without thresholds of their own yet."""
+    product = hand.fitted(folder).to_dict()
+    training = tf.read_recording(hand.training_file(folder))
     bare = without_friction(product)
-    return [
-        Detector("no model", constant_bias(product, mean)),
-        Detector("bias alone", without_friction(product, "cover")),
-        Detector("joint Coulomb", bare, fit_predictor(product, training, tensions=False)[0]),
-        Detector("tension-proportional", bare, fit_predictor(product, training, tensions=True)[0]),
-        Detector("paper's rule", copy.deepcopy(dict(product))),
-    ]
+    arms = moment_arms(product)
+    free = [hand.recording(folder, take).groups["tendon_force"] for take in hand.takes("free")]
+    mean = np.mean([(force @ arms).mean(axis=0) for force in free], axis=0)
+    constant = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": mean.tolist()}
+    return {
+        "paper's rule": Rival(product),
+        "tension-proportional": fitted_rival(bare, product, training, tensions=True),
+        "joint Coulomb": fitted_rival(bare, product, training, tensions=False),
+        "no model": Rival({**bare, "bias": constant}),
+        "bias alone": Rival(without_friction(product, "cover")),
+    }
 
 
 # --- thresholds -------------------------------------------------------------------------------------------------------
 
 
-def best_thresholds(detector: Detector, free: Sequence[Sequence[Recording]]) -> Detector:
-    """The lowest thresholds with no more than `PER_SECOND` false alarms on all free recordings together."""
-    # free: recordings by pretension. Constant and per newton: a line through what each joint's residual exceeds in
-    # `TAIL` of the samples of each pretension. Both times the lowest factor, searched from where a third of the alarms
-    # would be given without any detection: the first lower one with too many alarms, or more than `MOST_SHARE` of the
-    # time in alarm, ends the search.
-    groups = [[detector.inputs(recording) for recording in group] for group in free]
-    sizes = [[np.abs(detector.residual(inputs)) for inputs in group] for group in groups]
-    tails = np.array([np.quantile(np.concatenate(group), 1 - TAIL, axis=0) for group in sizes])
-    force = np.array([np.mean([np.abs(inputs["tendon_force"]).mean() for inputs in group]) for group in groups])
-    ones = np.ones_like(force)
-    lines = [nnls(np.column_stack([ones, force]) / tail[:, None], ones)[0] for tail in tails.T]
-    constant, per_force = np.array(lines).T
-    recordings, residuals = list(itertools.chain(*groups)), list(itertools.chain(*sizes))
-    excess = [
-        (size / (constant + per_force * np.abs(inputs["tendon_force"]).mean(axis=1)[:, None])).max(axis=1)
-        for inputs, size in zip(recordings, residuals, strict=True)
-    ]
-    allowed = int(PER_SECOND * sum(inputs["time"][-1] - inputs["time"][0] for inputs in recordings) + 1e-6)
+def with_best_thresholds(rival: Rival, folder: Path) -> Rival:
+    """The lowest thresholds that keep the rate of false alarms on all free recordings together.
 
-    def at(factor: float) -> Detector:
-        return detector.with_thresholds(factor * constant, factor * per_force)
-
-    factor = max(float(values.max()) for values in excess)
-    while _begins(recordings, excess, factor) < allowed / 3:
-        factor *= FINER
-    while not _holds(at(factor), recordings, allowed):
-        factor /= FINER
-    while _holds(at(factor * FINER), recordings, allowed):
-        factor *= FINER
-    return at(factor)
+    Constant and per newton: a line through what each joint's residual exceeds in `TAIL` of the samples of each
+    pretension, times one factor.
+    """
+    inputs = [rival.inputs(hand.recording(folder, take)) for take in hand.takes("free")]
+    tails, forces = [], []
+    for one in inputs:
+        every = np.ones(len(one["time"]), dtype=bool)
+        residual = run_parts(rival.description, one, [slice(0, len(every))], every, 1).residual
+        tails.append(np.quantile(np.abs(np.nan_to_num(residual)), 1 - TAIL, axis=0))
+        forces.append(float(np.abs(one["tendon_force"]).mean()))
+    ones = np.ones(len(forces))
+    lines = [nnls(np.column_stack([ones, forces]) / tail[:, None], ones)[0] for tail in np.transpose(tails)]
+    constant, per_force = np.transpose(lines)
+    low, high = np.log(0.3), np.log(30.0)
+    for _ in range(ROUNDS):
+        middle = float(np.exp(0.5 * (low + high)))
+        if _keeps_the_rate(rival.with_thresholds(middle * constant, middle * per_force), inputs):
+            high = np.log(middle)
+        else:
+            low = np.log(middle)
+    return rival.with_thresholds(np.exp(high) * constant, np.exp(high) * per_force)
 
 
-def _begins(recordings: Sequence[Mapping[str, Numbers]], excess: Sequence[Numbers], factor: float) -> int:
-    """How often the residuals, in thresholds, rise above the factor."""
-    return sum(
-        len(stretches(inputs["time"], values > factor)) for inputs, values in zip(recordings, excess, strict=True)
-    )
-
-
-def _holds(detector: Detector, recordings: Sequence[Mapping[str, Numbers]], allowed: int) -> bool:
-    alarms, seconds, duration = 0, 0.0, 0.0
-    for inputs in recordings:
-        score = score_detection(inputs["time"], np.zeros(len(inputs["time"]), dtype=bool), detector.alarm(inputs))
+def _keeps_the_rate(rival: Rival, inputs: Sequence[Mapping[str, Numbers]]) -> bool:
+    duration = sum(float(one["time"][-1] - one["time"][0]) for one in inputs)
+    alarms, seconds = 0, 0.0
+    for one in inputs:
+        score = score_detection(one["time"], np.zeros(len(one["time"]), dtype=bool), rival.alarm(one))
         alarms += len(score.false_alarms)
         seconds += score.free_alarm_share * score.free_seconds
-        duration += inputs["time"][-1] - inputs["time"][0]
-        if alarms > allowed:
+        if alarms > PER_SECOND * duration + 1e-6:
             return False
     return seconds <= MOST_SHARE * duration
 
 
-# --- kept -------------------------------------------------------------------------------------------------------------
+def rival_case(folder: Path, name: str) -> Row:
+    rival = with_best_thresholds(rivals(folder)[name], folder)
+    every = hand.takes("free", *hand.PUSHED)
+    rows = [scored(folder, take, rival.alarm(rival.inputs(hand.recording(folder, take)))) for take in every]
+    return {"rival": name, "summary": summary(rows, free_rms(folder))}
 
 
-def to_json(detectors: Sequence[Detector]) -> list[dict[str, Any]]:
-    return [
-        plain(vars(detector) | {"predictor": detector.predictor and vars(detector.predictor)}) for detector in detectors
-    ]
+def contact(folder: Path, workers: int) -> Figures:
+    """Simpler models on the recordings of contact.hand."""
+    every = hand.takes("free", *hand.PUSHED)
+    run_cases(hand.made, {f"made_{take.name}": (folder, take) for take in every}, folder, workers)
+    names = list(rivals(folder))
+    rows = run_cases(rival_case, {f"rival_{k}": (folder, name) for k, name in enumerate(names)}, folder, workers)
+    return {row["rival"]: row["summary"] for row in rows}
 
 
-def from_json(file: Path) -> list[Detector]:
-    detectors = []
-    for kept in json.loads(file.read_text(encoding="utf-8")):
-        if kept["predictor"] is not None:
-            coefficients = [np.array(values) for values in kept["predictor"]["coefficients"]]
-            kept["predictor"] = Predictor(**kept["predictor"] | {"coefficients": coefficients})
-        detectors.append(Detector(**kept))
-    return detectors
+# --- the regression of a rigid body -----------------------------------------------------------------------------------
+
+CUTOFF, RATE = 8.0, 200.0  # Hz; of the low pass as in the maps
+SIGN = 0.01  # of the largest speed, over which the sign turns
+
+
+def regression(joint: int, learned: Sequence[str]) -> Callable[[Sequence[str]], float]:
+    """Least squares over inertia, coupled inertia, weight and friction; the rms error on recordings [N·m].
+
+    What the field identifies such an arm with: 17 numbers in base parameters, of all three joints.
+    """
+    logs = {name: pd.read_parquet(DATA / "psm" / f"{name}.parquet").astype(float) for name in learned}
+    fastest = max(float(log[f"joint_velocity_{joint}"].abs().max()) for log in logs.values())
+    low_pass = butter(2, CUTOFF, fs=RATE, output="sos")
+
+    def columns(log: Any) -> Numbers:
+        angle = [log[f"joint_position_{k}"].to_numpy() for k in (1, 2, 3)]
+        speed = [sosfiltfilt(low_pass, log[f"joint_velocity_{k}"]) for k in (1, 2, 3)]
+        turn = [np.gradient(values) * RATE for values in speed]
+        own, at = turn[joint - 1], speed[joint - 1] / fastest
+        sine, cosine = np.sin(angle[:2]), np.cos(angle[:2])
+        weight = [sine[0] * cosine[1], cosine[0] * sine[1], cosine[0] * cosine[1], sine[1], sine[0]]
+        inertia = [own, own * angle[2], own * angle[2] ** 2, own * cosine[1] ** 2]
+        coupled = [turn[k] for k in range(3) if k != joint - 1]
+        by_insertion = [values * angle[2] for values in weight[:3]]
+        return np.column_stack([np.ones_like(own), *inertia, *coupled, *weight, *by_insertion, np.tanh(at / SIGN), at])
+
+    design = np.vstack([columns(log) for log in logs.values()])
+    effort = np.concatenate([log[f"effort_{joint}"] for log in logs.values()])
+    scale = np.maximum(np.sqrt((design**2).mean(axis=0)), 1e-12)
+    numbers = np.linalg.lstsq(design / scale, effort, rcond=1e-6)[0] / scale
+
+    def error(names: Sequence[str]) -> float:
+        judged = [pd.read_parquet(DATA / "psm" / f"{name}.parquet").astype(float) for name in names]
+        return table.rms(np.concatenate([log[f"effort_{joint}"] - columns(log) @ numbers for log in judged]))
+
+    return error
+
+
+def rigid_body(_folder: Path, _workers: int) -> Figures:
+    lines = []
+    for joint in (1, 2, 3):
+        error = regression(joint, FIRST)
+        lines.append([f"{joint}", *(f"{1e3 * error(names):.0f}" for names in (SECOND, ANOTHER))])
+    return {"lines": lines}
+
+
+PARTS = {
+    "contact": Part(contact, minutes=15.0, tables={"found": found_table}),
+    "rigid_body": Part(
+        rigid_body,
+        minutes=0.1,
+        needs=("../shared/data",),
+        tables={
+            "errors": table.of_cells(
+                "lines", ["PSM joint, error in mN·m (3: mN)", "other excitations", "another identification"]
+            )
+        },
+    ),
+}
