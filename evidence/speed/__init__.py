@@ -170,7 +170,7 @@ WAYS = {"c": "C interface, same outputs", "fmi2": "FMI 2.0, value by value", "fm
 
 def time_table(names: Mapping[str, str], head: str) -> Callable[[Figures], str]:
     return lambda figures: table.table(
-        [head, "time, ns"], [[words, f"{figures[name]:.3g}"] for name, words in names.items() if name in figures]
+        [head, "time, ns"], [[words, f"{figures[name]:,.0f}"] for name, words in names.items() if name in figures]
     )
 
 
