@@ -7,9 +7,7 @@ import sys
 from pathlib import Path
 
 from evidence.cases import EXAMPLES
-from evidence.fit.paper_figures import paper
-from evidence.fit.recalibration import LIMIT, recalibration
-from evidence.fit.recovery import SETTINGS, levers, recovery
+from evidence.fit import paper_figures, recalibration, recovery
 from evidence.part import Figures, Part
 from evidence.table import of_cells, table
 
@@ -73,10 +71,10 @@ def prediction_table(figures: Figures) -> str:
 
 PARTS = {
     "recovery": Part(
-        recovery,
+        recovery.measure,
         headlines={
             f"{setting}.{figure}": interval
-            for setting in SETTINGS
+            for setting in recovery.SETTINGS
             for figure, interval in {
                 "identifiable, least": (0.7, 1.0),
                 "batch: within 3 standard errors": (0.99, 1.0),
@@ -84,18 +82,18 @@ PARTS = {
                 "not converged": (0, 0),
             }.items()
         },
-        tables={"recovery": of_cells("lines", ["", *SETTINGS])},
+        tables={"recovery": of_cells("lines", ["", *recovery.SETTINGS])},
     ),
     "levers": Part(
-        levers,
+        recovery.levers,
         headlines={"numbers": (472, 472), "usual": (0.78, 0.84), "worst": (0.1, 0.25)},
         tables={"levers": of_cells("lines", ["", "identifiable of 472", ""])},
     ),
     "recalibration": Part(
-        recalibration,
+        recalibration.measure,
         minutes=2.0,
         needs=("../shared/data",),
-        headlines={"jaw.above": (0, 12), "jaw.worst": (0.95, 1.2), "fingers.worst": (0.9, LIMIT)},
+        headlines={"jaw.above": (0, 12), "jaw.worst": (0.95, 1.2), "fingers.worst": (0.9, recalibration.LIMIT)},
         tables={
             "jaw": of_cells("jaw.lines", ["numbers", "factor", *RATIOS], 2),
             "fingers": of_cells("fingers.lines", ["pretension", "judged", *RATIOS], 2),
@@ -114,7 +112,7 @@ PARTS = {
         tables={"numbers": of_cells("lines", ["", "true", *(f"recording {seed}" for seed in SEEDS)])},
     ),
     "paper": Part(
-        paper,
+        paper_figures.measure,
         minutes=0.3,
         headlines={
             "2b.largest_difference": (0.0, 1e-15),

@@ -22,7 +22,7 @@ SETTINGS = {
 }
 
 
-def recovery(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """All seeds of all settings."""
     cases = {
         f"{rate:g}_{prior:g}_seed_{seed}": (seed, DURATION, rate, prior)
