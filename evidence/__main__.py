@@ -64,8 +64,13 @@ def _processor_time() -> float:
 
 
 def _commit() -> str:
-    describe = ["git", "describe", "--always", "--dirty", "--exclude=*", "--abbrev=12"]
-    return subprocess.run(describe, cwd=ROOT, capture_output=True, text=True).stdout.strip()
+    """With -dirty where anything but results and pages differs from it."""
+    head = ["git", "rev-parse", "--short=12", "HEAD"]
+    changed = ["git", "status", "--porcelain", "--untracked-files=no", "--", ".", ":!evidence/results", ":!docs"]
+    commit, changes = (
+        subprocess.run(c, cwd=ROOT, capture_output=True, text=True).stdout.strip() for c in (head, changed)
+    )
+    return f"{commit}-dirty" if changes else commit
 
 
 def _processor() -> str:

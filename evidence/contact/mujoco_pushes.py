@@ -14,8 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from evidence.fingers.foreign import Truth, frame, noisy, quantised
-from evidence.fingers.mujoco_cases import ALSO, PLANS, Plan, describe, finger
+from evidence.fingers.foreign import frame, noisy, quantised
+from evidence.fingers.mujoco_cases import PLANS, Plan, describe, finger
 from evidence.fingers.mujoco_model import LINK, Physics
 from evidence.fingers.mujoco_run import SETTLE, STEP, Motion, Runner, random_motion
 from evidence.runner import write
@@ -53,8 +53,8 @@ class Push:
 class Pushed(Runner):
     """A finger that is pushed."""
 
-    def __init__(self, physics: Physics, truth: Truth, pushes: list[Push]) -> None:
-        super().__init__(physics, truth)
+    def __init__(self, physics: Physics, pushes: list[Push]) -> None:
+        super().__init__(physics)
         self.pushes = pushes
         self.bodies = [int(self.model.jnt_bodyid[self.hinges.start + j]) for j in range(physics.joints)]
         self.torque = np.zeros(physics.joints)
@@ -103,7 +103,7 @@ def planned(joints: int, kind: str, rng: np.random.Generator) -> list[Push]:
 def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, pushes: list[Push], seed: list[int]) -> Any:
     """The recording as a frame, and the pushes with their torques."""
     rng = np.random.default_rng(seed)
-    runner = Pushed(physics, Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO), pushes)
+    runner = Pushed(physics, pushes)
     motors = motion.motors(own_time(seconds, rng), physics)
     data = runner.data
     data.qpos[runner.hinges] = motion.angles(np.array([-SETTLE]))[0]

@@ -25,45 +25,21 @@ class Truth:
     """What a case hides, and where."""
 
     hidden: str  # one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list
-    joints: int  # of the finger
     joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
     tendon: int | None = None
     also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them
-    rms: float | None = None  # of the hidden term [N·m], largest over the joints; None where it is not known
     # variance of what refitting the description leaves of the hidden term over that of the residual, where it is little
     survives: float | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class Inside:
-    """What only the simulator knows about its training recording; measured = described + hidden."""
-
-    angle: Array  # true joint angles [rad], (samples, joints)
-    measured: Array  # Rᵀ f0 of the true forces with the arms of the description [N·m], (samples, joints)
-    described: Array  # all that the description has a term for, and inertia [N·m]
-    hidden: Array  # what it lacks [N·m]
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
     """A finger description whose structure is right but for the hidden effect, and its recordings."""
 
-    family: str
-    number: int
     nominal: Nominal
     train: pd.DataFrame
     test: pd.DataFrame
     truth: Truth
-    inside: Inside | None = None
-
-    @property
-    def name(self) -> str:
-        return f"{self.family}_{self.number:02d}"
-
-
-def rms(values: Array) -> float:
-    """Largest root mean square over the columns, each without its mean: a slow bias takes the mean anyway."""
-    return float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2, axis=0)).max())
 
 
 def frame(time: Array, force: Array, position: Array, angle: Array | None) -> pd.DataFrame:

@@ -18,7 +18,6 @@ from evidence.fingers.foreign import (
     TRAIN_SECONDS,
     Array,
     Case,
-    Inside,
     Nominal,
     Truth,
     description,
@@ -26,13 +25,11 @@ from evidence.fingers.foreign import (
     law,
     noisy,
     quantised,
-    rms,
     rough,
 )
 from evidence.fingers.mujoco_model import Physics
 from evidence.fingers.mujoco_run import Trace, random_motion, run
 
-FAMILY = "mujoco"
 DELAY = 0.02  # s
 OFFSET = 1.5  # N
 ALSO = ("inertia",)  # links and motors have mass, 0.3 to 6 mN·m rms at a joint; no description has a number for it
@@ -99,23 +96,18 @@ SEED = 7100
 
 def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS) -> Case:
     """The case of a number (from 1); shorter recordings are beginnings of the full ones."""
-    return of_plan(PLANS[number - 1], number, SEED + number, train_seconds, test_seconds)
-
-
-def of_plan(plan: Plan, number: int, seed: int, train_seconds: float, test_seconds: float) -> Case:
-    """The case of a plan. seed: of finger, description, motion and noise."""
+    plan, seed = PLANS[number - 1], SEED + number
     rng = np.random.default_rng(seed)
     plain = finger(plan, rng)
     physics = dataclasses.replace(plain, **plan.add(plain))
-    truth = Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO)
     nominal = describe(plain, plan, rng)
     motions = [random_motion(plan.joints, rng, plan.speed) for _ in range(2)]
     still = dataclasses.replace(physics, pushes=())  # nobody pushes in the test recording
-    train = run(physics, truth, motions[0], train_seconds + DELAY, plan.rate)
-    test = run(still, truth, motions[1], test_seconds + DELAY, plan.rate)
-    inside, truth = seen_from_inside(physics, plan, train, truth)
+    train = run(physics, motions[0], train_seconds + DELAY, plan.rate)
+    test = run(still, motions[1], test_seconds + DELAY, plan.rate)
     frames = [record(trace, plan, np.random.default_rng((seed, k))) for k, trace in enumerate((train, test))]
-    return Case(FAMILY, number, nominal, frames[0], frames[1], truth, inside)
+    truth = Truth(plan.hidden, plan.joint, plan.tendon, also=ALSO)
+    return Case(nominal, frames[0], frames[1], truth)
 
 
 def finger(plan: Plan, rng: np.random.Generator) -> Physics:
@@ -196,23 +188,9 @@ def measured_force(trace: Trace, plan: Plan) -> Array:
     return force
 
 
-def kept(trace: Trace, plan: Plan) -> slice:
-    """Rows of the recording: the first DELAY seconds have no late forces yet."""
-    return slice(round(DELAY * plan.rate), len(trace.time))
-
-
 def record(trace: Trace, plan: Plan, rng: np.random.Generator) -> pd.DataFrame:
-    """The recording: 20 mN of noise, positions to 1 µm, angles to 0.1 mrad."""
-    rows = kept(trace, plan)
+    """The recording: 20 mN of noise, positions to 1 µm, angles to 0.1 mrad; from the first late force on."""
+    rows = slice(round(DELAY * plan.rate), None)
     force = noisy(measured_force(trace, plan), 0.02, rng)[rows]
     position, angle = quantised(trace.position[rows], 1e-6), quantised(trace.angle[rows], 1e-4)
     return frame(trace.time[rows] - trace.time[rows][0], force, position, angle)
-
-
-def seen_from_inside(physics: Physics, plan: Plan, trace: Trace, truth: Truth) -> tuple[Inside, Truth]:
-    """The training recording's torques, and the truth with the size of what is hidden."""
-    rows = kept(trace, plan)
-    measured = measured_force(trace, plan) @ physics.arms
-    hidden = trace.hidden + measured - trace.force @ physics.arms
-    inside = Inside(trace.angle[rows], measured[rows], trace.described[rows], hidden[rows])
-    return inside, dataclasses.replace(truth, rms=rms(hidden[rows]))

@@ -1,4 +1,4 @@
-"""Runs a finger of mujoco_model.py along a motion; keeps what sensors see and what only the simulator knows."""
+"""Runs a finger of mujoco_model.py along a motion, and keeps what sensors see."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import mujoco
 import numpy as np
 
-from evidence.fingers.foreign import Array, Truth
+from evidence.fingers.foreign import Array
 from evidence.fingers.mujoco_model import Physics, compiled
 
 STEP = 0.001  # s
@@ -18,14 +18,12 @@ TINY = 1e-9  # N; MuJoCo would leave out the row of a frictionloss of 0
 
 @dataclasses.dataclass
 class Trace:
-    """True signals of a run, a row a sample. Rᵀ f0 = described + hidden, as torques that the tendons have to bear."""
+    """True signals of a run, a row a sample."""
 
     time: Array  # s, from 0
     angle: Array  # rad
     force: Array  # N
     position: Array  # m, x0
-    described: Array  # N·m, all that the description has a term for, and inertia
-    hidden: Array  # N·m, the rest
 
 
 @dataclasses.dataclass
@@ -60,11 +58,10 @@ def random_motion(joints: int, rng: np.random.Generator, speed: float = 1.0) -> 
 
 
 class Runner:
-    """One finger in MuJoCo: sets friction and extra torques before every step, reads the balance after it."""
+    """One finger in MuJoCo, whose friction and extra torques are set before every step."""
 
-    def __init__(self, physics: Physics, truth: Truth) -> None:
+    def __init__(self, physics: Physics) -> None:
         self.physics = physics
-        self.truth = truth
         self.model = compiled(physics, STEP)
         self.data = mujoco.MjData(self.model)
         m, n = physics.tendons, physics.joints
@@ -72,11 +69,9 @@ class Runner:
         self.hinges = slice(m, m + n)
         self.drags = physics.drags()
         self.rubbing = physics.rubbing()
-        # per drag: share of the force, N of constant friction, and how drift and speed scale both
+        # per drag: share of the force, N of constant friction
         self.shares = [float(physics.edge[i, j] + (physics.pulley[i, j - 1] if j else 0.0)) for i, j in self.drags]
         self.constants = [physics.preload_at(i, j) for i, j in self.drags]
-        self.factors = [1.0] * len(self.drags)
-        self.losses = [TINY] * len(self.drags)  # N
         self.crept = np.zeros(n)
         mujoco.mj_forward(self.model, self.data)
 
@@ -97,28 +92,14 @@ class Runner:
         force = self.tension().tolist()  # falls (or grows) along the tendon by what rubbed in the step before
         rubbed = self.data.efc_force[len(self.rubbing) : len(self.rubbing) + len(self.drags)].tolist()
         speed = self.data.ten_velocity[m : m + len(self.drags)].tolist()
-        load = [0.0] * p.joints
+        load, losses = [0.0] * p.joints, []
         for k, (i, j) in enumerate(self.drags):
             factor = drift * (1 + p.stribeck[0] * math.exp(-abs(speed[k]) / p.stribeck[1]) if p.stribeck else 1.0)
-            self.factors[k] = factor
-            self.losses[k] = factor * (self.shares[k] * force[i] + self.constants[k]) + TINY
+            losses.append(factor * (self.shares[k] * force[i] + self.constants[k]) + TINY)
             force[i] = max(force[i] - rubbed[k], 0.0)  # lengths count against x1
             load[j] += force[i]
-        self.model.tendon_frictionloss[m : m + len(self.drags)] = self.losses
+        self.model.tendon_frictionloss[m : m + len(self.drags)] = losses
         self.model.dof_frictionloss[self.hinges] = drift * (p.joint_friction + p.load_friction * load)
-
-    def lacking(self, t: float) -> Array:
-        """Share of each friction row that the description lacks; MuJoCo has the joints' rows before the tendons'."""
-        truth, drift = self.truth, self.drift(t)
-        joints = [
-            float(truth.joint == j + 1) if truth.hidden == "joint_friction" else 1 - 1 / drift for j in self.rubbing
-        ]
-        tendons = [1 - 1 / factor for factor in self.factors]
-        if truth.hidden == "edge_friction":
-            tendons = [float((truth.tendon, truth.joint) == (i + 1, j + 1)) for i, j in self.drags]
-        elif truth.hidden == "preload_friction":
-            tendons = [constant / loss for constant, loss in zip(self.constants, self.losses, strict=True)]
-        return np.array(joints + tendons)
 
     def disturbance(self, t: float) -> Array:
         """Torques on the joints that MuJoCo has no element for [N·m], as they act."""
@@ -141,47 +122,19 @@ class Runner:
         """Force on the probe [N]; it goes back up when nobody pushes."""
         return next((force for begin, end, force in self.physics.pushes if begin <= t < end), -0.5)
 
-    def advance(self, t: float, motors: Array) -> Array:
-        """One step from time t; returns the extra torques that act in it."""
+    def advance(self, t: float, motors: Array) -> None:
+        """One step from time t."""
         self.set_friction(t)
         self.data.ctrl[self.motors] = motors
         if self.physics.pushes:
             self.data.ctrl[self.physics.tendons] = self.push(t)
-        extra = self.disturbance(t)
-        self.data.qfrc_applied[self.hinges] = extra
+        self.data.qfrc_applied[self.hinges] = self.disturbance(t)
         mujoco.mj_step(self.model, self.data)
-        return extra
-
-    def balance(self, t: float, q: Array, v: Array, extra: Array) -> tuple[Array, Array]:
-        """What is described and what is hidden [N·m] at the start (t, q, v) of the step just made."""
-        d, h, p, truth = self.data, self.hinges, self.physics, self.truth
-        rows = len(self.rubbing) + len(self.drags)
-        rubbed = d.efc_J.reshape(-1, self.model.nv)[:rows, h] * d.efc_force[:rows, None]
-        inertia = np.zeros(self.model.nv)
-        mujoco.mj_mulM(self.model, d, inertia, d.qacc)
-        weight = d.qfrc_bias[h] - d.qfrc_gravcomp[h]  # with what spins, which is small
-        touching = d.qfrc_constraint[h] - rubbed.sum(axis=0)
-        cover, damping = p.cover * (q - p.rest_angle), p.damping * v
-        coupled = self.coupled(q)
-        bent = self.tension() @ p.arms - (d.qfrc_spring[h] + cover + coupled)  # by arms that are not the described ones
-        here = np.array([truth.joint in (None, j + 1) for j in range(p.joints)], float)
-        hidden = -self.lacking(t) @ rubbed + coupled - extra - touching + bent
-        hidden += weight * bool(p.heavy) + cover * here * (truth.hidden == "cover_stiffness")
-        hidden += damping * here * (truth.hidden == "viscous_friction")
-        total = -rubbed.sum(axis=0) + coupled - extra - touching + bent + weight + cover + damping + inertia[h]
-        return total - hidden, hidden
-
-    def coupled(self, q: Array) -> Array:
-        torque = np.zeros(self.physics.joints)
-        if self.physics.coupling:
-            j, stiffness = self.physics.coupling
-            torque[j - 1 : j + 1] = stiffness * (q[j - 1] - q[j]) * np.array([1.0, -1.0])
-        return torque
 
 
-def run(physics: Physics, truth: Truth, motion: Motion, seconds: float, rate: float) -> Trace:
+def run(physics: Physics, motion: Motion, seconds: float, rate: float) -> Trace:
     """Simulates and samples; the first SETTLE seconds are left out."""
-    runner = Runner(physics, truth)
+    runner = Runner(physics)
     data = runner.data
     times = np.asarray(STEP * np.arange(-round(SETTLE / STEP), round(seconds / STEP)), dtype=float)
     motors = motion.motors(times, physics)
@@ -191,9 +144,9 @@ def run(physics: Physics, truth: Truth, motion: Motion, seconds: float, rate: fl
     every = round(1 / (rate * STEP))
     rows: list[tuple[Array, ...]] = []
     for k, t in enumerate(times.tolist(), start=-round(SETTLE / STEP)):
-        q, v, x0 = data.qpos[runner.hinges].copy(), data.qvel[runner.hinges].copy(), data.qpos[runner.motors].copy()
-        extra = runner.advance(t, motors[k + round(SETTLE / STEP)])
-        if k >= 0 and k % every == 0:
-            rows.append((np.array([t]), q, runner.tension(), x0, *runner.balance(t, q, v, extra)))
+        angle, position = data.qpos[runner.hinges].copy(), data.qpos[runner.motors].copy()
+        runner.advance(t, motors[k + round(SETTLE / STEP)])
+        if k >= 0 and k % every == 0:  # the forces are those of the step's beginning
+            rows.append((np.array([t]), angle, runner.tension(), position))
     time, *others = (np.array(column) for column in zip(*rows, strict=True))
     return Trace(time[:, 0], *others)

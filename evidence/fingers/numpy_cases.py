@@ -9,9 +9,7 @@ import numpy as np
 import pandas as pd
 
 from evidence.fingers import numpy_capstan, numpy_karnopp, numpy_maxwell, numpy_tanh
-from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Inside, Truth, frame, rms
-
-FAMILY = "numpy"
+from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Truth, frame
 
 # What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
 # false, in any case (diagnosis/foreign_cases.py).
@@ -70,17 +68,14 @@ def make(
     simulator = plan.simulator
     train = simulator.simulate(plan.hidden, train_seconds, np.random.default_rng((seed, number, 1)))
     test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((seed, number, 2)))
-    inside = Inside(train["true_angle"], train["measured"], train["described"], train["hidden"])
     truth = Truth(
         plan.hidden,
-        joints=train["true_angle"].shape[1],
         joint=plan.joint,
         tendon=plan.tendon,
         also=ALSO.get(simulator, ()),
-        rms=rms(train["hidden"]),
         survives=plan.survives,
     )
-    return Case(FAMILY, number, simulator.describe(plan.hidden), recording(train), recording(test), truth, inside)
+    return Case(simulator.describe(plan.hidden), recording(train), recording(test), truth)
 
 
 def recording(made: dict[str, Array]) -> pd.DataFrame:

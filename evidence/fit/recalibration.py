@@ -34,7 +34,7 @@ LEVELS = (1.0, 2.0, 4.0)  # times the pretension
 SETTLED = 50  # samples; the bias begins with the first one
 
 
-def recalibration(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """Errors after over before, of the jaw and of fingers whose truth is known."""
     starts = {
         f"jaw_{numbers}_{factor:g}": (numbers, factor) for numbers in ("guessed", "estimated") for factor in FACTORS
@@ -51,7 +51,7 @@ def _summary(cases: Sequence[Row], keys: Sequence[str]) -> Figures:
     rows = [row for case in cases for row in case["rows"]]
     ratio = column(rows, "ratio")
     above = {"worst": float(ratio.max()), "above": int(np.sum(ratio > LIMIT)), "of": len(ratio)}
-    return above | {"lines": by(rows, [*keys, "half"], _ratios)}
+    return above | {"lines": by(rows, keys, _ratios)}
 
 
 def _ratios(rows: Sequence[Row]) -> list[str]:
@@ -83,7 +83,7 @@ def jaw_rows(numbers: str, factor: float) -> Row:
     rows = []
     for run in runs:
         after = _errors(fitted(finger, [runs[run]]), runs)
-        about = {"numbers": numbers, "factor": f"× {factor:g}", "half": "chosen on" if run in EVEN else "others"}
+        about = {"numbers": numbers, "factor": f"× {factor:g}"}
         rows += [about | {"ratio": after[other] / before[other]} for other in runs if other != run]
     return {"rows": rows}
 
@@ -115,7 +115,6 @@ def finger_rows(seed: int) -> Row:
     hand = replace(hand, noise=replace(hand.noise, tendon_step=1e-7))
     training = {"one": _recorded(hand, 100 + seed, 1.0), "varied": _recorded(hand, 500 + seed, None)}
     judged = {f"× {level:g}": _recorded(hand, 200 + seed + 100 * k, level) for k, level in enumerate(LEVELS)}
-    half = "chosen on" if seed % 2 == 0 else "others"
     rows = []
     for k in range(STARTS):
         start = matched_rig.off_start(np.random.default_rng([seed, k, 9]), hand.truth, OFF)
@@ -124,7 +123,7 @@ def finger_rows(seed: int) -> Row:
             finger = fitted(start, [recording], hand.source)
             for level, other in judged.items():
                 ratio = _left(finger, other, hand.source) / before[level]
-                rows.append({"pretension": pretension, "judged": level, "half": half, "ratio": ratio})
+                rows.append({"pretension": pretension, "judged": level, "ratio": ratio})
     return {"rows": rows}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from evidence.cases import run_cases
 from evidence.fit import recovery_case as case
-from evidence.fit.recovery_case import DURATION, KINDS, Case, Scale, identifiable, run_seed
+from evidence.fit.recovery_case import DURATION, Case, Scale, identifiable, run_seed
 from evidence.part import Figures
 from evidence.table import Row, column
 
@@ -22,7 +22,7 @@ SETTINGS = {
 }
 
 
-def recovery(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """All seeds of all settings."""
     cases = {
         f"{rate:g}_{prior:g}_seed_{seed}": (seed, DURATION, rate, prior)
@@ -52,11 +52,6 @@ def summary(rows: Sequence[Row]) -> dict[str, float]:
     for key, method in (("batch", "batch"), ("ekf", "filter, last pass"), ("ekf_first", "filter, first pass")):
         values[f"{method}: within 3 standard errors"] = float(1 - of(f"{key}_far").sum() / known.sum())
         values[f"{method}: mean square"] = float(np.sum(of(f"{key}_variance") * known) / known.sum())
-    for kind in KINDS:
-        if count := of(f"identifiable_{kind}").sum():
-            values[f"batch: mean square, {kind}"] = float(of(f"squares_{kind}").sum() / count)
-    values["filter − batch, rms in standard errors"] = float(np.sqrt(np.mean(of("apart_rms") ** 2)))
-    values["filter − batch, largest"] = float(of("apart_most").max())
     values["not converged"] = int(np.sum(of("converged") == 0))
     return values
 
@@ -89,7 +84,8 @@ def levers(folder: Path, workers: int) -> Figures:
     rows = run_cases(lever, {f"lever_{k:02d}": (name,) for k, name in enumerate(LEVERS)}, folder, workers)
     shares = [row["identifiable"] / row["numbers"] for row in rows]
     lines = [
-        [name, str(row["identifiable"]), f"{share:.0%}"] for name, row, share in zip(LEVERS, rows, shares, strict=True)
+        [name, str(row["identifiable"]), f"{100 * share:.0f} %"]
+        for name, row, share in zip(LEVERS, rows, shares, strict=True)
     ]
     return {"numbers": rows[0]["numbers"], "usual": shares[0], "worst": shares[-1], "lines": lines}
 

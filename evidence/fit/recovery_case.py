@@ -165,7 +165,6 @@ def identifiable(case: Case, scale: Scale) -> Flags:
 
 # --- both fits of a case ---------------------------------------------------------------------------------------------
 
-KINDS = ("static", "coulomb", "stribeck_velocity", "viscous", "stiffness", "initial_torque")
 FAR = 3.0  # standard errors
 PRIOR = 0.3  # of a number's size: about as far as the starts are off
 EKF_PASSES = 3  # each but the first linearised where the one before arrived; the first is the paper's filter
@@ -185,17 +184,12 @@ def run_seed(seed: int, duration: float = DURATION, rate: float = RATE, prior: f
     estimator = Estimator(image(made.start))
     estimator.add_recording(made.recording, external_torque=made.recording["external_torque"])
     fit = estimator.fit(prior_std=prior)
-    z, errors = fit.z, scale.standard_errors(fit.covariance)
     row["converged"] = int(fit.converged)
-    row |= {f"batch_{key}": value for key, value in judge(scale, known, z, fit.covariance).items()}
-    for kind in KINDS:
-        distance = (scale.difference(z, scale.unknowns) / errors)[known & (scale.kinds == kind)]
-        row |= {f"identifiable_{kind}": len(distance), f"squares_{kind}": float(np.sum(distance**2))}
+    row |= {f"batch_{key}": value for key, value in judge(scale, known, fit.z, fit.covariance).items()}
     passes = list(_ekf(made, prior))
     row |= {f"ekf_first_{key}": value for key, value in judge(scale, known, *passes[0]).items()}
     row |= {f"ekf_{key}": value for key, value in judge(scale, known, *passes[-1]).items()}
-    apart = (scale.difference(passes[-1][0], z) / errors)[known]
-    return row | {"apart_rms": float(np.sqrt(np.mean(apart**2))), "apart_most": float(np.abs(apart).max())}
+    return row
 
 
 def _ekf(made: Case, prior: float) -> Iterator[tuple[Numbers, Numbers]]:

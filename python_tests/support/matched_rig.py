@@ -1,4 +1,7 @@
-"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect (diagnosis/README.md).
+"""Recordings of a tendon finger whose physics is the nominal model's but for one hidden effect.
+
+It solves Rᵀ f = T(q, q̇, f) + bias + noise for the forces, by the model's friction law or with presliding. Strokes are
+random, the pretension varies by a factor of four, torque noise is 1.5 to 3 mN·m, and the bias wanders.
 
     hand = random_hand(seed=1, joints=2)                       # the truth, and the tool's nominal description
     hidden = hide(hand, "load_friction", strength=0.1, seed=3) # hidden_effects.py; strength after refitting, over noise
