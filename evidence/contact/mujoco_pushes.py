@@ -18,7 +18,7 @@ from evidence.fingers.foreign import frame, noisy, quantised
 from evidence.fingers.mujoco_cases import PLANS, Plan, describe, finger
 from evidence.fingers.mujoco_model import LINK, Physics
 from evidence.fingers.mujoco_run import SETTLE, STEP, Motion, Runner, random_motion
-from evidence.runner import write
+from evidence.cases import write
 from tendonfmu.arrays import Numbers
 from tendonfmu.files import whole_file
 
