@@ -14,11 +14,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from evidence.cases import write
 from evidence.fingers.foreign import frame, noisy, quantised
 from evidence.fingers.mujoco_cases import PLANS, Plan, describe, finger
 from evidence.fingers.mujoco_model import LINK, Physics
 from evidence.fingers.mujoco_run import SETTLE, STEP, Motion, Runner, random_motion
-from evidence.cases import write
 from tendonfmu.arrays import Numbers
 from tendonfmu.files import whole_file
 
