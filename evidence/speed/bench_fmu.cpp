@@ -1,6 +1,6 @@
 // Time of a step through the FMUs, called from C: bench_fmu [OPTIONS OF GOOGLE BENCHMARK] FILE.json (bench_case.h). Set
-// the inputs, step, get six Real and three Boolean groups of outputs, each kind in one call. Beside it the same through
-// the C interface. Counter per_step is the figure of docs/evidence/speed.md.
+// the inputs, step, get six Real and three Boolean groups of outputs, each kind in one call. Counter per_step is the
+// figure of docs/evidence/speed.md.
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 
@@ -152,69 +152,28 @@ class fmi3_runner {
   const sample_references<fmi3ValueReference> all_{false};
 };
 
-// The same samples and outputs through the C interface.
-class c_runner {
- public:
-  explicit c_runner(const bench_case& made)
-      : finger_(tendonfmu_create(made.image.data(), made.image.size(), nullptr, 0)) {}
-  int start() {
-    const std::array<double, 2 * tendons> rest = {};
-    tendonfmu_reset(finger_);
-    set(rest.data());
-    return tendonfmu_initialise(finger_, 0.0, &inputs_);
-  }
-  int set(const double* inputs) {
-    inputs_ = {inputs, inputs + tendons, nullptr, nullptr};
-    return 0;
-  }
-  int step(double time) { return tendonfmu_step(finger_, time, &inputs_); }
-  int get(fmu_outputs& outputs) {
-    std::array<unsigned char, joints + 1 + tendons> flags;
-    double* number = outputs.numbers.data();
-    tendonfmu_outputs to = {};
-    for (double** row : {&to.compensated_torque, &to.joint_torque, &to.friction_torque, &to.bias_torque,
-                         &to.joint_angle, &to.joint_speed}) {
-      *row = number;
-      number += joints;
-    }
-    to.joint_contact = flags.data();
-    to.contact = flags.data() + joints;
-    to.slack = flags.data() + joints + 1;
-    const int status = tendonfmu_get_outputs(finger_, &to);
-    std::copy(flags.begin(), flags.end(), outputs.flags.begin());
-    return status;
-  }
-
- private:
-  tendonfmu_finger* finger_;
-  tendonfmu_inputs inputs_ = {};
-};
-
-// Sum of all outputs over the recording, the same for every way; times are worth nothing where it is not.
 template <typename Runner>
-double run(Runner& runner, const bench_case& made, int& status) {
-  double sum = 0.0;
+int run(Runner& runner, const bench_case& made) {
   fmu_outputs outputs;
-  status += runner.start();
+  int status = runner.start();
   for (std::size_t k = 0; k < made.samples; ++k) {
     status +=
-        runner.set(made.inputs(k).tendon_force) + runner.step(1e-3 * static_cast<double>(k + 1)) + runner.get(outputs);
+        runner.set(made.inputs(k).tendon_force) + runner.step(1e-3 * static_cast<double>(k)) + runner.get(outputs);
     benchmark::DoNotOptimize(outputs);
-    sum += outputs.numbers[k % outputs.numbers.size()] + outputs.flags[k % outputs.flags.size()];
   }
-  return sum;
+  return status;
 }
 
 template <typename Runner>
-void add(const char* name, const bench_case& made, double expected, std::shared_ptr<Runner> runner) {
+void add(const char* name, const bench_case& made, const resource_folder& resources) {
+  const auto runner = std::make_shared<Runner>(resources);
   benchmark::RegisterBenchmark(name, [=, &made](benchmark::State& state) {
     int status = 0;
-    bool same = true;
     for (auto _ : state) {
-      same = run(*runner, made, status) == expected && same;
+      status += run(*runner, made);
     }
-    if (status != 0 || !same) {
-      state.SkipWithError("a call was refused, or outputs differ from those of the C interface");
+    if (status != 0) {
+      state.SkipWithError("a call was refused");
     }
     const auto count = static_cast<double>(state.iterations() * static_cast<std::int64_t>(made.samples));
     state.counters["per_step"] = benchmark::Counter(count, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
@@ -232,12 +191,8 @@ int main(int argc, char** argv) {
   const std::filesystem::path file = argv[1];
   const bench_case made = read_case(file);
   const resource_folder resources(file.parent_path() / "resources", made.image);
-  const auto reference = std::make_shared<c_runner>(made);
-  int status = 0;
-  const double expected = run(*reference, made, status);
-  add("c", made, expected, reference);
-  add("fmi2", made, expected, std::make_shared<fmi2_runner>(resources));
-  add("fmi3", made, expected, std::make_shared<fmi3_runner>(resources));
+  add<fmi2_runner>("fmi2", made, resources);
+  add<fmi3_runner>("fmi3", made, resources);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::ClearRegisteredBenchmarks();
   return 0;
