@@ -355,26 +355,15 @@ def tracked() -> list[str]:
 
 
 TESTS = {file.stem for file in (ROOT / "python_tests").rglob("*.py")} - {"__init__"}
-FINGERS = {
-    "fit_data",
-    "made_logs",
-    "mujoco_friction",
-    "hidden_effects",
-    "hidden_sensors",
-    "matched_physics",
-    "matched_rig",
-    "matched_strength",
-    "mjcf_models",
-}
-OF_EVIDENCE = {"detection", "diagnosis", "fingers", "fit"}  # cases and fingers, for all tests
+SIMULATORS = {file.stem for file in (ROOT / "python_tests" / "support").glob("*.py")}  # and what they are made of
 
 
 @pytest.mark.parametrize(
     ("files", "strangers"),
     [
         ("python/**/*.py", TESTS | {"evidence", "python_tests"}),
-        ("examples/**/*.py", (TESTS - FINGERS) | {"python_tests"}),
-        ("evidence/**/*.py", (TESTS - FINGERS) | {"python_tests"}),
+        ("examples/**/*.py", (TESTS - SIMULATORS) | {"python_tests"}),
+        ("evidence/**/*.py", (TESTS - SIMULATORS) | {"python_tests"}),
         ("python_tests/support/oracle*.py", {"evidence", "tendonfmu"}),  # the oracle judges them
     ],
 )
@@ -384,17 +373,6 @@ def test_nothing_imports_tests_and_the_oracle_nothing_that_it_judges(files: str,
         for file in ROOT.glob(files)
         for name in imports_of(ast.parse(file.read_text(encoding="utf-8")))
         if name.split(".")[0] in strangers
-    ]
-    assert wrong == []
-
-
-def test_tests_of_the_product_take_cases_and_fingers_from_the_evidence() -> None:
-    wrong = [
-        f"{file.relative_to(ROOT)}: {name}"
-        for file in (ROOT / "python_tests").rglob("*.py")
-        if "evidence" not in file.relative_to(ROOT).parts
-        for name in imports_of(ast.parse(file.read_text(encoding="utf-8")))
-        if name.split(".")[0] == "evidence" and name.split(".")[1] not in OF_EVIDENCE
     ]
     assert wrong == []
 

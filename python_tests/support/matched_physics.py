@@ -140,11 +140,8 @@ class Finger:
 
 
 def read_law(law: Mapping[str, Any]) -> Array:
-    """[2, 4] positive and negative side of a law."""
-    sides = (law["positive"], law["negative"]) if "positive" in law else (law, law)
-    return np.array(
-        [[s["coulomb"], s["static"] - s["coulomb"], s["stribeck_velocity"], s.get("viscous", 0.0)] for s in sides]
-    )
+    """[2, 4] positive and negative side of a law, which are the same."""
+    return np.array([[law["coulomb"], law["static"] - law["coulomb"], law["stribeck_velocity"], law["viscous"]]] * 2)
 
 
 def read_finger(data: Mapping[str, Any]) -> Finger:

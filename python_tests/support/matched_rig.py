@@ -13,14 +13,10 @@ Friction depends on the forces: they are found by fixed-point iteration over the
 from __future__ import annotations
 
 import copy
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 from scipy.signal import lfilter
@@ -102,20 +98,10 @@ class Hand:
 
 @dataclass(frozen=True)
 class Made:
-    """A recording with its truth. columns: name -> [N]. motion, force [N, m]: the true ones; noise [N, n] N·m."""
+    """A recording: values [N] by the names of columns."""
 
     hand: Hand
     columns: dict[str, Array]
-    motion: Motion
-    force: Array
-    noise: Array
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """recording.parquet and nominal.json."""
-        folder.mkdir(parents=True, exist_ok=True)
-        pq.write_table(pa.table(self.columns), folder / "recording.parquet")
-        (folder / "nominal.json").write_text(json.dumps(self.hand.nominal), encoding="utf-8")
-        return folder / "recording.parquet", folder / "nominal.json"
 
 
 def random_arms(rng: np.random.Generator, joints: int) -> Array:
@@ -194,13 +180,14 @@ def off_start(rng: np.random.Generator, data: Description, share: float = 0.5) -
     rough = copy.deepcopy(data)
 
     def move(law: Description | None) -> None:
-        for side in [] if law is None else [law["positive"], law["negative"]] if "positive" in law else [law]:
-            drop = side["static"] - side["coulomb"]
-            scale = rng.uniform(1.0 - share, 1.0 + share, 4)
-            side["coulomb"] = float(side["coulomb"] * scale[0])
-            side["static"] = side["coulomb"] if drop == 0.0 else float(side["coulomb"] + drop * scale[1])
-            side["stribeck_velocity"] = float(side["stribeck_velocity"] * scale[2])
-            side["viscous"] = float(side["viscous"] * scale[3])
+        if law is None:
+            return
+        drop = law["static"] - law["coulomb"]
+        scale = rng.uniform(1.0 - share, 1.0 + share, 4)
+        law["coulomb"] = float(law["coulomb"] * scale[0])
+        law["static"] = law["coulomb"] if drop == 0.0 else float(law["coulomb"] + drop * scale[1])
+        law["stribeck_velocity"] = float(law["stribeck_velocity"] * scale[2])
+        law["viscous"] = float(law["viscous"] * scale[3])
 
     for joint in rough["joints"]:
         move(joint.get("friction"))
@@ -239,7 +226,7 @@ def random_hand(
 # --- motion and pretension --------------------------------------------------------------------------------------------
 
 
-def strokes(rng: np.random.Generator, time: Array, speed: float = 1.0) -> Array:
+def strokes(rng: np.random.Generator, time: Array) -> Array:
     """[N] one joint's angle: strokes of least jerk between random angles, a rest after some; it begins at rest at 0."""
     angle = np.zeros(len(time))
     now, at = time[0] + rng.uniform(0.1, 0.4), 0.0
@@ -247,7 +234,7 @@ def strokes(rng: np.random.Generator, time: Array, speed: float = 1.0) -> Array:
         length = rng.uniform(*STROKES)
         direction = 1.0 if at < -REACH + length else -1.0 if at > REACH - length else rng.choice([-1.0, 1.0])
         target = float(np.clip(at + direction * length, -REACH, REACH))
-        mean_speed = speed * np.exp(rng.uniform(*np.log(SPEEDS)))
+        mean_speed = np.exp(rng.uniform(*np.log(SPEEDS)))
         duration = max(abs(target - at) / mean_speed, SHORTEST)
         s = np.clip((time - now) / duration, 0.0, 1.0)
         angle = np.where(time >= now, at + (target - at) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2), angle)
@@ -320,20 +307,15 @@ def balanced_forces(finger: Finger, motion: Motion, pretensions: Array, load: Ar
     raise RuntimeError(f"matched rig: no balance, forces still move by {np.max(np.abs(force - last)):.2e} N")
 
 
-def record(
-    hand: Hand, seed: int, seconds: float = 60.0, *, quiet: bool = False, speed: float = 1.0, level: float = 1.0,
-    external: Array | None = None,
-) -> Made:  # fmt: skip
-    """A recording of this hand. quiet: without noise, wander and quantisation. speed, level: factors of the motion's
-    speed and the pretension. external: [N, n] N·m, a load nobody tells the tool of."""
+def record(hand: Hand, seed: int, seconds: float = 60.0, *, quiet: bool = False) -> Made:
+    """A recording of this hand. quiet: without noise, wander and quantisation."""
     arms = read_finger(hand.truth).arms
     time = np.arange(round(seconds * hand.rate)) / hand.rate
     rng = np.random.default_rng([seed, 61])
-    encoders = np.column_stack([strokes(rng, time, speed) for _ in range(arms.shape[1])])
+    encoders = np.column_stack([strokes(rng, time) for _ in range(arms.shape[1])])
     rng = np.random.default_rng([seed, 62])
-    pretensions = pretension(rng, time, arms, level * hand.level, hand.tension_time)
-    load = 0.0 if external is None else external
-    return recorded(hand, time, encoders, pretensions, load, rng, QUIET if quiet else hand.noise)
+    pretensions = pretension(rng, time, arms, hand.level, hand.tension_time)
+    return recorded(hand, time, encoders, pretensions, 0.0, rng, QUIET if quiet else hand.noise)
 
 
 def recorded(
@@ -372,7 +354,7 @@ def recorded(
         if hidden.sensors is not None:
             hidden.sensors(signals, finger, hidden.magnitude)
     measure(rng, signals, noise)
-    return Made(hand, columns_of(signals, hand.source), motion, force, disturbance)
+    return Made(hand, columns_of(signals, hand.source))
 
 
 def measure(rng: np.random.Generator, signals: dict[str, Array], noise: Noise) -> None:
