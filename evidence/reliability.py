@@ -1,7 +1,4 @@
-"""What happens with calls, files and machines that are not as they should be?
-
-Fuzzed calls and inputs, commands that are killed, and machines that have no room left.
-"""
+"""What happens to commands that are killed, and on machines that have no room left?"""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import contextlib
 import json
 import os
 import random
-import re
 import resource
 import shutil
 import signal
@@ -22,8 +18,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from evidence import table
-from evidence.cases import EXAMPLES, ROOT
+from evidence.cases import EXAMPLES
 from evidence.part import Figures, Part
 
 DEMO = EXAMPLES / "demo_recording"
@@ -196,30 +191,8 @@ def no_room(folder: Path, _workers: int) -> Figures:
     return {"runs": len(answers), **known, "wrong": wrong, "faults": len(wrong)}
 
 
-# --- fuzzed -----------------------------------------------------------------------------------------------------------
-
-FUZZ_SECONDS = 600  # of each
-
-
-def fuzz(_folder: Path, _workers: int) -> Figures:
-    """Inputs that every fuzzer tried, with the address and undefined-behaviour sanitizers; needs clang."""
-    script = ["bash", str(ROOT / "runtime" / "fuzz" / "run_fuzzers.sh"), str(FUZZ_SECONDS)]
-    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True)
-    tried = {name: int(count) for name, count in re.findall(r"^(\w+): (\d+) inputs, no finding", done.stdout, re.M)}
-    wrong = re.findall(r"^.*FAILED.*$", done.stderr, re.M)
-    if not tried and not wrong:
-        raise RuntimeError(done.stderr[-600:])
-    return {"tried": tried, "wrong": wrong, "faults": len(wrong)}
-
-
-def fuzz_table(figures: Figures) -> str:
-    lines = [[f"`{name}`", f"{count:,}"] for name, count in figures["tried"].items()]
-    return table.table(["fuzzer", "inputs without a finding"], lines)
-
-
 NOTHING_WRONG = {"faults": (0, 0)}
 PARTS = {
-    "fuzz": Part(fuzz, headlines=NOTHING_WRONG, tables={"inputs": fuzz_table}),
     "kills": Part(kills, minutes=11.0, headlines=NOTHING_WRONG),
     "no_room": Part(no_room, minutes=5.0, headlines=NOTHING_WRONG),
 }
