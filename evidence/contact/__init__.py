@@ -18,7 +18,7 @@ import numpy as np
 from evidence import table
 from evidence.cases import INDEX_RIG, run_cases, write
 from evidence.contact import hand
-from evidence.contact.sensor_faults import fault_table, sensor_faults
+from evidence.contact.sensor_faults import fault_table, judged_faults
 from evidence.part import Figures, Part
 from evidence.table import Row
 from tendonfmu.arrays import Flags, Numbers
@@ -296,7 +296,7 @@ PARTS: dict[str, Part] = {
         tables={"fingers": mujoco_table},
     ),
     "sensor_faults": Part(
-        sensor_faults,
+        judged_faults,
         needs=("mujoco",),
         headlines={"share": (98.0, 100.0), "sound_faults": (0, 0)},
         tables={"faults": fault_table},
