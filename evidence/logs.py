@@ -29,7 +29,7 @@ def faults(folder: Path, workers: int) -> Figures:
         ends += [result.name for result in results]
         # CSV is the first format, and the others say the same of their own columns
         words = ", ".join(f"{name}, {kept} rows kept" if kept else name for name, kept in sorted(same))
-        lines.append([fault, words, results[0].words or table.NOTHING])
+        lines.append([fault, words, results[0].words.split(";")[0] or table.NOTHING])
     cut = [[name, *cuts(folder, form)] for name, form in FORMATS.items()]
     return {
         "logs": len(ends),

@@ -84,7 +84,7 @@ def jaw() -> Machine:
 PLAIN, PULSES = "DATA_EMPS", "DATA_EMPS_PULSES"
 # Janot, Gautier, Brunot 2019: N/(m/s), N, N; % of the force that is missed
 PUBLISHED = {"viscous": 203.5034, "coulomb": 20.3935, "offset": -3.1648}
-PUBLISHED_ERRORS = {"symmetric": (4.08, 5.98), "asymmetric": (3.11, None)}
+PUBLISHED_ERRORS = {"symmetric": ("4.08", "5.98"), "asymmetric": ("3.11", "")}
 DECIMATION = 10  # from 1 kHz, as the authors decimate
 
 
@@ -190,20 +190,10 @@ def wire_contact(_folder: Path, _workers: int) -> Figures:
     best = int(np.argmax([score.found - score.false_alarms for score in scores]))
     report = tf.score(fingers[best], counted).report
     events = [event for recording in report["recordings"] for event in recording["event_list"] if event["found"]]
-    return {
-        "threshold": 1e3 * THRESHOLDS[best],
-        "found": report["found"],
-        "events": report["events"],
-        "false_alarms": report["false_alarms"],
-        "minutes": report["free_minutes"],
-        "delay": float(np.median([event["delay_s"] for event in events])) - SMEAR,
-    }
-
-
-def wire_table(figures: Figures) -> str:
-    cells = [f"{figures['found']} of {figures['events']}", f"{figures['false_alarms']} in {figures['minutes']:.1f} min"]
-    head = ["threshold, mN·m", "contacts found", "false alarms", "median delay, s"]
-    return table.table(head, [[f"{figures['threshold']:g}", *cells, f"{figures['delay']:.1f}"]])
+    figures = {key: report[key] for key in ("found", "events", "false_alarms")}
+    counts = ["{found} of {events}".format(**figures), f"{report['false_alarms']} in {report['free_minutes']:.1f} min"]
+    delay = float(np.median([event["delay_s"] for event in events])) - SMEAR
+    return figures | {"lines": [[f"{1e3 * THRESHOLDS[best]:g}", *counts, f"{delay:.1f}"]]}
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
@@ -290,30 +280,20 @@ def published(_folder: Path, _workers: int) -> Figures:
         # with two sides of the law the offset cannot be told from the difference of their Coulomb parts
         asymmetric = fit(HERE / "emps" / "asymmetric.json", fix="bias.initial_torque").finger
     law, bias = symmetric.data["joints"][0]["friction"], symmetric.data["bias"]
-    extended = HERE / "emps" / "extended.json"
+    numbers = (law["viscous"], law["coulomb"], bias["initial_torque"][0])
+    fingers = {"symmetric": symmetric, "asymmetric": asymmetric, "with its causes": HERE / "emps" / "extended.json"}
+    errors = {name: [share_missed(finger, recording) for recording in recordings] for name, finger in fingers.items()}
     return {
-        "numbers": {"viscous": law["viscous"], "coulomb": law["coulomb"], "offset": bias["initial_torque"][0]},
-        "errors": {
-            name: [share_missed(finger, recording) for recording in recordings]
-            for name, finger in (("symmetric", symmetric), ("asymmetric", asymmetric), ("with its causes", extended))
-        },
+        "errors": errors,
+        "error_lines": [
+            [name, *(f"{error:.2f}" for error in found), *PUBLISHED_ERRORS.get(name, ("", ""))]
+            for name, found in errors.items()
+        ],
+        "number_lines": [
+            [name, f"{value:.4g}", f"{known:.4g}", f"{100 * (value / known - 1):+.1f} %"]
+            for (name, known), value in zip(PUBLISHED.items(), numbers, strict=True)
+        ],
     }
-
-
-def published_table(figures: Figures) -> str:
-    lines = []
-    for name, found in figures["errors"].items():
-        known = PUBLISHED_ERRORS.get(name, (None, None))
-        lines.append([name, *(table.number(value) for pair in zip(known, found, strict=True) for value in pair)])
-    return table.table(["friction", "published", "found", "published, pulses", "found, pulses"], lines)
-
-
-def number_table(figures: Figures) -> str:
-    lines = [
-        [name, f"{value:.4g}", f"{found:.4g}", f"{100 * (found / value - 1):+.1f} %"]
-        for (name, value), found in zip(PUBLISHED.items(), figures["numbers"].values(), strict=True)
-    ]
-    return table.table(["number", "published", "found", "difference"], lines)
 
 
 SERVOS = ("rotation", "pitch", "elbow", "wrist_pitch", "wrist_roll", "jaw")
@@ -350,14 +330,21 @@ PARTS = {
         minutes=0.1,
         needs=NEEDS,
         headlines={"errors.symmetric.0": (4.0, 4.1), "errors.with its causes.1": (0.0, 2.75)},
-        tables={"errors": published_table, "numbers": number_table},
+        tables={
+            "errors": table.of_cells("error_lines", ["friction", "found", "pulses", "published", "published, pulses"]),
+            "numbers": table.of_cells("number_lines", ["number", "found", "published", "difference"]),
+        },
     ),
     "wire_contact": Part(
         wire_contact,
         minutes=0.1,
         needs=NEEDS,
         headlines={"found": (18, 21), "false_alarms": (0, 2)},
-        tables={"contacts": wire_table},
+        tables={
+            "contacts": table.of_cells(
+                "lines", ["threshold, mN·m", "contacts found", "false alarms", "median delay, s"], 0
+            )
+        },
     ),
     "so101": Part(unsigned, minutes=0.1, needs=NEEDS, headlines={"named": (18, 18)}),
 }

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from evidence.part import Figures
-from tendonfmu.statistics.intervals import Interval, quantile, rate, share
+from tendonfmu.statistics.intervals import share
 
 NOTHING = "–"  # in a cell without a case
-SEED = 0  # of resampling
 
 Row = dict[str, Any]
 
@@ -68,40 +67,24 @@ def number(value: float | None, form: str = ".2f", scale: float = 1.0) -> str:
     return NOTHING if value is None or math.isnan(value) else format(scale * value, form)
 
 
-def estimate(known: Interval, form: str = ".2f", scale: float = 1.0) -> str:
-    """A value with its interval."""
-    if math.isnan(known.low):
-        return number(known.value, form, scale)
-    return f"{number(known.value, form, scale)} ({number(known.low, form, scale)} to {number(known.high, form, scale)})"
-
-
 def percent(hits: Iterable[Any], form: str = ".0f") -> str:
     """Share of the cases in percent, with its interval."""
     answers = [bool(hit) for hit in hits]
-    return estimate(share(sum(answers), len(answers)), form, 100.0)
-
-
-def count(hits: Iterable[Any], with_interval: bool = False) -> str:
-    """How many of the cases, as `3/5`, or `3/5 (15 to 95 %)`."""
-    answers = [bool(hit) for hit in hits]
-    if not answers:
-        return NOTHING
-    text = f"{sum(answers)}/{len(answers)}"
     known = share(sum(answers), len(answers))
-    return f"{text} ({100 * known.low:.0f} to {100 * known.high:.0f} %)" if with_interval else text
+    value, *limits = (number(part, form, 100.0) for part in (known.value, known.low, known.high))
+    return value if math.isnan(known.low) else f"{value} ({' to '.join(limits)})"
 
 
-def events(number_of_events: int, exposure: float, form: str = ".1f") -> str:
-    """Rate of events over an exposure, with its interval."""
-    return estimate(rate(number_of_events, exposure), form)
+def count(hits: Iterable[Any]) -> str:
+    """How many of the cases, as `3/5`."""
+    answers = [bool(hit) for hit in hits]
+    return f"{sum(answers)}/{len(answers)}" if answers else NOTHING
 
 
-def median(values: Iterable[float | None], form: str = ".2f", scale: float = 1.0, with_interval: bool = False) -> str:
+def median(values: Iterable[float | None], form: str = ".2f", scale: float = 1.0) -> str:
     """Median of the known values; NaN and None are left out."""
     known = np.array(list(values), dtype=float)
     known = known[~np.isnan(known)]
-    if with_interval:
-        return estimate(quantile(known, 0.5, SEED), form, scale)
     return number(float(np.median(known)), form, scale) if len(known) else NOTHING
 
 
@@ -125,7 +108,7 @@ def values_of(rows: Iterable[Row], key: str) -> list[Any]:
 
 def where(rows: Iterable[Row], **wanted: Any) -> list[Row]:
     """The rows that have these values."""
-    return list(filter(equal(**wanted), rows))
+    return [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
 
 
 def by(rows: Sequence[Row], keys: Sequence[str], cells: Callable[[Sequence[Row]], Sequence[str]]) -> list[list[str]]:
@@ -134,25 +117,6 @@ def by(rows: Sequence[Row], keys: Sequence[str], cells: Callable[[Sequence[Row]]
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
     return [[*map(_word, group), *cells(members)] for group, members in groups.items()]
-
-
-def crossed(
-    rows: Sequence[Row],
-    lines: Mapping[str, Callable[[Row], Any]],
-    columns: Mapping[str, Callable[[Row], Any]],
-    cell: Callable[[list[Row]], str],
-) -> str:
-    """A table whose cells say something of the rows for which both the line and the column hold."""
-    cells = []
-    for name, in_line in lines.items():
-        members = [row for row in rows if in_line(row)]
-        cells.append([name, *(cell([row for row in members if in_column(row)]) for in_column in columns.values())])
-    return table(["", *columns], cells)
-
-
-def equal(**wanted: Any) -> Callable[[Row], bool]:
-    """Whether a row has these values."""
-    return lambda row: all(row.get(key) == value for key, value in wanted.items())
 
 
 def _word(value: Any) -> str:

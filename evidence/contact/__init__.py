@@ -15,17 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-import tendonfmu as tf
 from evidence import table
 from evidence.cases import INDEX_RIG, run_cases, write
 from evidence.contact import hand
-from evidence.contact.sensor_faults import fault_table, sensor_faults
+from evidence.contact.sensor_faults import fault_table, judged_faults
 from evidence.part import Figures, Part
 from evidence.table import Row
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect import score_detection
 from tendonfmu.model.native import run_recording
-from tendonfmu.recordings import read_recording, run_parts
+from tendonfmu.recordings import run_parts
 
 # --- the virtual hand -------------------------------------------------------------------------------------------------
 
@@ -99,16 +98,11 @@ def summary(rows: Sequence[Row], rms: Mapping[float, Numbers]) -> Figures:
     }
 
 
-def found_table(detectors: Mapping[str, Figures]) -> str:
-    """A line for each detector, by its `summary`."""
-    lines = []
-    for name, figures in detectors.items():
-        counts = [f"{found}/{count}" for found, count in figures["found"].values()]
-        alarms = [f"{rate:.1f}" for rate in figures["false_alarms"].values()]
-        lines.append([name, *counts, *alarms, f"{figures['delay']:.0f}"])
-    head = ["", *(f"≥ 6, {pretension:g} N" for pretension in hand.PRETENSIONS), "4–6", "3–4"]
-    head += ["false alarms in 10 min: free", "between pushes", "median delay of ≥ 6, ms"]
-    return table.table(head, lines)
+def found_table(figures: Figures) -> str:
+    counts = [f"{found}/{count}" for found, count in figures["found"].values()]
+    alarms = [f"{rate:.1f}" for rate in figures["false_alarms"].values()]
+    head = [*figures["found"], "false alarms in 10 min: free", "between pushes", "median delay of ≥ 6, ms"]
+    return table.table(head, [[*counts, *alarms, f"{figures['delay']:.0f}"]], 0)
 
 
 def hand_case(folder: Path, take: hand.Take) -> Row:
@@ -267,48 +261,7 @@ def mujoco_table(figures: Figures) -> str:
     return table.table([*head, "CPU time of `calibrate`, s"], lines)
 
 
-STRONG = 0.5  # N
-
-
-def slow_case(folder: Path, number: int) -> Row:
-    """Pushes that rise over 1 to 10 s, found with the rule for them (`contact.drift`) and without."""
-    from evidence.contact import mujoco_pushes
-
-    mujoco_pushes.make(folder, number, ("slow",))
-    finger = tf.read_finger(calibrated(folder, number) / "finger.json")
-    lines = []
-    for name, data in (("without", finger.replace({"contact.drift": None}).data), ("with", finger.data)):
-        found, strong, alarms, minutes = [], [], 0, 0.0
-        for pretension in mujoco_pushes.PRETENSIONS:
-            recording = read_recording(mujoco_pushes.place(folder, number, "slow", pretension))
-            pushes = mujoco_pushes.pushes_of(folder, number, pretension, "slow")
-            during = [(recording.time >= push.begin) & (recording.time <= push.end) for push in pushes]
-            alarm = run_recording(data, recording.arrays())["contact"].ravel()
-            score = score_detection(recording.time, np.any(during, axis=0), alarm)
-            found += [event.found for event in score.events]
-            strong += [abs(push.force) >= STRONG for push in pushes]
-            alarms, minutes = alarms + len(score.false_alarms), minutes + score.free_seconds / 60
-        of_strong = [hit for hit, is_strong in zip(found, strong, strict=True) if is_strong]
-        lines.append([f"{number}, {name}", table.count(found), table.count(of_strong), f"{alarms} in {minutes:.1f}"])
-    return {"lines": lines}
-
-
-def slow(folder: Path, workers: int) -> Figures:
-    rows = run_cases(slow_case, {f"slow_{number:02d}": (folder, number) for number in (3, 4)}, folder, workers)
-    return {"lines": [line for row in rows for line in row["lines"]]}
-
-
-# --- a held force -----------------------------------------------------------------------------------------------------
-
-
-def held_force(_folder: Path, _workers: int) -> Figures:
-    """What examples/mujoco/press.py prints: errors of a force that is held on a moving plate, by what feels it."""
-    from evidence.cases import EXAMPLES
-
-    program = [sys.executable, str(EXAMPLES / "mujoco" / "press.py")]
-    printed = subprocess.run(program, capture_output=True, text=True, check=True).stdout
-    return {"lines": [[cell.strip() for cell in line.strip("| ").split("|")] for line in printed.splitlines()[2:]]}
-
+# --- parts -----------------------------------------------------------------------------------------------------------
 
 LINK_HEAD = ["pretension, N", "push", "in contact", "not named (−1), %", "on `contact_link` or beyond, %"]
 LINK_HEAD += ["that very link, %", "`contact_link` 4: right"]
@@ -326,7 +279,7 @@ PARTS: dict[str, Part] = {
         virtual_hand,
         minutes=40.0,
         headlines={"found_share": (0.98, 1.0), "false_alarms.free": (0.0, 1.0), "delay": (0.0, 40.0)},
-        tables={"found": lambda figures: found_table({"tuned": figures})},
+        tables={"found": found_table},
     ),
     "place": Part(
         place,
@@ -342,23 +295,10 @@ PARTS: dict[str, Part] = {
         headlines={"even_missed": (0, 1)},
         tables={"fingers": mujoco_table},
     ),
-    "slow": Part(
-        slow,
-        needs=("mujoco",),
-        tables={
-            "found": table.of_cells("lines", ["finger, rule", "found", "of 0.5 N and more", "false alarms in min"])
-        },
-    ),
     "sensor_faults": Part(
-        sensor_faults,
+        judged_faults,
         needs=("mujoco",),
         headlines={"share": (98.0, 100.0), "sound_faults": (0, 0)},
         tables={"faults": fault_table},
-    ),
-    "held_force": Part(
-        held_force,
-        minutes=0.2,
-        needs=("mujoco",),
-        tables={"forces": table.of_cells("lines", ["felt by", "0.5 N wanted", "1 N wanted"], 3)},
     ),
 }

@@ -24,7 +24,7 @@ sys.path.insert(0, str(EXAMPLES / "rigs"))
 from virtual_hand import TRAINING, record
 
 PRETENSIONS = (10.0, 20.0, 40.0)  # N: trained at the first, on average
-PARTS = {"free": 3, "light": 3, "strong": 2}  # recordings of each kind and pretension
+PARTS = {"free": 3, "light": 2, "strong": 1}  # recordings of each kind and pretension
 PUSHED = ("light", "strong")
 DURATION = 600.0  # s, of one
 TRAINING_DURATION = 400.0  # s

@@ -1,37 +1,35 @@
 """Recordings of MuJoCo fingers for contact detection: free motion and labelled pushes, each with its truth.
 
 The fingers are those of evidence/fingers. A push is a force on a link, at right angles to it, of 0.1 to 2 N, uniform in
-the logarithm, that begins anywhere in a slot of 6 s. A *slow* one rises over 1 to 10 s. What is there is kept.
+the logarithm, that begins anywhere in a slot of 6 s.  What is there is kept.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from evidence.cases import write
 from evidence.fingers.foreign import frame, noisy, quantised
 from evidence.fingers.mujoco_cases import PLANS, Plan, describe, finger
 from evidence.fingers.mujoco_model import LINK, Physics
 from evidence.fingers.mujoco_run import SETTLE, STEP, Motion, Runner, random_motion
-from evidence.runner import write
 from tendonfmu.arrays import Numbers
 from tendonfmu.files import whole_file
 
 PRETENSIONS = (15.0, 30.0)  # N, each breathing by 30 %
 RATE = 250.0  # Hz
-SECONDS = {"free": 390.0, "more": 390.0, "push": 300.0, "slow": 240.0}  # s, of one recording; "more" is free, too
+SECONDS = {"free": 390.0, "more": 390.0, "push": 300.0}  # s, of one recording; "more" is free, too
 FREE, PUSHED = ("free", "more"), ("push",)
-SLOT = {"push": 6.0, "slow": 20.0}  # s, of one push
+SLOT = 6.0  # s, of one push
 EARLIEST, LATEST = 0.5, 4.4  # s into its slot that a push begins
 FORCE = (0.1, 2.0)  # N
-RISE, HOLD = {"push": (0.01, 0.05), "slow": (1.0, 10.0)}, (0.3, 1.0)  # s
-FALL = 0.05  # s, at most; it falls as it rises, but no slower
-SEEDS = {"more": 1, "free": 2, "push": 3, "slow": 4}  # of a kind of recording
+RISE, HOLD = (0.01, 0.05), (0.3, 1.0)  # s; it falls as it rises
+SEEDS = {"more": 1, "free": 2, "push": 3}  # of a kind of recording
 STRETCH, STILL, RAMP = (6.0, 13.0), (0.7, 2.0), 0.3  # s of motion, of rest, and from one to the other
 
 
@@ -42,11 +40,10 @@ class Push:
     force: float  # N, along the positive angle or against it
     link: int  # from 0
     rise: float  # s
-    torque: tuple[float, ...] = ()  # [n] N·m, peak
 
     def at(self, t: float) -> float:
         """N: a cosine up, a hold, a cosine down."""
-        part = min((t - self.begin) / self.rise, (self.end - t) / min(self.rise, FALL))
+        part = min(t - self.begin, self.end - t) / self.rise
         return 0.0 if part <= 0.0 else self.force * 0.5 * (1.0 - float(np.cos(np.pi * min(part, 1.0))))
 
 
@@ -88,20 +85,20 @@ def own_time(seconds: float, rng: np.random.Generator) -> Numbers:
     return np.asarray(np.cumsum(smooth) * STEP - SETTLE)
 
 
-def planned(joints: int, kind: str, rng: np.random.Generator) -> list[Push]:
+def planned(joints: int, rng: np.random.Generator) -> list[Push]:
     """One push in each slot."""
     pushes = []
-    for k in range(int(SECONDS[kind] // SLOT[kind])):
-        begin = k * SLOT[kind] + rng.uniform(EARLIEST, LATEST)
-        rise = rng.uniform(*RISE[kind])
+    for k in range(int(SECONDS["push"] // SLOT)):
+        begin = k * SLOT + rng.uniform(EARLIEST, LATEST)
+        rise = rng.uniform(*RISE)
         force = float(np.exp(rng.uniform(*np.log(FORCE)))) * (1.0 if rng.random() < 0.5 else -1.0)
-        end = begin + rng.uniform(*HOLD) + rise + min(rise, FALL)
+        end = begin + rng.uniform(*HOLD) + 2.0 * rise
         pushes.append(Push(begin, end, force, int(rng.integers(joints)), rise))
     return pushes
 
 
 def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, pushes: list[Push], seed: list[int]) -> Any:
-    """The recording as a frame, and the pushes with their torques."""
+    """The recording, labelled where pushes act, as a frame."""
     rng = np.random.default_rng(seed)
     runner = Pushed(physics, pushes)
     motors = motion.motors(own_time(seconds, rng), physics)
@@ -111,16 +108,12 @@ def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, push
     mujoco.mj_forward(runner.model, data)
     every, first = round(1 / (RATE * STEP)), round(SETTLE / STEP)
     rows: list[tuple[Numbers, ...]] = []
-    peaks = [np.zeros(physics.joints) for _ in pushes]
     for k, row in enumerate(motors, start=-first):
         t = k * STEP
         if k >= 0 and k % every == 0:
             kept = (data.qpos[runner.hinges].copy(), runner.tension(), data.qpos[runner.motors].copy(), runner.torque)
             rows.append((np.array([t]), *kept))
         runner.advance(t, row)
-        n = next((n for n, push in enumerate(pushes) if push.begin <= t <= push.end), None)
-        if n is not None and np.abs(runner.torque).max() > np.abs(peaks[n]).max():
-            peaks[n] = runner.torque.copy()
     time, angle, force, position, torque = (np.array(column) for column in zip(*rows, strict=True))
     force = noisy(force, 0.02, rng)
     table = frame(time[:, 0], force, quantised(position, 1e-6), quantised(angle, 1e-4))
@@ -131,7 +124,7 @@ def simulated(physics: Physics, plan: Plan, motion: Motion, seconds: float, push
         table["contact"] = label
         for j, column in enumerate(torque.T):
             table[f"external_torque[{j + 1}]"] = -column  # as the tendons bear it
-    return table, [dataclasses.replace(p, torque=tuple(t.tolist())) for p, t in zip(pushes, peaks, strict=True)]
+    return table
 
 
 def place(folder: Path, number: int, kind: str, pretension: float) -> Path:
@@ -160,15 +153,7 @@ def make(folder: Path, number: int, kinds: tuple[str, ...] = FREE + PUSHED) -> N
             seed = [number, SEEDS[kind], round(pretension)]
             draws = np.random.default_rng([*seed, 1])
             motion = dataclasses.replace(random_motion(plan.joints, draws, plan.speed), pretension=pretension)
-            pushes = planned(plan.joints, kind, draws) if kind in SLOT else []
-            table, pushes = simulated(physics, plan, motion, SECONDS[kind], pushes, [*seed, 2])
-            if pushes:
-                write(file.with_suffix(".json"), [dataclasses.asdict(push) for push in pushes])
+            pushes = planned(plan.joints, draws) if kind in PUSHED else []
+            table = simulated(physics, plan, motion, SECONDS[kind], pushes, [*seed, 2])
             with whole_file(file) as temporary:
                 table.to_parquet(temporary)
-
-
-def pushes_of(folder: Path, number: int, pretension: float, kind: str = "push") -> list[Push]:
-    """Of a recording with pushes, in order."""
-    file = place(folder, number, kind, pretension).with_suffix(".json")
-    return [Push(**values) for values in json.loads(file.read_text(encoding="utf-8"))]

@@ -119,7 +119,7 @@ def finger_case(folder: Path, number: int) -> Row:
     return {"faults": faults, "sound_faults": begins, "hours": hours}
 
 
-def sensor_faults(folder: Path, workers: int) -> Figures:
+def judged_faults(folder: Path, workers: int) -> Figures:
     rows = run_cases(finger_case, {f"faults_{number}": (folder, number) for number in FINGERS}, folder, workers)
     faults = [fault for row in rows for fault in row["faults"]]
     wrong = [row for row in faults if row["wrong"]]

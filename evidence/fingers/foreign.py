@@ -25,11 +25,9 @@ class Truth:
     """What a case hides, and where."""
 
     hidden: str  # one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list
-    joints: int  # of the finger
     joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
     tendon: int | None = None
     also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them
-    rms: float | None = None  # of the hidden term [N·m], of recorded cases
     # variance of what refitting the description leaves of the hidden term over that of the residual, where it is little
     survives: float | None = None
 
@@ -38,16 +36,10 @@ class Truth:
 class Case:
     """A finger description whose structure is right but for the hidden effect, and its recordings."""
 
-    family: str
-    number: int
     nominal: Nominal
     train: pd.DataFrame
     test: pd.DataFrame
     truth: Truth
-
-    @property
-    def name(self) -> str:
-        return f"{self.family}_{self.number:02d}"
 
 
 def frame(time: Array, force: Array, position: Array, angle: Array | None) -> pd.DataFrame:

@@ -30,7 +30,6 @@ from evidence.fingers.foreign import (
 from evidence.fingers.mujoco_model import Physics
 from evidence.fingers.mujoco_run import Trace, random_motion, run
 
-FAMILY = "mujoco"
 DELAY = 0.02  # s
 OFFSET = 1.5  # N
 ALSO = ("inertia",)  # links and motors have mass, 0.3 to 6 mN·m rms at a joint; no description has a number for it
@@ -107,8 +106,8 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
     train = run(physics, motions[0], train_seconds + DELAY, plan.rate)
     test = run(still, motions[1], test_seconds + DELAY, plan.rate)
     frames = [record(trace, plan, np.random.default_rng((seed, k))) for k, trace in enumerate((train, test))]
-    truth = Truth(plan.hidden, plan.joints, plan.joint, plan.tendon, also=ALSO)
-    return Case(FAMILY, number, nominal, frames[0], frames[1], truth)
+    truth = Truth(plan.hidden, plan.joint, plan.tendon, also=ALSO)
+    return Case(nominal, frames[0], frames[1], truth)
 
 
 def finger(plan: Plan, rng: np.random.Generator) -> Physics:

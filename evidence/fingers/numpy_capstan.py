@@ -43,24 +43,19 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
     elif hidden == "unknown_catch":
         extra[:, 1] = CATCH * np.exp(-(((q[:, 1] + 0.1) / 0.08) ** 2)) * (v[:, 1] < 0)
     force = (21 + 6 * np.sin(2 * np.pi * 0.06 * t + p[0, 0]))[:, None] * np.ones(4)
-    base = extra
     for _ in range(30):
         base = extra.copy()
         if hidden == "joint_load_friction":
             base[:, 0] += LOADED * force.sum(axis=1) * direction[:, 0]
         missing = joint + base - np.einsum("ij,kij,ki->kj", ARMS, passes, force)
         force = force + missing @ np.linalg.pinv(ARMS)
-    described = force @ ARMS - np.einsum("ij,kij,ki->kj", ARMS, passes, force) + joint
     seen = force * (1 - GAIN * np.array([0.0, 1.0, 0.0, 0.0])) if hidden == "force_gain" else force
     return {
         "time": t,
         "force": noisy(seen, 0.02, rng),
         "position": quantised(q @ ARMS.T + seen / STIFFNESS, 5e-6),
         "angle": quantised(q, 1e-4),
-        "true_angle": q,
         "measured": seen @ ARMS,
-        "described": described,
-        "hidden": base + (seen - force) @ ARMS,
     }
 
 

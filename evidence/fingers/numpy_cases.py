@@ -11,8 +11,6 @@ import pandas as pd
 from evidence.fingers import numpy_capstan, numpy_karnopp, numpy_maxwell, numpy_tanh
 from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Truth, frame
 
-FAMILY = "numpy"
-
 # What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
 # false, in any case (diagnosis/foreign_cases.py).
 ALSO = {
@@ -72,13 +70,12 @@ def make(
     test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((seed, number, 2)))
     truth = Truth(
         plan.hidden,
-        joints=train["true_angle"].shape[1],
         joint=plan.joint,
         tendon=plan.tendon,
         also=ALSO.get(simulator, ()),
         survives=plan.survives,
     )
-    return Case(FAMILY, number, simulator.describe(plan.hidden), recording(train), recording(test), truth)
+    return Case(simulator.describe(plan.hidden), recording(train), recording(test), truth)
 
 
 def recording(made: dict[str, Array]) -> pd.DataFrame:

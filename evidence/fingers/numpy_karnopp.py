@@ -33,6 +33,7 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
     for now, aims in zip(t[:, 0].tolist(), target, strict=True):
         f = [STIFFNESS[i] * max(0.0, x0[i] - ARMS_LIST[i][0] * q[0] - ARMS_LIST[i][1] * q[1]) for i in range(4)]
         torque = [sum(ARMS_LIST[i][j] * f[i] for i in range(4)) for j in range(2)]
+        rows.append((*q, *torque, *x0, *f))
         load = [sum(f), f[2] + f[3]]
         extra = [0.0, 0.0]
         if hidden == "gravity":
@@ -48,26 +49,19 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
             else:
                 rub = slide * math.copysign(1.0, v[j] if abs(v[j]) >= STILL else free)
                 a = (free - rub) / INERTIA[j]
-            lost = rub * HIDDEN_DRY / slide if hidden == "joint_friction" and j == 1 else 0.0
-            rows.append((q[j], torque[j], spring + rub - lost + INERTIA[j] * a, extra[j] + lost))
             v[j] += DT * a
             q[j] += DT * v[j]
-        rows.append((*x0,))
-        rows.append((*f,))
         for i in range(4):
             u[i] += DT * (SERVO * (aims[i] - x0[i]) - BRAKE * u[i] - f[i]) / MASS
             x0[i] += DT * u[i]
-    table = np.array(rows).reshape(len(t), 4, 4)[round(2 / DT) :: 4]
-    angle, measured, described, lacking = (table[:, :2, k] for k in range(4))
+    kept = np.array(rows)[round(2 / DT) :: 4]
+    angle, measured, position, force = np.split(kept, (2, 4, 8), axis=1)
     return {
         "time": t[round(2 / DT) :: 4, 0],
-        "force": noisy(table[:, 3], 0.02, rng),
-        "position": quantised(table[:, 2], 1e-6),
+        "force": noisy(force, 0.02, rng),
+        "position": quantised(position, 1e-6),
         "angle": quantised(angle, 2e-4),
-        "true_angle": angle,
         "measured": measured,
-        "described": described,
-        "hidden": lacking,
     }
 
 

@@ -47,19 +47,12 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
     for _ in range(40):
         rubbing = np.einsum("ij,ki,kij->kj", ARMS, force, 1 - remains)
         force = start + (joint + extra + rubbing - start @ ARMS) @ np.linalg.pinv(ARMS)
-    if hidden in ("edge_friction", "friction_drift"):
-        known = np.cumprod(1 - SHARE * slip * (share == SHARE), axis=2)
-        extra += np.einsum("ij,ki,kij->kj", ARMS, force, known - remains)
-        remains = known
     return {
         "time": t,
         "force": noisy(force, 0.03, rng),
         "position": quantised(q @ ARMS.T + force / STIFFNESS, 2e-6),
         "angle": quantised(q, 1e-4),
-        "true_angle": q,
         "measured": force @ ARMS,
-        "described": np.einsum("ij,ki,kij->kj", ARMS, force, 1 - remains) + joint,
-        "hidden": extra,
     }
 
 

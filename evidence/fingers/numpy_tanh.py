@@ -34,19 +34,14 @@ def simulate(hidden: str, seconds: float, rng: np.random.Generator) -> dict[str,
     missing = joint + extra - np.einsum("kji,ki->kj", passes, wanted)
     shares = np.linalg.solve(passes @ passes.transpose(0, 2, 1), missing[:, :, None])
     force = wanted + (passes.transpose(0, 2, 1) @ shares)[:, :, 0]
-    described = force @ ARMS - np.einsum("kji,ki->kj", passes, force) + joint
     late = np.roll(force, round(DELAY * 500), axis=0) if hidden == "time_delay" else force
-    extra += (late - force) @ ARMS
     rows = slice(round(DELAY * 500), None)
     position = q @ ARMS.T + force / STIFFNESS
     return {
         "time": t[rows],
         "force": noisy(late, 0.05, rng)[rows],
         "position": quantised(noisy(position, 2e-6, rng), 1e-6)[rows],
-        "true_angle": q[rows],
         "measured": (late @ ARMS)[rows],
-        "described": described[rows],
-        "hidden": extra[rows],
     }
 
 

@@ -9,7 +9,6 @@ import pandas as pd
 from evidence.cases import FOREIGN
 from evidence.fingers.foreign import Case, Truth
 
-FAMILY = "recorded"
 TRUTHS = FOREIGN / "truth.json"
 NUMBERS = range(1, 27)
 
@@ -20,4 +19,4 @@ def make(number: int) -> Case:
     truth = json.loads(TRUTHS.read_text(encoding="utf-8"))[name]
     nominal = json.loads((FOREIGN / f"{name}.json").read_text(encoding="utf-8"))
     train, test = (pd.read_parquet(FOREIGN / f"{name}_{part}.parquet") for part in ("train", "test"))
-    return Case(FAMILY, number, nominal, train, test, Truth(**truth))
+    return Case(nominal, train, test, Truth(truth["hidden"], truth.get("joint"), truth.get("tendon")))

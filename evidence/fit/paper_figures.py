@@ -208,7 +208,7 @@ def finish(figure: Any, axes: Any, file: Path) -> None:
     plt.close(figure)
 
 
-def paper(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """The figures as paper_*.png in the folder, and their numbers."""
     low, high, pushes = (simulated(rig, folder) for rig in ("index_finger", "index_finger_x4", "index_finger_pushes"))
     fit = FrictionFit(INDEX_FINGER, uncertainty=False).fit([low[0]])

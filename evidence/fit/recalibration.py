@@ -34,7 +34,7 @@ LEVELS = (1.0, 2.0, 4.0)  # times the pretension
 SETTLED = 50  # samples; the bias begins with the first one
 
 
-def recalibration(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """Errors after over before, of the jaw and of fingers whose truth is known."""
     starts = {
         f"jaw_{numbers}_{factor:g}": (numbers, factor) for numbers in ("guessed", "estimated") for factor in FACTORS

@@ -22,7 +22,7 @@ SETTINGS = {
 }
 
 
-def recovery(folder: Path, workers: int) -> Figures:
+def measure(folder: Path, workers: int) -> Figures:
     """All seeds of all settings."""
     cases = {
         f"{rate:g}_{prior:g}_seed_{seed}": (seed, DURATION, rate, prior)
@@ -52,8 +52,6 @@ def summary(rows: Sequence[Row]) -> dict[str, float]:
     for key, method in (("batch", "batch"), ("ekf", "filter, last pass"), ("ekf_first", "filter, first pass")):
         values[f"{method}: within 3 standard errors"] = float(1 - of(f"{key}_far").sum() / known.sum())
         values[f"{method}: mean square"] = float(np.sum(of(f"{key}_variance") * known) / known.sum())
-    values["filter − batch, rms in standard errors"] = float(np.sqrt(np.mean(of("apart_rms") ** 2)))
-    values["filter − batch, largest"] = float(of("apart_most").max())
     values["not converged"] = int(np.sum(of("converged") == 0))
     return values
 

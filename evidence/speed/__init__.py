@@ -1,0 +1,292 @@
+"""How fast is a step: of the C interface, of the FMUs, from Python, and of the simulated finger?
+
+bench_step.cpp and bench_fmu.cpp are built by CMake with TENDONFMU_BUILD_BENCH.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tendonfmu as tf
+from evidence import table
+from evidence.cases import EXAMPLES, INDEX_RIG, ROOT, say
+from evidence.part import Figures, Part
+from tendonfmu.arrays import Numbers
+from tendonfmu.model import native
+
+Description = dict[str, Any]
+
+# --- steps, called from C ---------------------------------------------------------------------------------------------
+
+SAMPLES = 5000  # at 1 kHz
+REPETITIONS = 5
+
+
+def law(scale: float, velocity: float, place: int) -> Description:
+    """Friction whose numbers differ from those of every other place."""
+    coulomb = scale * (1 + 0.01 * (place % 17))
+    widened = velocity * (1 + 0.02 * (place % 11))
+    return {"static": 1.4 * coulomb, "coulomb": coulomb, "stribeck_velocity": widened, "viscous": 0.1 * scale}
+
+
+def finger(joints: int, tendons: int, points: int) -> Description:
+    """Friction at every place, every law different, `points` working points at every edge; the paper's rule."""
+
+    def edge(i: int, j: int) -> Description:
+        angles = [-1.0 + 0.5 * k + 0.013 * i for k in range(points)]
+        return {"angles": angles, "laws": [law(0.02, 0.005, 7 * i + 3 * j + k) for k in range(points)]}
+
+    def arm(i: int, j: int) -> float:
+        return (1 - 2 * (i % 2)) * (0.009 - 0.0005 * j + 0.0001 * i) if j <= i // 2 else 0.0
+
+    return {
+        "format": "tendonfmu-finger-1",
+        "name": "bench",
+        "joints": [
+            {"cover": {"stiffness": 0.02}, "friction": law(0.005, 0.1, j), "load_friction": law(1e-4, 0.1, j + 3)}
+            for j in range(joints)
+        ],
+        "tendons": [
+            {
+                "stiffness": 4000.0 + 100.0 * i,
+                "moment_arms": [arm(i, j) for j in range(joints)],
+                "pulley_friction": [law(0.01, 0.004, i + 5 * j) for j in range(joints - 1)],
+                "edge_friction": [edge(i, j) for j in range(joints)],
+            }
+            for i in range(tendons)
+        ],
+        "contact": {"threshold": [5.0] * joints},
+    }
+
+
+def calibrated(plain: Description) -> Description:
+    """With all that `tendonfmu calibrate` writes, presliding apart."""
+    joints, tendons = len(plain["joints"]), len(plain["tendons"])
+    bounds: Description = {"threshold": [5.0] * joints, "threshold_per_force": [0.001] * joints}
+    small = {"threshold": [0.01] * joints}
+    directions = [[0.01 * (1 + i % 3) for i in range(tendons + 3)]] * 4
+    contact = {
+        "threshold": [5.0] * joints,
+        "method": "innovation",
+        "innovation": {"time": 0.05, **bounds},
+        "friction_bound": {"stuck_share": 0.4, "jump_share": 0.6},
+        "uncertainty": [directions] * joints,
+        "deviation": [0.002] * joints,
+        "release_ratio": 0.7,
+        "hold_time": 0.05,
+        "release_time": 2,
+        "drift": bounds,
+        "rest": {"travel": 1e-5, **small, "creep": [0.001] * joints, "innovation": {"time": 0.5, **small}},
+    }
+    return {**plain, "contact": contact, "bias": {"start_share": 1, "noise_time": 0.001}, "sensor_fault": {}}
+
+
+def motion(description: Description, shaking: bool = False) -> Numbers:
+    """[N, 1 + 2m] time, forces, positions. All joints move at once, or sides and rests change all the time."""
+    joints, tendons = len(description["joints"]), len(description["tendons"])
+    time, j = 1e-3 * np.arange(SAMPLES)[:, None], np.arange(joints)
+    angles = 0.8 * np.sin(time * (0.7 + 0.3 * j) + j) + 0.1 * np.sin(3.1 * time)
+    if shaking:
+        k = np.arange(SAMPLES)[:, None]
+        angles = np.where(k % 4 < 2, 0.01, -0.01) * np.where(k % 2 == 0, 1.0, 1.2) * (1 + j)
+    i = np.arange(tendons)
+    force = 20.0 + i + 3.0 * np.sin(time + i)
+    arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    return np.hstack([time, force, angles @ arms.T + force / (4000.0 + 100.0 * i)])
+
+
+def write_cases(folder: Path) -> list[Path]:
+    """Descriptions and their samples, as bench_case.h reads them."""
+    middle = finger(4, 8, 5)
+    presliding = {"extensions": [{"effect": "presliding", "displacement": 0.05}]}
+    cases: dict[str, tuple[Description, bool]] = {
+        "4x8x5": (middle, False),
+        "shaking": (middle, True),
+        "calibrated": (calibrated(middle), False),
+        "presliding": (calibrated(middle) | presliding, False),
+        "1x2x1": (finger(1, 2, 1), False),
+        "16x64x5": (finger(16, 64, 5), False),
+    }
+    for name, (description, shaking) in cases.items():
+        (folder / f"{name}.json").write_text(json.dumps(description), encoding="utf-8")
+        motion(description, shaking).tofile(folder / f"{name}.samples")
+    return [folder / f"{name}.json" for name in cases]
+
+
+def bench(folder: Path, target: str, files: list[Path]) -> dict[str, float]:
+    """Medians of a program of this folder, ns a step."""
+    build = folder / "build"
+    settings = ["-DTENDONFMU_BUILD_BENCH=ON", f"-DTENDONFMU_BUILD_FMU={'ON' if target == 'bench_fmu' else 'OFF'}"]
+    for command in (
+        ["cmake", "-S", str(ROOT), "-B", str(build), "-DCMAKE_BUILD_TYPE=Release", *settings],
+        ["cmake", "--build", str(build), "--target", target],
+    ):
+        say(" ".join(command))
+        subprocess.run(command, check=True, capture_output=True)
+    options = [f"--benchmark_repetitions={REPETITIONS}", "--benchmark_enable_random_interleaving=true"]
+    program = build / "evidence" / "speed" / target
+    done = subprocess.run(
+        [str(program), *options, "--benchmark_format=json", *map(str, files)],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    rows = json.loads(done.stdout)["benchmarks"]
+    medians = [row for row in rows if row.get("aggregate_name") == "median"]
+    return {row["run_name"]: 1e9 * row["per_step"] for row in medians}
+
+
+def steps(folder: Path, _workers: int) -> Figures:
+    return bench(folder, "bench_step", write_cases(folder))
+
+
+def fmu_steps(folder: Path, _workers: int) -> Figures:
+    return bench(folder, "bench_fmu", write_cases(folder)[:1])
+
+
+STEPS = {
+    "avx2/4x8x5": "AVX2, picked at run time",
+    "sse2/4x8x5": "SSE2, baseline x86-64",
+    "plain/4x8x5": "plain C, any machine",
+    "avx2/shaking": "AVX2, joints shaking so that sides, rests and working points change all the time",
+    "avx2/calibrated": "AVX2, all that `calibrate` writes, presliding apart",
+    "avx2/presliding": "AVX2, all that `calibrate` writes",
+    "avx2/1x2x1": "AVX2, 1 joint × 2 tendons × 1 point",
+    "avx2/16x64x5": "AVX2, 16 joints × 64 tendons × 5 points",
+}
+WAYS = {"fmi2": "FMI 2.0, value by value", "fmi3": "FMI 3.0, arrays"}
+
+
+def time_table(names: Mapping[str, str], head: str) -> Callable[[Figures], str]:
+    return lambda figures: table.table(
+        [head, "time, ns"], [[words, f"{figures[name]:,.0f}"] for name, words in names.items() if name in figures]
+    )
+
+
+# --- from Python ------------------------------------------------------------------------------------------------------
+
+DEMO = EXAMPLES / "demo_recording"
+INTERFACE = {  # description and recording
+    "2 joints, 4 tendons, presliding": ("two_joints.json", "two_joints_unseen.parquet"),
+    "4 joints, 8 tendons, all that `calibrate` writes": ("index_finger_calibrated.json", "index_finger_pushes.parquet"),
+}
+
+
+def least(call: Callable[[], object]) -> float:
+    """Least processor time of several calls, s: other jobs on the machine make it longer."""
+    times = []
+    for _ in range(15):
+        begin = time.process_time()
+        call()
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def sample_costs(description: Path, recording: tf.Recording) -> list[float]:
+    """µs a sample of the C library in one call, of `run`, and of `Runner.step` one sample after the other."""
+    model = tf.read_finger(description)
+    instance, runner, arrays = native.Instance(model.image), tf.Runner(model), recording.arrays()
+    columns = (recording.time.tolist(), list(arrays["tendon_force"]), list(arrays["tendon_position"]))
+
+    def library() -> None:
+        instance.reset()
+        instance.run(arrays)
+
+    def step() -> None:
+        runner.reset()
+        for at, force, position in zip(*columns, strict=True):
+            runner.step(at, force, position)
+
+    calls = (library, lambda: tf.run(model, recording), step)
+    return [1e6 * least(call) / len(recording) for call in calls]
+
+
+def python(_folder: Path, _workers: int) -> Figures:
+    return {
+        name: sample_costs(DEMO / description, tf.read_recording(DEMO / file))
+        for name, (description, file) in INTERFACE.items()
+    }
+
+
+def python_table(figures: Figures) -> str:
+    lines = [[name, *(f"{value:.2f}" for value in values)] for name, values in figures.items()]
+    return table.table(["µs a sample", "C library, one call", "`tf.run`", "`Runner.step`"], lines)
+
+
+# --- the simulated finger ---------------------------------------------------------------------------------------------
+
+START, SPAN = 1.5, 20.0  # s: where it begins, in motion; simulated
+ROUNDS = 3
+SOLVERS: dict[str, dict[str, Any]] = {
+    **{
+        f"CVODE, {tolerance:.0e}": {"integrator": "cvode", "relative_tolerance": tolerance}
+        for tolerance in (1e-4, 1e-5, 1e-6, 1e-7)
+    },
+    **{
+        f"fixed step, {1e3 * step:g} ms": {"integrator": "fixed_step", "step": step}
+        for step in (2e-3, 1e-3, 5e-4, 1e-4)
+    },
+}
+
+
+def plant(_folder: Path, _workers: int) -> Figures:
+    """Simulated seconds per CPU second of each solver, and its largest errors against CVODE at 1e-9."""
+    from tendonfmu.simulate import read_rig
+    from tendonfmu.simulate.plant import Plant
+
+    text = read_rig(INDEX_RIG).json()
+    moments = np.arange(START, START + SPAN, 0.01)[1:]
+
+    def measured(settings: dict[str, Any]) -> tuple[float, dict[str, Numbers]]:
+        simulated = Plant(text)
+        simulated.configure(sensors=False, **settings)
+        simulated.initialise()
+        simulated.advance(START)
+        before = time.process_time()
+        signals = simulated.run(moments)
+        return time.process_time() - before, signals
+
+    _, exact = measured({"integrator": "cvode", "relative_tolerance": 1e-9})
+    figures = {}
+    for name, settings in SOLVERS.items():
+        runs = [measured(settings) for _ in range(ROUNDS)]
+        errors = [np.abs(runs[0][1][key] - exact[key]).max() for key in ("joint_position", "tendon_force")]
+        figures[name] = [SPAN / statistics.median(used for used, _ in runs), *map(float, errors)]
+    return figures
+
+
+def plant_table(figures: Figures) -> str:
+    lines = [
+        [name, f"{speed:.3g}", *(f"{error:.1e}" for error in errors)] for name, (speed, *errors) in figures.items()
+    ]
+    head = ["solver", "simulated s per CPU s", "largest error: angle, rad", "tendon force, N"]
+    return table.table(head, lines)
+
+
+PARTS = {
+    "steps": Part(
+        steps,
+        headlines={"avx2/4x8x5": (0.0, 400.0), "avx2/presliding": (0.0, 1000.0)},
+        tables={"steps": time_table(STEPS, "what")},
+    ),
+    "fmu_steps": Part(
+        fmu_steps,
+        headlines={"fmi2": (0.0, 600.0), "fmi3": (0.0, 600.0)},
+        tables={"steps": time_table(WAYS, "a step by the")},
+    ),
+    "python": Part(python, minutes=0.3, tables={"samples": python_table}),
+    "plant": Part(
+        plant,
+        minutes=0.5,
+        headlines={"CVODE, 1e-06.0": (100.0, 300.0)},
+        tables={"solvers": plant_table},
+    ),
+}

@@ -1,4 +1,4 @@
-"""A loose guard of the fit's speed: a tenth of what docs/evidence/performance.md says, in CPU time."""
+"""A loose guard of the fit's speed: a tenth of what docs/evidence/speed.md says, in CPU time."""
 
 from __future__ import annotations
 

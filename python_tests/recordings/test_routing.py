@@ -281,7 +281,7 @@ def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
 def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two MuJoCo fingers, one with spatial tendons: arms within 1 %, stiffness within 5 %, zeros within 3 steps."""
     require("mujoco")
-    from evidence.detection import mujoco_pushes
+    from evidence.contact import mujoco_pushes
 
     monkeypatch.setitem(mujoco_pushes.SECONDS, "free", 130.0)
     off, covered, alone = [], [], []

@@ -66,7 +66,7 @@ USUAL = CalibrateOptions()
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
 HELD = Held(0.2, 10.0)  # part of the recordings that chooses nothing and is judged on if there are no tests
-BIAS_TIME = 2.0  # s: a fitted model needs no faster bias, and that learns pushes (docs/evidence/detection.md)
+BIAS_TIME = 2.0  # s: a fitted model needs no faster bias, and that learns pushes (docs/evidence/contact.md)
 TUNED = ("bias", "contact", "sensor_fault")  # what `tune` learns
 NOTHING_ASKED: dict[str, Any] = {
     "verdict": "not done: the structure is that of the earlier calibration",
