@@ -36,7 +36,7 @@ def test_it_changes_no_output() -> None:
     assert all(np.array_equal(values, known[name], equal_nan=True) for name, values in plain.items())
 
 
-@pytest.mark.parametrize("entry", [1.0, [1.0], [1.0, -1.0], ["a", 0.1], [1.0, 0.1, 0.1], None])
+@pytest.mark.parametrize("entry", [1.0, [1.0], [1.0, -1.0], ["a", 0.1]])
 def test_what_is_no_value_and_error_is_refused(entry: Any) -> None:
     with pytest.raises(InputError, match=r"estimated\.joints"):
         read_finger(finger_with(entry))

@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 import oracle
 import oracle_fit
-from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
+from fit_cases import (
+    BIASES,
+    few_unknowns,
+    groups,
+    image_of,
+    leave_out,
+    off_start,
+    random_fit_case,
+    shared_key,
+    small_finger,
+    twin_of,
+)
 from fit_data import recorded
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
@@ -60,17 +71,6 @@ def assert_equal_evaluation(estimator: Any, likelihoods: list[oracle_fit.Likelih
     np.testing.assert_array_equal(information, information.T)
 
 
-def leave_out(seed: int, samples: int) -> Array:
-    """[N] bool: a few stretches and single samples not used, at times the first ones."""
-    rng = np.random.default_rng([seed, 11])
-    use = rng.random(samples) > 0.05
-    for start in rng.integers(0, samples, 3):
-        use[start : start + int(rng.integers(1, 30))] = False
-    if seed % 3 == 0:
-        use[: 1 + seed % 7] = False
-    return np.asarray(use)
-
-
 def random_parts(seed: int, samples: int, recordings: int) -> tuple[Description, list[Part]]:
     """A random finger with several recordings: left-out samples, known load, any kinematics."""
     description = random_fit_case(seed, samples)[0]
@@ -103,21 +103,6 @@ def test_cost_gradient_and_information_are_those_of_the_dense_twin(seed: int) ->
 def made_part(description: Description, seed: int, duration: float, rate: float = 20.0, **how: Any) -> Part:
     recording = recorded(description, seed, duration, rate, **how)
     return Part(recording, 3, recording.get("external_torque"))
-
-
-BIASES: dict[str, Description] = {
-    "as given": {},
-    "initial_variance": {"initial_variance": 4e-3},
-    "noise_per_force": {"noise_std_per_force": 4e-4},
-    "noise_time": {"noise_time": 0.02},
-    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
-    "initial_torque of default variance": {"initial_torque": [0.02, -0.01]},
-    "no wandering": {"drift_variance": 0.0},
-    "known start": {"initial_variance": 0.0},
-    "forgets at once": {"forget_rate": 1e3},
-    "never forgets": {"forget_rate": 0.0},
-    "all": {"initial_torque": [0.01, 0.0], "noise_time": 0.01, "noise_std_per_force": 1e-4, "initial_variance": 1e-4},
-}
 
 
 @pytest.mark.parametrize("name", repeated(BIASES, 2, 4, 10))
@@ -190,7 +175,7 @@ def filtered(rows: tuple[Array, ...], y: Array, time: Array, noise: float, drift
     return 0.5 * float(r @ r), J.T @ r, J.T @ J
 
 
-@pytest.mark.parametrize("threads", repeated([0, 1, 2, 3], 3))
+@pytest.mark.parametrize("threads", repeated([1, 3], 1))
 def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     """30,001 samples, longer than any block, against a filter that takes them one by one."""
     description = small_finger()
@@ -216,18 +201,6 @@ def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     again = estimator.evaluate(z, threads=threads)
     for first, second in zip((cost, gradient, information), again, strict=True):
         np.testing.assert_array_equal(first, second)  # the same call gives the same bits
-
-
-def test_a_coarse_pass_knows_about_as_much() -> None:
-    """Every s-th sample with the noise of s of them: the information of all samples, roughly, for less work."""
-    description = small_finger()
-    group = groups(description, few_unknowns)
-    part = made_part(description, 9, 60.0, rate=200.0)
-    estimator = estimation.Estimator(image_of(description), group)
-    estimator.add_recording(part.recording, 3, part.external_torque)
-    z = np.array([unknown.start for unknown in estimator.unknowns])
-    full, coarse = (np.diag(estimator.evaluate(z, stride=stride)[2]) for stride in (1, 4))
-    np.testing.assert_allclose(coarse / full, 1.0, atol=0.3)
 
 
 # --- innovations

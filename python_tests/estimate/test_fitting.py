@@ -134,7 +134,7 @@ def test_rms_are_said_for_what_was_trained_on_held_out_and_compared(fit: Frictio
             assert entry["rms"][j] < entry["model_only_rms"][j]
 
 
-# --- the filter ----------------------------------------------------------------------------------------------------
+# --- the filter -------------------------------------------------------------------------------------------------------
 
 
 def test_the_filter_agrees_with_the_batch_within_their_errors(fit: FrictionFit) -> None:
@@ -154,7 +154,7 @@ def test_the_filter_agrees_with_the_batch_within_their_errors(fit: FrictionFit) 
     assert high - low == pytest.approx(2 * 1.96 * np.sqrt(2 / trained), rel=0.02)  # held-out samples do not count
 
 
-# --- why a number is not identified -------------------------------------------------------------------------------
+# --- why a number is not identified -----------------------------------------------------------------------------------
 
 
 def test_what_only_shows_together_names_its_partners() -> None:
