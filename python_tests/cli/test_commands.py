@@ -304,20 +304,8 @@ def test_a_reader_that_leaves_ends_nothing(case: Path) -> None:
 # --- imports ----------------------------------------------------------------------------------------------------------
 
 
-HEAVY = {
-    "dask",
-    "fmpy",
-    "jinja2",
-    "lxml",
-    "matplotlib",
-    "mcap",
-    "mujoco",
-    "pandas",
-    "pint",
-    "plotly",
-    "pyarrow",
-    "scipy",
-}
+HEAVY = {"dask", "fmpy", "jinja2", "lxml", "matplotlib", "mcap", "mujoco", "pandas", "pint", "plotly", "pyarrow",
+         "scipy"}  # fmt: skip
 START = """
 import contextlib, io, json, sys
 import tendonfmu
