@@ -136,5 +136,5 @@ def test_the_picture_of_a_finger_marks_edges_and_takes_any_name() -> None:
         streams = io.BytesIO(), io.BytesIO()
         draw_finger(finger_drawing(description), *streams)
         for stream in streams:
-            image = (255 * imread(stream)[:, :, :3]).round()
+            image = (255 * imread(io.BytesIO(stream.getvalue()))[:, :, :3]).round()
             assert (image == (0xCC, 0x1F, 0x1A)).all(axis=-1).any() == edges and (image < 100).any()
