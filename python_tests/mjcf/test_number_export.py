@@ -13,6 +13,8 @@ from optional_parts import require
 
 require("mujoco")
 
+import mujoco
+from lxml import etree
 
 from command import Call
 from evidence.fingers.mjcf_models import fixed_model
@@ -147,7 +149,7 @@ def test_included_files_with_changed_numbers_stand_in_the_text(folder: Path, dat
     assert import_finger(folder / "out.xml", SETTINGS).data["joints"][0]["friction"]["viscous"] == 0.01
     assert 'damping="0.01"' not in (folder / "bodies.xml").read_text(encoding="utf-8")
     (folder / "elsewhere").mkdir()
-    with pytest.raises(InputError, match=r"bodies\.xml.*in the folder of model\.xml"):
+    with pytest.raises(InputError, match=r"beside it; expected an output in the folder of model\.xml"):
         exported(folder, data, output="elsewhere/out.xml")
 
 
