@@ -235,7 +235,7 @@ def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path)
     assert found["slack"][1] == {**only_forces, "tendon_force": [1]}
 
 
-# --- extensions ------------------------------------------------------------------------------------------------------
+# --- extensions -------------------------------------------------------------------------------------------------------
 
 
 def bare(row: dict[str, Any]) -> dict[str, Any]:
