@@ -218,19 +218,3 @@ def test_a_calibrated_hand_does_not_depend_on_jobs(tmp_path: Path, call: Call) -
     assert call("run", "one/hand.json", files["more"], "-o", "out.csv").status == 0
     assert call("calibrate", files["hand"], files["more"], "-o", "later", "--from", "one/hand.json").status == 0
     assert "previous" in json.loads(Path("later/ring/calibration.json").read_text())["error"]
-
-
-@pytest.mark.long
-def test_a_history_follows_each_finger(tmp_path: Path, call: Call) -> None:
-    days = {f"2026-03-{day:02d}": worn_columns(day, "ring", more=1.0 + 0.02 * day) for day in (9, 16, 23)}
-    files = write_worn_hand(tmp_path, well=worn_columns(1), **days)
-    command = ["diagnose", files["hand"], *(files[day] for day in days), "--history", "--reference", files["well"]]
-    answer = call(*command, "-o", "out", "--kinematics", "3", "--json")
-    assert answer.status == 0, answer.err
-    report = json.loads(answer.out)
-    assert list(report["fingers"]) == ["ring", "index"] and report["fingers"]["index"]["causes"] == []
-    assert report["fingers"]["ring"]["causes"][0]["where"]["effect"] == "joint_friction"
-    assert "ring is the worst: 1 change." in words(Path("out/hand.html"))
-    rows = {file: file.stat().st_mtime_ns for file in Path("out").glob("*/rows/*.json")}
-    call(*command, "-o", "out", "--kinematics", "3")
-    assert len(rows) >= 6 and {file: file.stat().st_mtime_ns for file in rows} == rows

@@ -91,40 +91,6 @@ def test_a_tendon_sticks_within_the_cone_and_does_not_creep(share: float, sticks
     assert (travel < 5e-4 and speed < 1e-9) if sticks else (travel > 0.01 and speed > 0.05)
 
 
-# Where a tendon goes from a site to another one: the geom, its place, the sites, the side.
-WRAPS = {
-    "half a turn": ("cylinder", "0 1 0", (-0.02, 0.0, -0.1), (0.02, 0.0, -0.1), (0.0, 0.0, 0.05)),
-    "more": ("cylinder", "0 1 0", (-0.005, 0.0, -0.1), (0.004, 0.0, -0.1), (0.0, 0.0, 0.05)),
-    "a helix": ("cylinder", "0 1 0", (-0.02, -0.03, -0.1), (0.06, 0.05, 0.01), (0.0, 0.0, 0.05)),
-    "a tilted cylinder": ("cylinder", "0.3 1 -0.2", (-0.02, -0.03, -0.1), (0.06, 0.05, 0.01), (0.0, 0.0, 0.05)),
-    "a sphere": ("sphere", "0 0 1", (-0.05, -0.01, 0.0), (0.05, 0.02, -0.01), (0.0, 0.0, 0.05)),
-    "nothing": ("sphere", "0 0 1", (-0.05, 0.0, 0.05), (0.05, 0.0, 0.05), (0.0, 0.0, 0.06)),
-}
-
-
-@pytest.mark.parametrize("case", WRAPS)
-def test_the_angle_is_that_of_the_arc_s_length(case: str) -> None:
-    from capstan import path_of
-
-    kind, axis, first, last, side = WRAPS[case]
-    places = {"first": first, "last": last, "side": side}
-    sites = "".join(f'<site name="{name}" pos="{x} {y} {z}"/>' for name, (x, y, z) in places.items())
-    model, data = loaded(
-        f'<mujoco><worldbody>{sites}<geom name="g" type="{kind}" size="0.02 0.1" zaxis="{axis}"/></worldbody>'
-        '<tendon><spatial><site site="first"/><geom geom="g" sidesite="side"/><site site="last"/></spatial></tendon>'
-        "</mujoco>"
-    )
-    angle = path_of(model, data, 0)[0][1]
-    if case == "nothing":
-        assert angle == 0.0
-        return
-    start, enters, leaves, end = data.wrap_xpos.reshape(-1, 3)[:4]
-    arc = data.ten_length[0] - np.linalg.norm(enters - start) - np.linalg.norm(end - leaves)
-    climb = data.geom_xmat[0].reshape(3, 3)[:, 2] @ (leaves - enters) if kind == "cylinder" else 0.0
-    around = np.sqrt(arc**2 - climb**2)
-    assert angle == pytest.approx(around / 0.02 * around / arc, rel=1e-6) and angle > (np.pi if case == "more" else 0.5)
-
-
 def waved(model: Any, data: Any, rest: Any, steps: int) -> Any:
     """States of the finger while its tendons are pulled back and forth."""
     arms = np.array([[0.0085, 0.0065], [0.0075, 0.0], [-0.007, -0.0055], [-0.0065, 0.0]])

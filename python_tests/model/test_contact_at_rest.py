@@ -58,12 +58,6 @@ def test_the_change_counts_from_the_begin_of_the_rest(runner: Runner) -> None:
     assert contacts(out) == flags(out)
 
 
-def test_a_load_that_is_there_before_the_rest_is_not_seen(runner: Runner) -> None:
-    out = run(runner, [10.0, 20.0, 20.0, 20.0, 20.0, 20.0])
-    assert flags(out) == [0] * 6
-    close(out["contact_change"], 0.0)
-
-
 def test_torque_and_motor_postpone_the_rest(runner: Runner) -> None:
     """A change of 0.6 N at sample 2, or a motor that moves there: the wait begins again, the rest at sample 4."""
     stepped = run(runner, [10.0, 10.0, 10.6, 10.6, 10.6, 11.2])
@@ -110,12 +104,6 @@ def test_a_load_that_goes_ends_the_contact_and_another_rest_begins(runner: Runne
     assert flags(held) == [0, 0, 0, 1, 1, 1, 1]
 
 
-def test_the_release_ratio_holds_what_falls_below_the_bound(runner: Runner) -> None:
-    force = [10.0, 10.0, 10.0, 10.6, 10.4, 10.2]
-    assert flags(run(runner, force)) == [0, 0, 0, 1, 0, 0]
-    assert flags(run(runner, force, release_ratio=0.5)) == [0, 0, 0, 1, 1, 0]
-
-
 def test_what_changes_suddenly_is_found_beside_what_creeps(runner: Runner) -> None:
     """m follows c with T = 0.25 s: a ramp of 0.004 N·m a sample stays below y = 0.02, a step of 0.03 does not."""
     rest = {"threshold": [0.5], "innovation": {"time": 0.25, "threshold": [0.02]}}
@@ -140,14 +128,6 @@ def test_the_bias_does_not_learn_the_load_of_a_rest(runner: Runner) -> None:
     close(out["bias_torque"][4:13, 0], 0.1)
     close(out["compensated_torque"][4:13, 0], 0.02)
     assert out["bias_torque"][-1, 0] > 0.119 and contacts(out)[-1] == 0
-
-
-def test_a_carried_load_ends_with_its_torque(runner: Runner) -> None:
-    """The motor moves on at sample 5 with 0.02 N·m on the joint; at sample 7 the residual is back at 0."""
-    force = [10.0, 10.0, 10.0, 12.0, 12.0, 12.0, 12.0, 10.0, 10.0]
-    out = run(runner, force, [0.0] * 5 + [1e-4 * k for k in range(1, 5)], bias=LEARNS | {"drift_variance": 0.0})
-    assert flags(out) == [0, 0, 0, 1, 1, 0, 0, 0, 0]
-    assert contacts(out) == [0, 0, 0, 1, 1, 1, 1, 0, 0]
 
 
 def test_no_rest_no_outputs_and_nothing_else_changes() -> None:

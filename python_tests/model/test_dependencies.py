@@ -197,16 +197,6 @@ def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
     assert seen == wanted
 
 
-def test_contact_depends_as_the_torques_do(tmp_path: Path) -> None:
-    """Its decision compares the compensated torque; that the mean force enters the threshold adds nothing to it."""
-    for seed in SEEDS:
-        found = declared(random_case(seed)[0], tmp_path)
-        assert found["joint_contact"] == found["compensated_torque"]
-        for name in INPUTS:
-            together = {i for element in found["compensated_torque"] for i in element[name]}
-            assert set(found["contact"][0][name]) == together
-
-
 # --- one finger by hand -----------------------------------------------------------------------------------------------
 
 
@@ -287,17 +277,3 @@ def test_a_delay_leaves_no_fixed_factor(tmp_path: Path) -> None:
     plain, late = described(others, tmp_path), described(ROWS, tmp_path)
     assert "fixed" in {kind for output in plain["outputs"] for kind in output["kinds"]}
     assert {kind for output in late["outputs"] for kind in output["kinds"]} == {"dependent"}
-
-
-def test_numbers_say_of_which_effect_they_are(tmp_path: Path) -> None:
-    found = {variable["name"]: variable for variable in described(ROWS, tmp_path)["variables"]}
-    numbers = {name: found[name] for name in found if name.startswith("extensions[")}
-    assert len(numbers) == 46
-    assert (
-        numbers["extensions[11].coulomb"]["description"]
-        == "Extension 11: coulomb, of load_friction at joint 2, tendon 1"
-    )
-    assert numbers["extensions[26].delay"]["description"] == "Extension 26: delay, of time_delay"
-    for number in numbers.values():
-        assert number["variability"] == "tunable" and number["causality"] == "parameter"
-    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (18, 19, 29)} == {"rad", "m", "s"}

@@ -6,8 +6,6 @@ A motion turns the joint by q and stretches both springs by c: x0 = ±0.01·q + 
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,12 +102,6 @@ def test_a_force_that_stands_while_its_spring_is_stretched(runner: Runner) -> No
     assert not out["contact"].any()
 
 
-def test_a_force_that_stands_with_its_spring(runner: Runner) -> None:
-    """At rest, and as the joint turns without a change of the springs."""
-    for q in (np.zeros(16), 0.05 * np.arange(16)):
-        assert not runner(pair(), moving(16, q=q, tension=np.full(16, TENSION)), 1)["sensor_fault"].any()
-
-
 def test_a_position_that_stands_while_the_joint_turns(runner: Runner) -> None:
     """From sample 4 on: 0.3 N of stretch and 0.1 N of turning a sample are missing, 0.5 + 0.01 + share allowed."""
     recording = moving(14)
@@ -137,16 +129,6 @@ def test_a_slack_tendon_is_no_fault(runner: Runner) -> None:
     assert not out["sensor_fault"].any()
 
 
-def test_without_other_tendons_nothing_can_be_told(runner: Runner) -> None:
-    """One tendon alone gives the angle of its joint, so its fault shows only beside the measured angle."""
-    recording = {
-        name: values if values.ndim == 1 or name == "joint_position" else values[:, :1]
-        for name, values in changed(moving(12), "tendon_force", 0, slice(6, None), 0.0).items()
-    }
-    assert not runner(pair(tendons=1), recording, 1)["sensor_fault"].any()
-    assert faults(runner(pair(tendons=1), recording, 2)) == [0] * 6 + [1] * 6
-
-
 # --- what a fault does
 
 
@@ -172,24 +154,6 @@ def test_the_bias_waits_and_begins_anew(runner: Runner) -> None:
     close(out["compensated_torque"][well, 0], 0.0)
 
 
-def test_a_fault_ends_only_with_the_force_of_the_spring(runner: Runner) -> None:
-    """5 N too much after the jump: the force moves, but never agrees."""
-    recording = moving(30)
-    recording["tendon_force"][8:, 0] += 5.0
-    assert faults(runner(pair(), recording, 1)) == [0] * 8 + [1] * 22
-
-
-def test_a_position_keeps_the_torques(runner: Runner) -> None:
-    """Contact is still found while a position fails."""
-    recording = moving(20)
-    recording = changed(recording, "tendon_position", 0, slice(5, None), recording["tendon_position"][4, 0])
-    recording["tendon_force"][14:, 1] -= 5.0
-    recording["tendon_position"][14:, 1] -= 5.0 / STIFFNESS
-    out = runner(pair(), recording, 1)
-    assert out["sensor_fault"][13:, 0].all() and not out["sensor_fault"][:, 1].any()
-    assert not out["contact"][:14].any() and out["contact"][14:].all()
-
-
 def test_a_second_fault_leaves_nothing_to_tell_the_angle(runner: Runner) -> None:
     """Positions of both tendons of one joint: the second one's row cannot leave."""
     recording = moving(24, tendons=2)
@@ -199,27 +163,6 @@ def test_a_second_fault_leaves_nothing_to_tell_the_angle(runner: Runner) -> None
     assert observable(out)[6:] == [1] * 18 and not out["sensor_fault"][:, 1].any(), "nothing tells of tendon 2 any more"
     out = runner(pair(), both, 2)
     assert out["sensor_fault"][12:].all() and observable(out)[12:] == [0] * 12
-
-
-def test_other_joints_are_watched_on(runner: Runner) -> None:
-    """Two joints without a common tendon: contact is found at the one while a force of the other fails."""
-    data = finger(
-        [{"moment_arms": arms, "stiffness": STIFFNESS} for arms in ([ARM, 0.0], [-ARM, 0.0], [0.0, ARM], [0.0, -ARM])],
-        joints=[{}, {}],
-        bias=NO_UPDATE,
-        contact={"threshold": [0.02, 0.02]},
-    )
-    one = moving(20)
-    recording = {"time": one["time"]}
-    for name in ("tendon_force", "tendon_position", "joint_position"):
-        recording[name] = np.hstack([one[name], one[name]])
-    recording = changed(recording, "tendon_force", 0, slice(6, None), 0.0)
-    recording["tendon_force"][12:, 3] -= 5.0
-    recording["tendon_position"][12:, 3] -= 5.0 / STIFFNESS
-    out = runner(data | {"sensor_fault": FAULT}, recording, 1)
-    assert not out["joint_contact"][:, 0].any()
-    assert [int(each) for each in out["joint_contact"][:, 1]] == [0] * 12 + [1] * 8
-    assert observable(out) == [1] * 6 + [0] * 14
 
 
 def test_no_key_no_outputs_and_nothing_else_changes() -> None:
@@ -239,24 +182,6 @@ def test_positions_are_needed_with_every_source() -> None:
 
 
 # --- the FMU, the saved state, the derivative
-
-
-def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
-    import fmpy
-
-    names = {}
-    for name, data in (("watched", pair()), ("plain", {k: v for k, v in pair().items() if k != "sensor_fault"})):
-        (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu", illustrated=False)
-        variables = fmpy.read_model_description(str(fmu)).modelVariables
-        names[name] = {variable.name: variable for variable in variables}
-    added = set(names["watched"]) - set(names["plain"])
-    keys = {f"sensor_fault.{key}" for key in FAULT}
-    assert added == keys | {"contact_observable", "sensor_fault[1]", "sensor_fault[2]"}
-    assert not set(names["plain"]) - set(names["watched"])
-    assert all(names["watched"][key].variability == "tunable" for key in keys)
-    assert names["watched"]["sensor_fault[2]"].type == names["watched"]["contact_observable"].type == "Boolean"
-    assert names["watched"]["sensor_fault.jump_margin"].unit == "N"
 
 
 def test_the_derivative_is_that_of_the_rows_in_use() -> None:

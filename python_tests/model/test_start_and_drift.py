@@ -48,12 +48,6 @@ def test_the_first_stroke_shows_how_friction_stood(runner: Runner, smooth: bool)
     close(told["compensated_torque_std"][2, 0], left / math.sqrt(3.0))
 
 
-def test_a_share_of_the_start_bounds_what_is_learned(runner: Runner) -> None:
-    """With a tenth of the friction open, 0.1 N·m beside the model is contact, and stays."""
-    force, speed = [10.0, 10.0, -10.0, -10.0], [0.0, 0.0, -4.0, -4.0]
-    assert contact_of(run(runner, at_start(0.1, True), force, speed)) == [0, 0, 1, 1]
-
-
 def test_the_start_is_turned_over_once(runner: Runner) -> None:
     """A push in the second stroke is contact, and one in the first is not."""
     speed = [0.0, 4.0, -4.0, 4.0]
@@ -61,11 +55,6 @@ def test_the_start_is_turned_over_once(runner: Runner) -> None:
     for at, contact in ((1, [0, 0, 0, 0]), (3, [0, 0, 0, 1])):
         force = 50.0 + model + 5.0 * (np.arange(4) >= at)
         assert contact_of(run(runner, at_start(1.0, True), force, speed)) == contact
-
-
-def test_what_moves_at_the_start_leaves_nothing_open(runner: Runner) -> None:
-    out = run(runner, at_start(1.0, False), [10.0, 10.0, 10.0], [4.0, 4.0, 4.0])
-    close(out["compensated_torque_std"], 0.0)
 
 
 # --- steps 5 and 6: slow loads
@@ -99,24 +88,7 @@ def test_a_slow_load_is_found_though_the_bias_has_it(runner: Runner) -> None:
     assert np.abs(out["residual"][: found + 1]).max() < 0.02
 
 
-def test_in_contact_the_slow_mean_stands(runner: Runner) -> None:
-    """A step of 0.1 N·m: the drift comes to it and stays, and goes when the load goes."""
-    force = [10.0] * 12 + [20.0] * 8 + [10.0] * 3
-    out = run(runner, drifting(), force)
-    close(out["drift"][19, 0], 0.1 * (1.0 - math.exp(-8.0)))
-    assert contact_of(out) == [0] * 12 + [1] * 8 + [0] * 3  # 0.1·e⁻¹ is below 0.05
-
-
 def test_a_contact_that_lasts_too_long_begins_anew(runner: Runner) -> None:
     out = run(runner, drifting(release_time=3 * DT), [10.0] * 12 + [20.0] * 8)
     assert contact_of(out) == [0] * 12 + [1] * 4 + [0] * 4
     close(out["drift"][16, 0], 0.1 * (math.exp(-4.0) - math.exp(-5.0)))  # p − s, s = p of the sample before
-
-
-def test_what_the_bias_learns_of_the_start_is_no_drift(runner: Runner) -> None:
-    """The first stroke of test_the_first_stroke_shows_how_friction_stood: V learns it, c does not."""
-    description = at_start(1.0, True, drift={"quick_time": 1e-3, "slow_time": 100.0, "threshold": [0.02]})
-    out = run(runner, description, [10.0, 10.0, -10.0, -10.0], [0.0, 0.0, -4.0, -4.0])
-    close(out["drift"][2, 0], -0.1)
-    assert contact_of(out) == [0, 0, 0, 0]
-    assert abs(out["drift"][3, 0]) < 0.1
