@@ -127,21 +127,6 @@ def test_gap_in_time() -> None:
     assert_equal_evaluation(estimator, likelihoods, off_start(estimator.unknowns, 2))
 
 
-def test_one_gap_or_two_recordings_differ_by_the_bias_alone() -> None:
-    """Two recordings have two bias paths: their costs add up, also in another order."""
-    description = small_finger()
-    group = groups(description)
-    parts = [made_part(description, 1, 9.0), made_part(description, 2, 7.0)]
-    together, likelihoods = both(description, group, parts)
-    z = off_start(together.unknowns, 3)
-    alone = [both(description, group, [part])[0].evaluate(z) for part in parts]
-    swapped = both(description, group, parts[::-1])[0].evaluate(z)
-    for found, first, second, other in zip(together.evaluate(z), *alone, swapped, strict=True):
-        np.testing.assert_allclose(found, first + second, rtol=1e-11, atol=1e-11 * np.abs(found).max())
-        np.testing.assert_allclose(found, other, rtol=1e-11, atol=1e-11 * np.abs(found).max())
-    assert_equal_evaluation(together, likelihoods, z)
-
-
 LENGTHS = (2, 3, 4, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 400)
 
 

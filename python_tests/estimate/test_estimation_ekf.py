@@ -132,19 +132,6 @@ def learner_over(description: Description, group: Array, recording: Recording, p
     return learner
 
 
-def test_blocks_are_exact_enough() -> None:
-    """Linearised once a block: within a standard error of the filter sample by sample, most unknowns far within."""
-    description = lasting_finger()
-    group = groups(description, few_unknowns)
-    recording = recorded(description, 8, 30.0, 200.0)
-    single, blocks = (learner_over(description, group, recording, block=each, prior_std=0.3) for each in (1, 4))
-    std = np.sqrt(np.diag(single.covariance))
-    off = np.abs(blocks.z - single.z) / std
-    assert off.max() < 1.0 and np.median(off) < 0.05
-    np.testing.assert_allclose(np.sqrt(np.diag(blocks.covariance)) / std, 1.0, atol=0.3)
-    np.testing.assert_allclose(blocks.bias, single.bias, rtol=0.0, atol=1e-3)
-
-
 def test_further_passes_leave_nothing_to_blocks() -> None:
     """From the second pass on every sample is linearised at the same unknowns: a block is then only arithmetic."""
     description = lasting_finger()

@@ -102,17 +102,6 @@ def test_parameters_that_only_scale_tendons_are_told_exactly() -> None:
     assert max(entry["train"]["error_rms"][0], entry["loaded"]["error_rms"][0] / 4) < 5e-6 * entry["train"]["std"][0]
 
 
-def test_the_report_says_how_well_the_directions_tell_it(fit: FrictionFit) -> None:
-    entry = fit.report_["uncertainty"]
-    assert entry["blocks"] >= 10 and entry["block_time"] >= 1.0
-    for which in ("train", "held_out", "loaded"):
-        std, error, worst = (np.array(entry[which][key]) for key in ("std", "error_rms", "error_worst"))
-        assert (std > 0).all() and (error < (0.4 if which != "loaded" else 0.8) * std).all() and (worst >= error).all()
-    assert entry["directions"] == [len(each) for each in fit.description_.data["contact"]["uncertainty"]]
-    # white noise of the settings' size: nothing to inflate but by chance (16 blocks)
-    assert all(0.5 < each < 1.8 for each in entry["inflation"])
-
-
 def test_residuals_that_last_count_for_more() -> None:
     """As much noise again, each value held for 0.1 s: of that the bias takes a part, and fewer samples are new."""
     recording = made_recording(duration=40.0)

@@ -18,9 +18,7 @@ from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, dura
 from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, read_subject
 from tendonfmu.files.tables import read_table
-from tendonfmu.model import native
 from tendonfmu.model.friction_places import (
-    balanced_forces,
     effects,
     moment_arms,
     pretension_vector,
@@ -153,17 +151,6 @@ def test_several_pretensions_in_turn() -> None:
     force = stretch * [tendon["stiffness"] for tendon in SMALL["tendons"]]
     np.testing.assert_allclose(force.mean(axis=1), motion.pretension)
     np.testing.assert_allclose(force @ moment_arms(SMALL), 0, atol=1e-12)
-
-
-def test_balanced_forces_carry_the_friction() -> None:
-    motion = plan_excitation(SMALL, Plan(SMALL_RANGES, duration=30))
-    samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
-    force = balanced_forces(SMALL, samples, motion.pretension)
-    finger = native.Instance.from_description(SMALL, kinematics_source=3)
-    found = finger.run({**samples, "tendon_force": force})
-    torque = found["friction_torque"] - found["bias_torque"]
-    assert np.abs(force @ moment_arms(SMALL) - torque).max() < 1e-5
-    assert np.abs(torque).max() > 0.02
 
 
 # --- tensions that vary -----------------------------------------------------------------------------------------------

@@ -21,8 +21,6 @@ from tendonfmu.hand.parts import PartResult, split_files
 from tendonfmu.hand.report import (
     CALIBRATION,
     calibration_rows,
-    diagnosis_rows,
-    share_that_is_wrong,
 )
 
 
@@ -70,27 +68,6 @@ def test_the_worst_finger_is_first_and_one_that_failed_last(hand: tf.Hand, tmp_p
         assert "<script>" not in page and ('href="index/calibration.html"' in page) == ("index" in reports)
         if "index" not in reports:
             assert "index was left out: no motion" in words(tmp_path / PAGE)
-
-
-def test_what_is_wrong_is_what_causes_explain_and_what_nothing_does(hand: tf.Hand) -> None:
-    def report(verdict: str, gain: float, unexplained: float) -> dict[str, Any]:
-        rms = {"test_rms": [1e-3]}
-        return {
-            "verdict": verdict,
-            "gain": {"value": gain},
-            "unexplained": {"share": unexplained},
-            "causes": [{"title": "it rubs", "joint": 1, "tendon": 2}] if gain else [],
-            "nominal": rms,
-        }
-
-    assert share_that_is_wrong(report("explained", 0.4, 0.0)) == pytest.approx(0.4)
-    assert share_that_is_wrong(report("unexplained", 0.0, 0.75)) == pytest.approx(0.5)
-    given = {"index": report("unexplained", 0.0, 0.75), "ring": report("explained", 0.4, 0.0)}
-    rows = diagnosis_rows(hand, results(hand, given))
-    assert [row.name for row in rows] == ["index", "ring"] and rows[1].cells[1] == "it rubs (at joint 1 on tendon 2)"
-    given["index"] = report("adequate", 0.0, 0.02)
-    rows = diagnosis_rows(hand, results(hand, given))
-    assert [(row.name, row.tone, row.badness) for row in rows] == [("ring", "bad", 0.4), ("index", "fine", 0.0)]
 
 
 # --- splitting --------------------------------------------------------------------------------------------------------

@@ -113,17 +113,6 @@ def test_fingers_get_the_angles_of_all_joints(tmp_path: Path, wrist: str) -> Non
         assert "joint_velocity" not in split[name].groups
 
 
-def test_the_wrist_angle_of_all_is_that_of_the_wrist(tmp_path: Path) -> None:
-    """A finger whose tendons say otherwise does not change it; its own joints follow the wrist."""
-    hand, recording, truth = write_wrist_hand(tmp_path, "measured")
-    table = read_table(recording, lambda file, names: names)
-    table["wrist.joint_position[1]"] = table["wrist.joint_position[1]"] + 0.1
-    split = tf.split_recording(tf.read_hand(hand), pd.DataFrame(table))
-    for name in FINGERS:
-        np.testing.assert_allclose(split[name]["joint_position[1]"], truth[name][:, 0] + 0.1, rtol=0, atol=1e-13)
-        assert np.abs(split[name]["joint_position[2]"] - truth[name][:, 1]).max() > 1e-3
-
-
 def test_encoders_of_the_fingers_are_used(tmp_path: Path) -> None:
     hand, recording, _ = write_wrist_hand(tmp_path, "measured")
     table = read_table(recording, lambda file, names: names)

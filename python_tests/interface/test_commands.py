@@ -115,18 +115,6 @@ def test_recordings_of_which_contact_leaves_nothing_are_refused() -> None:
         tf.diagnose(FINGER, touched, reference=free)
 
 
-@pytest.mark.long
-@pytest.mark.filterwarnings("ignore::tendonfmu.interface.calibrating.CalibrationWarning")
-def test_calibrate(frame: pd.DataFrame, recording_file: Path, tmp_path: Path) -> None:
-    """In memory and from files: the same finger; what it writes is what the command writes."""
-    found, again = (tf.calibrate(FINGER, given, previous=FINGER) for given in (frame, recording_file))
-    left = [result.report["error"]["calibrated"] for result in (found, again)]
-    assert left[0] == pytest.approx(left[1], rel=1e-6)
-    written = found.write(tmp_path / "out")
-    assert {path.name for path in written} == {"calibration.html", "calibration.json", "finger.json", "finger.fmu"}
-    assert tf.read_finger(tmp_path / "out" / "finger.json") == found.finger
-
-
 # --- messages and warnings --------------------------------------------------------------------------------------------
 
 
@@ -208,13 +196,3 @@ def test_names_are_escaped_where_results_are_shown() -> None:
         assert "<script>" not in page and "&lt;script&gt;" in page
     for figure in (recording.plot(), diagnosis.plot()):
         assert "<script>" not in figure.layout.title.text and len(figure.data) > 3
-
-
-def test_plots_have_what_they_name() -> None:
-    frame = pd.read_parquet(PUSHES)
-    figure = tf.Recording.from_frame(frame).plot()
-    assert {trace.name for trace in figure.data} == set(frame.columns) - {"time", "contact"}
-    force = next(trace for trace in figure.data if trace.name == "tendon_force[3]")
-    assert force.y.max() == frame["tendon_force[3]"].max()  # thinned to extremes
-    joints = tf.run(INDEX, frame.iloc[:2000]).plot()
-    assert len(joints.data) == 12 and sum(name.startswith("yaxis") for name in joints.layout.to_plotly_json()) == 4

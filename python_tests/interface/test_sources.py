@@ -144,16 +144,6 @@ def test_a_recording_becomes_a_frame_and_comes_back(recording: tf.Recording, tmp
     pd.testing.assert_frame_equal(tf.read_recording(tmp_path / "again.csv").frame, frame, check_exact=True)
 
 
-def test_arrays_are_not_copied() -> None:
-    time, force = np.arange(3.0), np.ones((4, 3)).T  # of Fortran's order
-    position, label = np.zeros((3, 4)), [0, 1, 1]
-    found = tf.Recording.from_arrays(time, tendon_force=force, tendon_position=position, contact=label)
-    assert np.shares_memory(found.time, time) and np.shares_memory(found.groups["tendon_position"], position)
-    assert np.shares_memory(found.groups["tendon_force"], force)
-    assert found.contact is not None and found.contact.tolist() == [False, True, True]
-    assert found.frame["contact"].tolist() == [0, 1, 1]
-
-
 SMALL = {"time": [0.0, 0.1], "tendon_force[1]": [1.0, 2.0], "tendon_position[1]": [0.0, 0.1]}
 
 
@@ -286,12 +276,3 @@ def test_tendons_and_joints_may_be_named(finger: tf.Finger, recording: tf.Record
         finger.replace({"tendons[nobody].stiffness": 5000.0})
     fitted = tf.fit(finger, recording[:5.0], only=f"joints[{joint}].friction.coulomb")
     assert list(fitted.parameters.index) == ["joints[2].friction.coulomb"]
-
-
-def test_a_check_speaks_of_the_recording_in_memory(finger: tf.Finger, recording: tf.Recording) -> None:
-    assert tf.check(finger, recording).belongs and not tf.check(finger).findings
-    frame = recording.frame
-    frame["tendon_position[2]"] *= -1.0
-    wrong = tf.check(finger, frame)
-    assert not wrong.belongs and "tendon_position[2]" in wrong._repr_html_()
-    assert "correct it in memory: tendon_position[2]: times -1" in repr(wrong) and "map" not in repr(wrong)

@@ -158,17 +158,6 @@ def test_links_place_the_tip_where_mujoco_has_it(tmp_path: Path) -> None:
     assert np.allclose(place + turned @ np.array(finger.data["tip"]), data.site("tip").xpos, atol=1e-12)
 
 
-def test_passive_springs_and_loops_on_request(tmp_path: Path) -> None:
-    finger = imported(tmp_path, fixed_model(), tendons=["spring", "deep"], bidirectional=["deep"], stiffness=900.0)
-    spring, deep = finger.data["tendons"]
-    assert spring["stiffness"] == 50.0 and spring["moment_arms"] == [0.0, -0.004] and "bidirectional" not in spring
-    assert deep["bidirectional"] and deep["stiffness"] == 4000.0
-    bow = imported(tmp_path, BOWSTRING, joints=["hinge"])
-    assert [tendon["stiffness"] for tendon in bow.data["tendons"]] == [1e9, 1e9]
-    soft = imported(tmp_path, BOWSTRING, joints=["hinge"], stiffness=900.0)
-    assert [tendon["stiffness"] for tendon in soft.data["tendons"]] == [900.0, 900.0]
-
-
 def no_friction(text: str) -> str:
     return text.replace('damping="0.002" frictionloss="0.006"', "")
 

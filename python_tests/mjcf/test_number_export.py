@@ -153,24 +153,6 @@ def test_included_files_with_changed_numbers_stand_in_the_text(folder: Path, dat
         exported(folder, data, output="elsewhere/out.xml")
 
 
-def test_files_included_from_a_folder_by_names_relative_to_it(folder: Path, data: dict[str, Any]) -> None:
-    """The tendons' file is included by the bodies' file, both in a folder; only the bodies change."""
-    divided(folder)
-    (folder / "parts").mkdir()
-    for name in ("bodies.xml", "tendons.xml"):
-        (folder / name).rename(folder / "parts" / name)
-    bodies = (folder / "parts" / "bodies.xml").read_text(encoding="utf-8")
-    bodies = bodies.replace("</mujoco>", '<include file="tendons.xml"/></mujoco>')
-    (folder / "parts" / "bodies.xml").write_text(bodies, encoding="utf-8")
-    whole = (folder / "model.xml").read_text(encoding="utf-8").replace('<include file="tendons.xml"/>', "")
-    whole = whole.replace("bodies.xml", "parts/bodies.xml")
-    (folder / "model.xml").write_text(whole, encoding="utf-8")
-    data["joints"][0]["friction"]["viscous"] = 0.01
-    exported(folder, data)
-    assert '<include file="parts/tendons.xml"/>' in (folder / "out.xml").read_text(encoding="utf-8")
-    assert import_finger(folder / "out.xml", SETTINGS).data["joints"][0]["friction"]["viscous"] == 0.01
-
-
 # --- refusals ---------------------------------------------------------------------------------------------------------
 
 

@@ -200,17 +200,6 @@ def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
 # --- one finger by hand -----------------------------------------------------------------------------------------------
 
 
-def test_index_finger_torques_follow_the_routing() -> None:
-    found = dependencies(structure_of(read_finger(INDEX_FINGER)))
-    passing = [element["tendon_force"] for element in found["joint_torque"]]
-    assert passing == [list(range(8)), list(range(8)), [4, 5, 6, 7], [6, 7]]
-    for k in range(4):
-        assert found["joint_speed"][k]["joint_velocity"] == [k]
-        assert found["joint_angle"][k]["joint_position"] == [k]
-        assert found["joint_angle"][k]["joint_velocity"] == []
-        assert found["friction_torque"][k]["tendon_force"] == list(range(8))
-
-
 def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path) -> None:
     description = {
         "format": "tendonfmu-finger-1",

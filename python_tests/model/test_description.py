@@ -17,7 +17,6 @@ import pytest
 
 import extension_cases
 from fmu_binary import FINGER
-from random_fingers import random_finger
 from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
@@ -156,18 +155,6 @@ def test_schema_agrees_with_the_reader_on_every_changed_extension() -> None:
                 assert_agreement(description, f"{row} with {key} = {change!r}", changed_row, by_effect[row["effect"]])
                 agreed += 1
     assert agreed > 1000
-
-
-@pytest.mark.parametrize("fingers", repeated([15, 50], 0))
-def test_schema_agrees_with_the_reader_on_random_changes(fingers: int) -> None:
-    for seed in range(fingers):
-        rng = np.random.default_rng([seed, 9])
-        description = random_finger(seed)
-        for _ in range(2):
-            paths = list(places(description))
-            path, change = paths[rng.integers(len(paths))], CHANGES[rng.integers(len(CHANGES))]
-            description = changed(description, path, change)
-            assert_agreement(description, f"random finger {seed}: {path} = {change!r}")
 
 
 @pytest.mark.parametrize(

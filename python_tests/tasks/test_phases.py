@@ -45,17 +45,6 @@ def test_the_time_left_follows_the_work_that_is_done(clock: Clock) -> None:
     assert seen[-1].left_s == pytest.approx(0.0) and seen[-1].seconds == pytest.approx(10.0)
 
 
-def test_a_phase_may_come_again(clock: Clock) -> None:
-    phases, seen = seen_of({"searching": 1.0, "fitting": 1.0}, clock)
-    for _ in range(3):
-        for words in ("searching", "fitting"):
-            with phases.start(words, total=1) as step:
-                clock.now += 5.0
-                step(1)
-    assert [state.number for state in seen] == [1, 1, 2, 2] * 3
-    assert seen[-1].left_s == pytest.approx(0.0) and seen[-3].left_s == pytest.approx(5.0)
-
-
 def test_a_phase_may_be_skipped_and_fail(clock: Clock) -> None:
     phases, seen = seen_of(SHARES, clock)
     with phases.start("reading"):
