@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,12 @@ from fit_cases import small_finger
 from fit_data import make_recording, wavy_motion
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import FitWarning, FrictionFit, known_numbers
+from tendonfmu.estimate import FrictionFit, known_numbers
 from tendonfmu.estimate.structure import get_number, set_number
 from tendonfmu.model import native, read_finger
 from tendonfmu.recordings import Recording
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 COULOMB = "joints[1].friction.coulomb"
 
@@ -51,9 +52,7 @@ def test_replacing_a_number_makes_it_a_guess() -> None:
 
 def fitted(finger: Any, *recordings: Recording) -> FrictionFit:
     """All tendons alike: 19 unknowns, 70 numbers."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return FrictionFit(finger, share=["tendons"], kinematics=3, tolerance=1e-3, uncertainty=False).fit(recordings)
+    return FrictionFit(finger, share=["tendons"], kinematics=3, tolerance=1e-3, uncertainty=False).fit(recordings)
 
 
 def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -> None:

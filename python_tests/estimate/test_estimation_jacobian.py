@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import oracle_fit
-from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
-from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, twin_of
 from oracle_trace import Trace, run_recorder, with_values
 from repetitions import repeated
 from tendonfmu.errors import InputError
@@ -91,26 +90,6 @@ def test_derivatives_are_the_oracles_differences(seed: int) -> None:
         found = np.stack([d_torque[..., column], d_jump[..., column]])
         error = np.abs(found - expected)[:, each.compared].max()
         assert error <= BY_DIFFERENCES * np.abs(expected).max() + 100.0 * floor, each.estimator.unknowns[column].path
-
-
-def test_forces_follow_the_parameters() -> None:
-    """The paper freezes f_A and f_B; the estimation does not, and the difference is not small."""
-    description = small_finger()
-    group = groups(description)
-    estimator = estimation.Estimator(image_of(description), group)
-    motion = wavy_motion(3, 10.0, 20.0, 2)
-    made = make_recording(description, motion, wavy_forces(3, motion["time"], 4), 3)
-    estimator.add_recording(made.recording, 3)
-    twin = twin_of(description, group, estimator.unknowns)
-    trace = Trace(description, made.recording, 3)
-    z = twin.start
-    _, _, d_torque, d_jump = estimator.jacobian(0, z, 0, len(trace.time))
-    carried = oracle_fit.derivatives(trace, twin, z)
-    frozen = oracle_fit.derivatives_with_frozen_forces(trace, twin, z)
-    assert excess(d_torque, carried[0]) < ROUNDING
-    assert excess(d_jump, carried[1]) < ROUNDING
-    assert excess(d_torque, frozen[0]) > 0.03
-    assert excess(d_jump, frozen[1]) > 0.03
 
 
 def test_any_part_of_a_recording() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -13,18 +12,18 @@ import pytest
 from fit_cases import jam, small_finger
 from fit_finger import made_recording
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.recordings.prepared import slack_sentences
 from tendonfmu.recordings.recording import Recording
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 Change = Callable[[Recording], Recording | None]  # in place, or another recording
 
 
 def fitted(recording: Recording | list[Recording], finger: dict[str, Any] | None = None, **options: Any) -> FrictionFit:
     settings = {"share": ["tendons"], "kinematics": 3, "max_passes": 8} | options
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return FrictionFit(finger or small_finger(), **settings).fit(recording)
+    return FrictionFit(finger or small_finger(), **settings).fit(recording)
 
 
 def said(fit: FrictionFit, *words: str) -> bool:
@@ -147,9 +146,7 @@ def test_what_was_checked_is_neither_checked_nor_told_again() -> None:
     recording = made_recording()
     later(recording, (2200, 5.0))
     recording.groups["joint_position"][:] *= 180 / np.pi
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        fit = FrictionFit(small_finger(), share=["tendons"], kinematics=1, max_passes=1).fit(recording, checked=True)
+    fit = FrictionFit(small_finger(), share=["tendons"], kinematics=1, max_passes=1).fit(recording, checked=True)
     assert not said(fit, "gap") and not said(fit, "map of columns")
 
 

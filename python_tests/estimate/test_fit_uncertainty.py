@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import warnings
 from typing import Any
 
 import numpy as np
@@ -13,23 +12,18 @@ from numpy.typing import NDArray
 
 from fit_cases import plain, small_finger
 from fit_finger import made_recording, moved_start
-from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.model import native
 from tendonfmu.statistics.error_directions import few_directions, predicted
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 Numbers = NDArray[np.float64]
 SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 1e-3}
 
 
 def fitted(finger: dict[str, Any], recording: Any, **options: Any) -> FrictionFit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return FrictionFit(finger, **(SHARED | options)).fit(recording)
-
-
-@pytest.fixture(scope="module")
-def fit() -> FrictionFit:
-    return fitted(moved_start(), made_recording(duration=40.0), holdout=0.2)
+    return FrictionFit(finger, **(SHARED | options)).fit(recording)
 
 
 def parts_of(data: dict[str, Any], recording: Any) -> Numbers:

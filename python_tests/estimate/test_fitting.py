@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import re
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,11 @@ from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import Unfinished, read_unfinished, write_unfinished
-from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.structure import get_number, set_number, with_sides
 from tendonfmu.model import native
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 Groups = dict[str, np.ndarray[Any, Any]]
 
@@ -27,26 +28,11 @@ PULLEY_WITHOUT_DROP = json.loads(json.dumps(small_finger()))
 PULLEY_WITHOUT_DROP["tendons"][0]["pulley_friction"][0]["static"] = 0.02
 
 
-@pytest.fixture(autouse=True)
-def _quiet() -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        yield
-
-
 def shared(finger: Any = None, **options: Any) -> FrictionFit:
     """All tendons alike: 19 unknowns, 70 numbers."""
     return FrictionFit(
         finger or small_finger(), **({"share": ["tendons"], "kinematics": 3, "tolerance": 1e-3} | options)
     )
-
-
-@pytest.fixture(scope="module")
-def fit() -> FrictionFit:
-    """One fit that several tests look at: 40 s, started up to a fifth off, a fifth of the time held out."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return shared(moved_start(), holdout=0.2).fit(made_recording(duration=40.0), compare=made_recording(seed=5))
 
 
 # --- what it finds ----------------------------------------------------------------------------------------------------
@@ -397,7 +383,7 @@ def test_parameters_are_read_and_set_as_in_scikit_learn() -> None:
             not_fitted()
 
 
-@pytest.mark.parametrize("method", ["batch", "ekf"])
+@pytest.mark.parametrize("method", [pytest.param("batch", marks=pytest.mark.long), "ekf"])
 def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path, method: str) -> None:
     """Several recordings, so that a pass takes over 50 ms: `fit` reports progress that often."""
     recording = [made_recording(duration=40.0)] * (4 if method == "batch" else 1)

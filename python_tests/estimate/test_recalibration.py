@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,11 @@ from numpy.typing import NDArray
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.fitting import FitWarning, FrictionFit
+from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.files import report_text
 from tendonfmu.recordings.recording import Recording
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 Numbers = NDArray[np.float64]
 SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 0.05, "uncertainty": False}
@@ -24,9 +25,7 @@ TRUTH = small_finger()
 
 
 def fitted(finger: Any, *recordings: Recording, **options: Any) -> FrictionFit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FitWarning)
-        return FrictionFit(finger, **(SHARED | options)).fit(list(recordings))
+    return FrictionFit(finger, **(SHARED | options)).fit(list(recordings))
 
 
 def held_noise(seed: int, duration: float, size: float) -> Recording:

@@ -85,17 +85,14 @@ def test_score(tmp_path: Path, call: Call) -> None:
         tf.score(INDEX, pushes, labels="pressed")
 
 
-def test_diagnose(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """Ten seconds, which need not tell anything: what a diagnosis finds is tested elsewhere."""
-    found = tf.diagnose(FINGER, frame.iloc[:5000])
+def test_a_diagnosis_is_written_with_a_finger_that_runs(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """One that is made up: what `diagnose` finds is tested elsewhere."""
+    found = Diagnosis(examples.one_cause())
     assert found.report["verdict"] == found.verdict and found.report["gain"]["value"] == found.gain.value
     assert [cause.effect for cause in found.causes] == [cause["effect"] for cause in found.report["causes"]]
     written = found.write(tmp_path / "diagnosis")
     assert {file.name for file in written} >= {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu"}
     assert tf.read_finger(tmp_path / "diagnosis/extended.json") == found.extended
-    tf.build(found.extended, tmp_path / "f.fmu")
-    of_fmu, of_finger = (tf.run(model, frame.iloc[:100]).outputs for model in (tmp_path / "f.fmu", found.extended))
-    assert np.array_equal(of_fmu["friction_torque"], of_finger["friction_torque"])
 
 
 @pytest.mark.parametrize("tested", [False, True])
