@@ -20,7 +20,6 @@ from repository_paths import ROOT
 EXAMPLE = ROOT / "examples" / "mujoco"
 MODEL, FINGER = EXAMPLE / "capstan.xml", EXAMPLE / "finger.xml"
 MU = 0.2
-SERVO = '<position name="winch" tendon="rope" kp="20000" kv="200" forcerange="-100 0"/>'
 
 
 @pytest.fixture(autouse=True)

@@ -22,7 +22,6 @@ from fmu_binary import FINGER
 from random_extensions import random_extensions
 from random_fingers import random_case
 from repetitions import repeated
-from repository_paths import ROOT
 from tendonfmu.fmu.model_variables import describe_model, read_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
@@ -30,7 +29,6 @@ from tendonfmu.model.output_dependencies import Dependencies, dependencies, stru
 from tendonfmu.model.output_names import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
-INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 Influence = set[tuple[str, int, str, int]]  # output, element, input, element; 0-based
 Sample = dict[str, Any]
