@@ -1,14 +1,12 @@
 """What one command writes every other takes: it does its work, answers no, or refuses by name; it never fails inside.
 
-All pairs of a writer and a reader are generated (support/chains.py), each with some variations of the recordings and
-kinematics sources, so that every writer and every reader meets all of them. A seeded sample in which each writer and
-each reader is once runs in `./test`; `./test -m "" python_tests/cli/test_chains.py` runs all.
+All pairs of a writer and a reader (support/chains.py), each with some variations of the recordings and kinematics
+sources. In `./test` runs a seeded sample in which each writer and each reader is once.
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -104,20 +102,3 @@ def test_what_one_command_writes_the_other_takes(
 ) -> None:
     found = list(faults_of(pair, description(pair[0]), recordings, tmp_path / "taken"))
     assert not found, "\n".join(found)
-
-
-def test_an_extended_description_has_more_keys_than_a_given_one(description: Callable[[str], Path]) -> None:
-    extended, tuned = (json.loads(description(name).read_text()) for name in ("diagnose, extended", "calibrate"))
-    assert extended["extensions"]
-    assert tuned["bias"]["start_share"] and tuned["contact"]["method"] == "innovation"
-
-
-def test_the_sample_has_every_writer_and_every_reader() -> None:
-    sample = [PAIRS[k] for k in some_pairs()]
-    assert {writer for writer, *_ in sample} == set(WRITERS)
-    assert sorted(reader for _, reader, *_ in sample) == sorted(READERS)
-    for at in (0, 1):  # every one of them meets every variation and every source
-        for name, group in itertools.groupby(sorted(PAIRS, key=lambda pair: pair[at]), key=lambda pair: pair[at]):
-            met = list(group)
-            assert {variation for *_, variation, _ in met} == set(VARIATIONS), name
-            assert {source for *_, source in met} == set(KINEMATICS), name

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import io
 import json
 from dataclasses import replace
@@ -15,9 +13,12 @@ import pytest
 from matplotlib.image import imread
 
 from repetitions import repeated
-from tendonfmu.drawing.figures import dark_colours, figure_of, figures_json, packed_plotly, pooled, stretched, thinned
-from tendonfmu.drawing.panel import DIVERGING, STYLES, Band, Bars, Curve, Dots, Heat, Panel, Sheet
+from repository_paths import ROOT
+from tendonfmu.drawing import draw_finger
+from tendonfmu.drawing.figures import figure_of, figures_json, pooled, thinned
+from tendonfmu.drawing.panel import DIVERGING, Band, Bars, Curve, Dots, Heat, Panel, Sheet
 from tendonfmu.drawing.png import write_sheet
+from tendonfmu.model import finger_drawing
 
 X = np.linspace(0.0, 10.0, 5)
 PANEL = Panel(title="title", alt="what it shows", x_label="time (s)", y_label="torque (mN·m)", x_limits=(0.0, 10.0))
@@ -75,33 +76,12 @@ def test_a_png_has_ink_at_its_size_and_the_same_bytes_again(panel: Panel) -> Non
     assert 0.005 < np.mean(image < 0.98) < 0.6
 
 
-def test_a_png_shows_what_the_figure_holds() -> None:
-    """A curve at the middle of the axes is there in its colour, and nowhere else."""
-    file = io.BytesIO()
-    flat = replace(PANEL, curves=(Curve("before", X, np.full(5, 0.5)),), y_limits=(0.0, 1.0))
-    write_sheet(Sheet("", "name", "heading", (), (flat,)), [figure_of(flat, NAMES)], file)
-    image = (255 * imread(io.BytesIO(file.getvalue()))).astype(int)
-    colour = np.array([int(STYLES["before"].colour[k : k + 2], 16) for k in (1, 3, 5)])
-    rows = np.flatnonzero((np.abs(image[:, image.shape[1] // 2, :3] - colour).sum(axis=1)) < 60)
-    # 44 CSS pixels below the axes, 28 above them
-    assert len(rows) in (1, 2, 3)
-    assert image.shape[0] - rows.mean() == pytest.approx(1.5 * (44 + 0.5 * (250 - 44 - 28)), abs=2.0)
-
-
 def test_a_curve_has_its_numbers_and_its_gaps() -> None:
     y = np.array([1.0, 2.0, np.nan, 2.0, 1.23456789])
     (curve,) = traces(replace(PANEL, curves=(Curve("before", X, y),)))
     assert curve.mode == "lines" and curve.x.tolist() == X.tolist()
     np.testing.assert_allclose(curve.y, y, rtol=1e-6)
     assert len(traces(replace(PANEL, curves=(Curve("before", X, np.full(5, np.nan)),)))) == 0
-
-
-def test_values_have_units_and_names() -> None:
-    (curve,) = traces(replace(PANEL, curves=(Curve("before", X, X),)))
-    assert curve.hovertemplate == "%{y:.4~g} mN·m the model<extra></extra>"
-    assert figure_of(PANEL, NAMES).layout.xaxis.unifiedhovertitle.text == "%{x:.5~g} s"
-    *_, limits = traces(replace(PANEL, bars=(Bars("after", X, X - 1, X + 1),)))
-    assert limits.customdata[:, 0].tolist() == (X - 1).tolist() and limits.y.tolist() == (X + 1).tolist()
 
 
 def test_a_band_goes_round_each_of_its_stretches() -> None:
@@ -113,12 +93,6 @@ def test_a_band_goes_round_each_of_its_stretches() -> None:
     np.testing.assert_array_equal(limits.customdata[:, 0], low)
 
 
-def test_bars_lie_where_they_should() -> None:
-    (drawn,) = traces(ROWS)
-    np.testing.assert_array_equal(drawn.x, [1, 3, np.nan, 2, 4, np.nan])
-    assert drawn.y.tolist() == [0, 0, 0, 1, 1, 1]
-
-
 def test_many_points_are_thinned_and_none_that_stands_out_is_lost() -> None:
     x = np.arange(20_000.0)
     first, second = np.sin(x / 500), np.cos(x / 700)
@@ -127,25 +101,6 @@ def test_many_points_are_thinned_and_none_that_stands_out_is_lost() -> None:
     assert 1000 < len(one.x) < 2100 and np.array_equal(one.x, other.x) and (one.x[0], one.x[-1]) == (0.0, 19_999.0)
     assert one.y.max() == 5.0 and np.nanmin(other.y) == -5.0 and np.isnan(other.y[one.x == 7000.0]).all()
     np.testing.assert_array_equal(one.y, first[one.x.astype(int)])
-
-
-def test_a_stretched_axis_keeps_the_order_and_names_round_numbers() -> None:
-    x = np.array([-10.0, -0.1, -0.05, 0.0, 0.1, 1.0, 10.0])
-    assert (np.diff(stretched(x, 0.1)) > 0).all() and np.diff(stretched(x, 0.1)[-3:]) == pytest.approx([1.0, 1.0])
-    layout = figure_of(
-        replace(PANEL, x_limits=None, near_x=0.1, near_y=0.1, curves=(Curve("before", x, x),)), {}
-    ).layout
-    for axis in (layout.xaxis, layout.yaxis):
-        assert list(axis.ticktext) == ["−10", "−1", "0", "1", "10"]
-        assert list(axis.tickvals) == pytest.approx(stretched(np.array([-10.0, -1.0, 0.0, 1.0, 10.0]), 0.1))
-    short = np.linspace(0.0, 0.47, 9)
-    axis = figure_of(replace(PANEL, near_x=0.12, curves=(Curve("before", short, short),)), {}).layout.xaxis
-    assert len(axis.ticktext) >= 3 and axis.ticktext[0] == "0"
-
-
-def test_limits_of_a_logarithmic_axis_are_powers() -> None:
-    axis = figure_of(replace(PANEL, log_x=True, x_limits=(0.01, 100.0)), NAMES).layout.xaxis
-    assert axis.type == "log" and list(axis.range) == [-2, 2]
 
 
 def test_the_strongest_of_many_stays_visible() -> None:
@@ -172,10 +127,14 @@ def test_names_are_text() -> None:
     assert file.getvalue()
 
 
-def test_plotly_is_whole_and_packed_alike_each_time() -> None:
-    unpacked = gzip.decompress(base64.b64decode(packed_plotly())).decode()
-    assert unpacked.lstrip().startswith("/**\n* plotly.js v") and len(packed_plotly()) < 0.45 * len(unpacked)
-
-
-def test_what_is_dark_on_a_light_page_is_light_on_a_dark_one() -> None:
-    assert '.plot [style*="stroke: rgb(34, 34, 34)"] { stroke: #E4E8EC !important; }' in dark_colours()
+def test_the_picture_of_a_finger_marks_edges_and_takes_any_name() -> None:
+    """The picture that an FMU carries, and its icon: red is an edge; letters that the font lacks, no friction."""
+    finger = json.loads((ROOT / "examples" / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
+    finger["joints"][0]["name"] = "$\\frac{手指"
+    bare = {"joints": [{"name": "j"}], "tendons": [{"name": "a", "stiffness": 1e5, "moment_arms": [0.004]}]}
+    for description, edges in ((finger, True), (bare, False)):
+        streams = io.BytesIO(), io.BytesIO()
+        draw_finger(finger_drawing(description), *streams)
+        for stream in streams:
+            image = (255 * imread(io.BytesIO(stream.getvalue()))[:, :, :3]).round()
+            assert (image == (0xCC, 0x1F, 0x1A)).all(axis=-1).any() == edges and (image < 100).any()

@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 import oracle
 import oracle_fit
-from fit_cases import few_unknowns, groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
+from fit_cases import (
+    BIASES,
+    few_unknowns,
+    groups,
+    image_of,
+    leave_out,
+    off_start,
+    random_fit_case,
+    shared_key,
+    small_finger,
+    twin_of,
+)
 from fit_data import recorded
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
@@ -60,17 +71,6 @@ def assert_equal_evaluation(estimator: Any, likelihoods: list[oracle_fit.Likelih
     np.testing.assert_array_equal(information, information.T)
 
 
-def leave_out(seed: int, samples: int) -> Array:
-    """[N] bool: a few stretches and single samples not used, at times the first ones."""
-    rng = np.random.default_rng([seed, 11])
-    use = rng.random(samples) > 0.05
-    for start in rng.integers(0, samples, 3):
-        use[start : start + int(rng.integers(1, 30))] = False
-    if seed % 3 == 0:
-        use[: 1 + seed % 7] = False
-    return np.asarray(use)
-
-
 def random_parts(seed: int, samples: int, recordings: int) -> tuple[Description, list[Part]]:
     """A random finger with several recordings: left-out samples, known load, any kinematics."""
     description = random_fit_case(seed, samples)[0]
@@ -105,21 +105,6 @@ def made_part(description: Description, seed: int, duration: float, rate: float 
     return Part(recording, 3, recording.get("external_torque"))
 
 
-BIASES: dict[str, Description] = {
-    "as given": {},
-    "initial_variance": {"initial_variance": 4e-3},
-    "noise_per_force": {"noise_std_per_force": 4e-4},
-    "noise_time": {"noise_time": 0.02},
-    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
-    "initial_torque of default variance": {"initial_torque": [0.02, -0.01]},
-    "no wandering": {"drift_variance": 0.0},
-    "known start": {"initial_variance": 0.0},
-    "forgets at once": {"forget_rate": 1e3},
-    "never forgets": {"forget_rate": 0.0},
-    "all": {"initial_torque": [0.01, 0.0], "noise_time": 0.01, "noise_std_per_force": 1e-4, "initial_variance": 1e-4},
-}
-
-
 @pytest.mark.parametrize("name", repeated(BIASES, 2, 4, 10))
 @pytest.mark.parametrize("left_out", repeated([False, True], 1), ids=["all used", "some left out"])
 def test_every_bias_option(name: str, left_out: bool) -> None:
@@ -140,21 +125,6 @@ def test_gap_in_time() -> None:
     part.recording["time"] = part.recording["time"] + 40.0 * (np.arange(300) >= 170)
     estimator, likelihoods = both(description, groups(description), [part])
     assert_equal_evaluation(estimator, likelihoods, off_start(estimator.unknowns, 2))
-
-
-def test_one_gap_or_two_recordings_differ_by_the_bias_alone() -> None:
-    """Two recordings have two bias paths: their costs add up, also in another order."""
-    description = small_finger()
-    group = groups(description)
-    parts = [made_part(description, 1, 9.0), made_part(description, 2, 7.0)]
-    together, likelihoods = both(description, group, parts)
-    z = off_start(together.unknowns, 3)
-    alone = [both(description, group, [part])[0].evaluate(z) for part in parts]
-    swapped = both(description, group, parts[::-1])[0].evaluate(z)
-    for found, first, second, other in zip(together.evaluate(z), *alone, swapped, strict=True):
-        np.testing.assert_allclose(found, first + second, rtol=1e-11, atol=1e-11 * np.abs(found).max())
-        np.testing.assert_allclose(found, other, rtol=1e-11, atol=1e-11 * np.abs(found).max())
-    assert_equal_evaluation(together, likelihoods, z)
 
 
 LENGTHS = (2, 3, 4, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 400)
@@ -190,7 +160,7 @@ def filtered(rows: tuple[Array, ...], y: Array, time: Array, noise: float, drift
     return 0.5 * float(r @ r), J.T @ r, J.T @ J
 
 
-@pytest.mark.parametrize("threads", repeated([0, 1, 2, 3], 3))
+@pytest.mark.parametrize("threads", repeated([1, 3], 1))
 def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     """30,001 samples, longer than any block, against a filter that takes them one by one."""
     description = small_finger()
@@ -216,18 +186,6 @@ def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     again = estimator.evaluate(z, threads=threads)
     for first, second in zip((cost, gradient, information), again, strict=True):
         np.testing.assert_array_equal(first, second)  # the same call gives the same bits
-
-
-def test_a_coarse_pass_knows_about_as_much() -> None:
-    """Every s-th sample with the noise of s of them: the information of all samples, roughly, for less work."""
-    description = small_finger()
-    group = groups(description, few_unknowns)
-    part = made_part(description, 9, 60.0, rate=200.0)
-    estimator = estimation.Estimator(image_of(description), group)
-    estimator.add_recording(part.recording, 3, part.external_torque)
-    z = np.array([unknown.start for unknown in estimator.unknowns])
-    full, coarse = (np.diag(estimator.evaluate(z, stride=stride)[2]) for stride in (1, 4))
-    np.testing.assert_allclose(coarse / full, 1.0, atol=0.3)
 
 
 # --- innovations

@@ -4,8 +4,6 @@ central differences of the oracle itself."""
 from __future__ import annotations
 
 import functools
-from collections import Counter
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 import oracle_fit
-from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, small_finger, twin_of
-from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, twin_of
 from oracle_trace import Trace, run_recorder, with_values
 from repetitions import repeated
+from tendonfmu.errors import InputError
 from tendonfmu.estimate import estimation
 
 Array = NDArray[Any]
@@ -55,7 +53,7 @@ def excess(found: Array, expected: Array) -> float:
     return float((np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
 
 
-@pytest.mark.parametrize("seed", repeated(range(FINGERS), *range(0, FINGERS, 4)))
+@pytest.mark.parametrize("seed", repeated(range(FINGERS), *range(3, FINGERS, 8)))
 def test_torques_jumps_and_their_derivatives(seed: int) -> None:
     each = case(seed)
     torque, jump, d_torque, d_jump = (rows[each.compared] for rows in each.rows)
@@ -94,71 +92,12 @@ def test_derivatives_are_the_oracles_differences(seed: int) -> None:
         assert error <= BY_DIFFERENCES * np.abs(expected).max() + 100.0 * floor, each.estimator.unknowns[column].path
 
 
-@pytest.mark.long
-def test_the_random_fingers_take_every_branch_that_matters() -> None:
-    branches: Counter[str] = Counter()
-    roles: Counter[str] = Counter()
-    sources: Counter[int] = Counter()
-    for seed in range(FINGERS):
-        branches += case(seed).trace.branches
-        roles.update(unknown.role for unknown in case(seed).estimator.unknowns)
-        sources[case(seed).source] += 1
-        roles["shared"] += sum(len(unknown.parameters) > 2 for unknown in case(seed).estimator.unknowns)
-    wanted = {
-        "first_sample_moves", "first_sample_stuck", "keeps_moving", "reversal_between_samples", "enter", "stays_stuck",
-        "first_exit", "exit_after_one_sample", "exit_with_memory", "exit_same_side", "exit_other_side",
-        "moves_above_zero_threshold", "symmetric_positive", "symmetric_negative", "asymmetric_positive",
-        "asymmetric_negative", "working_points_below", "working_points_inside", "working_points_above",
-        "slack_at_spring", "slack_by_loss", "bidirectional_pulls", "bidirectional_pushes", "initial_torque",
-    }  # fmt: skip
-    assert not {name for name in wanted if branches[name] < 10}
-    assert min(roles[name] for name in ("coulomb", "drop", "rate", "viscous", "value", "shared")) > 20
-    assert set(sources) == {1, 2, 3}
-
-
-def test_forces_follow_the_parameters() -> None:
-    """The paper freezes f_A and f_B; the estimation does not, and the difference is not small."""
-    description = small_finger()
-    group = groups(description)
-    estimator = estimation.Estimator(image_of(description), group)
-    motion = wavy_motion(3, 10.0, 20.0, 2)
-    made = make_recording(description, motion, wavy_forces(3, motion["time"], 4), 3)
-    estimator.add_recording(made.recording, 3)
-    twin = twin_of(description, group, estimator.unknowns)
-    trace = Trace(description, made.recording, 3)
-    z = twin.start
-    _, _, d_torque, d_jump = estimator.jacobian(0, z, 0, len(trace.time))
-    carried = oracle_fit.derivatives(trace, twin, z)
-    frozen = oracle_fit.derivatives_with_frozen_forces(trace, twin, z)
-    assert excess(d_torque, carried[0]) < ROUNDING
-    assert excess(d_jump, carried[1]) < ROUNDING
-    assert excess(d_torque, frozen[0]) > 0.03
-    assert excess(d_jump, frozen[1]) > 0.03
-
-
-@pytest.mark.parametrize(("start", "stop"), [(0, 1), (0, 7), (40, 41), (13, 100), (99, 100)])
-def test_any_part_of_a_recording(start: int, stop: int) -> None:
+def test_any_part_of_a_recording() -> None:
     each = case(2)
-    part = each.estimator.jacobian(0, each.z, start, stop)
-    for found, whole in zip(part, each.rows, strict=True):
-        np.testing.assert_array_equal(found, whole[start:stop])
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda e, z: e.jacobian(0, z, 0, SAMPLES + 1),
-        lambda e, z: e.jacobian(1, z, 0, 1),
-        lambda e, z: e.jacobian(0, z[:-1], 0, 1),
-        lambda e, z: e.jacobian(0, np.where(np.arange(len(z)) == 1, np.nan, z), 0, 1),
-    ],
-    ids=["past the end", "no such recording", "too few numbers", "not a number"],
-)
-def test_refusals_are_one_line(call: Callable[[Any, Array], Any]) -> None:
-    from tendonfmu.errors import InputError
-
-    each = case(2)
-    with pytest.raises((InputError, IndexError, ValueError)) as refused:
-        call(each.estimator, each.z)
-    assert "\n" not in str(refused.value)
-    assert str(refused.value)
+    for start, stop in ((0, 1), (0, 7), (40, 41), (13, 100), (99, 100)):
+        for found, whole in zip(each.estimator.jacobian(0, each.z, start, stop), each.rows, strict=True):
+            np.testing.assert_array_equal(found, whole[start:stop])
+    not_a_number = np.where(np.arange(len(each.z)) == 1, np.nan, each.z)
+    for wrong in ((0, each.z, 0, SAMPLES + 1), (1, each.z, 0, 1), (0, each.z[:-1], 0, 1), (0, not_a_number, 0, 1)):
+        with pytest.raises((InputError, IndexError, ValueError)):
+            each.estimator.jacobian(*wrong)

@@ -1,21 +1,20 @@
-"""∂T/∂z and ∂Δb/∂z of the estimation by the numbers of `extensions`, all effects together in random fingers: against
-formulas in complex numbers (exact) where the kinematics stay, and against central differences of the oracle."""
+"""∂T/∂z and ∂Δb/∂z of the estimation by the numbers of `extensions`, against differences of the oracle.
+
+All effects together in random fingers.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections import Counter
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import oracle_fit
-from fit_cases import groups, image_of, twin_of
-from oracle_extensions import read_rows
-from oracle_trace import Trace, run_recorder, with_values
-from random_extensions import MAGNITUDES, MAKE
+from fit_cases import groups, image_of
+from oracle_trace import run_recorder, with_values
+from random_extensions import MAGNITUDES
 from random_fingers import Description, random_case
 from repetitions import repeated
 from tendonfmu.estimate import estimation
@@ -24,8 +23,6 @@ Array = NDArray[Any]
 
 FINGERS = range(700, 713)
 SAMPLES = 50
-SIGNALS = ("time_delay", "backlash", "tendon_nonlinearity")
-ROUNDING = 1e-9  # of the column's largest
 BY_DIFFERENCES = 3e-5  # of the column's largest
 
 
@@ -47,7 +44,6 @@ class Case:
         self.group = groups(self.description)
         self.estimator = estimation.Estimator(image_of(self.description), self.group)
         self.estimator.add_recording(self.recording, self.source)
-        self.twin = twin_of(self.description, self.group, self.estimator.unknowns)
         self.z = self.estimator.start
         self.rows = self.estimator.jacobian(0, self.z, 0, SAMPLES)
 
@@ -64,28 +60,7 @@ def case(seed: int) -> Case:
     return Case(seed)
 
 
-def largest(values: Array) -> Array:
-    """Of each column (last axis), 1 where it is 0."""
-    found = np.abs(values).reshape(-1, values.shape[-1]).max(axis=0)
-    return np.asarray(np.where(found > 0.0, found, 1.0))
-
-
-@pytest.mark.parametrize("seed", [seed for seed in FINGERS if seed % 3])
-def test_torques_and_friction_by_formula(seed: int) -> None:
-    """Every number but those of the signals: laws, arms, factors, presliding, what multiplies what."""
-    each = case(seed)
-    trace = Trace(each.description, each.recording, each.source)
-    kept = ~trace.near
-    expected = oracle_fit.derivatives(trace, each.twin, each.z)
-    signals = {f"extensions[{k + 1}]" for k, row in enumerate(read_rows(each.description)) if row.effect in SIGNALS}
-    columns = [c for c, one in enumerate(each.estimator.unknowns) if one.path.rpartition(".")[0] not in signals]
-    for found, wanted in zip(each.rows[2:], expected, strict=True):
-        scale = largest(np.concatenate([wanted, each.rows[2]]))
-        assert (np.abs(found - wanted) / scale)[kept][..., columns].max() < ROUNDING
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", repeated(FINGERS, 5))  # these have all effects
+@pytest.mark.parametrize("seed", repeated(FINGERS, 0, 3, 12))  # these have all effects
 def test_all_numbers_by_differences(seed: int) -> None:
     """But for samples at which the step turns a decision (a threshold, a play, a neighbour in time)."""
     each = case(seed)
@@ -115,14 +90,3 @@ def test_all_numbers_by_differences(seed: int) -> None:
         wrong = np.abs(derivative[..., column] - expected) > BY_DIFFERENCES * scale + error
         assert known.mean() > 0.9, (unknown.path, known.mean())
         assert not (wrong & known).any(), (unknown.path, each.description["extensions"])
-
-
-def test_the_fingers_have_every_effect() -> None:
-    seen: Counter[str] = Counter()
-    for seed in FINGERS:
-        seen.update(row.effect for row in read_rows(case(seed).description))
-        rows = case(seed).description["extensions"]
-        seen["forces late"] += any(row.get("delay", 0.0) < 0.0 for row in rows)
-        seen["positions late"] += any(row.get("delay", 0.0) > 0.0 for row in rows)
-    assert {effect for effect in MAKE if seen[effect] < 2} == set(), seen
-    assert seen["forces late"] and seen["positions late"]

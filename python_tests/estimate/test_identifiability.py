@@ -87,49 +87,38 @@ def test_standard_errors_are_those_of_estimates() -> None:
     np.testing.assert_allclose(np.std(estimates, axis=0), np.sqrt(np.diag(np.linalg.inv(known))), rtol=0.12)
 
 
+@pytest.mark.parametrize(
+    ("ranges", "part", "expected"),
+    [
+        (
+            ("base=0.1:0.6", "tip=-0.4:0.4"),
+            "edge_friction[2].laws[1]",
+            "joint 1 never comes near working point 1 at -0.5 rad",
+        ),
+        (("base=0.2:0.2", "tip=-0.4:0.4"), "joints[1].friction", "never slides: always within v_min = 0.01"),
+        (("base=0.2:0.2", "tip=-0.4:0.4"), "joints[1].cover", None),
+    ],
+)
+def test_reasons_name_what_the_motion_lacks(
+    small_file: Path, ranges: tuple[str, ...], part: str, expected: str | None
+) -> None:
+    entries = [entry for entry in small_report(small_file, *ranges)["parameters"] if part in entry["path"]]
+    assert (
+        {entry["reason"] for entry in entries} == {expected} if expected else {"noise"} == {e["cause"] for e in entries}
+    )
+
+
+def test_slower_than_the_threshold_or_noisier_identifies_less(small_file: Path) -> None:
+    slow = small_report(small_file, "base=-0.05:0.05", "tip=-0.01:0.01", max_speed=0.009)
+    assert {e["cause"] for e in slow["parameters"] if "friction" in e["path"]} == {"side"} and slow["identifiable"] == 0
+    counts = []
+    for noise in (0.001, 0.01, 0.1):
+        small_file.write_text(json.dumps({**SMALL, "bias": {"noise_std": noise}}))
+        counts.append(small_report(small_file, "tip=-0.4:0.4")["known_combinations"])
+    assert counts[0] > counts[1] > counts[2]
+
+
 def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:
     subject = read_subject(small_file)
     found = find_ranges(subject, ranges)
     return report(excite(subject, found, Plan(as_array(found), **{"duration": 60, **plan})), "tendonfmu excite")
-
-
-def reasons(result: dict[str, Any], part: str) -> set[tuple[str | None, str | None]]:
-    return {(e["cause"], e["reason"]) for e in result["parameters"] if part in e["path"]}
-
-
-def test_an_angle_that_is_never_reached(small_file: Path) -> None:
-    result = small_report(small_file, "base=0.1:0.6", "tip=-0.4:0.4")
-    expected = ("working_point", "joint 1 never comes near working point 1 at -0.5 rad")
-    assert reasons(result, "edge_friction[2].laws[1]") == {expected}
-    assert expected not in reasons(result, "edge_friction[2].laws[2]")
-    points = next(e for e in result["effects"] if e["path"] == "tendons[1].edge_friction[2]")["working_points"]
-    assert points[0]["time"] == {"positive": 0, "negative": 0, "stuck": 0}
-
-
-def test_a_joint_that_never_moves(small_file: Path) -> None:
-    result = small_report(small_file, "1=0.2:0.2", "2=-0.4:0.4")
-    assert reasons(result, "joints[1].friction") == {("side", "never slides: always within v_min = 0.01")}
-    assert {cause for cause, _ in reasons(result, "joints[1].cover")} == {"noise"}
-    assert result["joints"][0]["strokes"] == 0 and result["joints"][1]["strokes"] > 10
-
-
-def test_slower_than_the_threshold_is_no_sliding(small_file: Path) -> None:
-    result = small_report(small_file, "base=-0.05:0.05", "tip=-0.01:0.01", max_speed=0.009)
-    assert {cause for cause, _ in reasons(result, "friction")} == {"side"}
-    assert result["identifiable"] == 0
-
-
-def test_more_noise_identifies_less(small_file: Path, tmp_path: Path) -> None:
-    counts = []
-    for noise in (0.001, 0.01, 0.1):
-        path = tmp_path / "noisy.json"
-        path.write_text(json.dumps({**SMALL, "bias": {"noise_std": noise}}))
-        counts.append(small_report(path, "tip=-0.4:0.4")["known_combinations"])
-    assert counts[0] > counts[1] > counts[2]
-
-
-def test_asymmetric_laws_have_numbers_for_each_side(small_file: Path) -> None:
-    paths = {e["path"] for e in small_report(small_file)["parameters"]}
-    assert {f"tendons[1].edge_friction[1].{side}.coulomb" for side in ("positive", "negative")} <= paths
-    assert "tendons[1].edge_friction[1].negative.viscous" in paths
-    assert "tendons[1].edge_friction[1].positive.viscous" not in paths

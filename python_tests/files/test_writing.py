@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tendonfmu.files import whole_file
+from tendonfmu.files import are, by_kind, counted, whole_file
 
 if os.name != "posix":
     pytest.skip("SKIPPED: locks and signals as POSIX has them", allow_module_level=True)
@@ -65,6 +65,19 @@ def test_young_files_and_those_of_others_stay(tmp_path: Path, name: str) -> None
     with whole_file(tmp_path / "out.csv") as temporary:
         temporary.write_text("whole")
     assert (tmp_path / name).read_text() == "mine"
+
+
+def test_numbers_agree_with_their_words_and_sentences_are_told_once() -> None:
+    for number, noun, plural, words in (
+        (0, "sample", "", "0 samples are"),
+        (1, "pass", "passes", "1 pass is"),
+        (3, "pass", "passes", "3 passes are"),
+    ):
+        assert f"{counted(number, noun, plural)} {are(number)}" == words
+    alike = [f"{file}: tendon_position[{i}]: zero is off by 0.{i} mm; learn it" for file in "ab" for i in (1, 2)]
+    alone = ["c.csv: time: 1 gap, the first of 0.7 s"]
+    kinds = by_kind([*alike, *alone, *alike])
+    assert [sentences for _, sentences in kinds] == [alike, alone] and kinds[1][0] == alone[0]
 
 
 def test_an_error_leaves_nothing(tmp_path: Path) -> None:

@@ -9,25 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import tendonfmu as tf
-from command import Call, run_script
-from plant_rigs import needs_plant
+from command import Call
 from real_browser import Elements
-from repository_paths import ROOT
-from small_hand import FINGERS, worn_columns, write_hand, write_worn_hand
+from small_hand import FINGERS, worn_columns, write_worn_hand
 from tendonfmu.hand import parts
-from tendonfmu.hand.page import COLOURS, PAGE, hand_svg, write_hand_page
+from tendonfmu.hand.page import PAGE, write_hand_page
 from tendonfmu.hand.parts import PartResult, split_files
 from tendonfmu.hand.report import (
     CALIBRATION,
-    PartRow,
     calibration_rows,
-    diagnosis_rows,
-    share_that_is_wrong,
-    shared_warnings,
 )
 
 
@@ -60,68 +53,21 @@ def results(hand: tf.Hand, reports: Mapping[str, Any]) -> list[PartResult]:
     ]
 
 
-def test_the_page_has_the_worst_finger_first(hand: tf.Hand, tmp_path: Path) -> None:
-    rows = calibration_rows(hand, results(hand, {"index": calibration(1.0), "ring": calibration(3.0)}))
-    assert [row.name for row in rows] == ["ring", "index"] and [row.tone for row in rows] == ["fine", "fine"]
-    rows = calibration_rows(hand, results(hand, {"index": calibration(5.0), "ring": calibration(1.0)}))
-    assert [(row.name, row.tone) for row in rows] == [("index", "bad"), ("ring", "fine")]
-    write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
-    page = tmp_path / PAGE
-    text = page.read_text("utf-8")
-    assert (
-        "index is the worst: 5.00 mN·m are left on unseen motion." in words(page)
-        and 'href="index/calibration.html"' in text
-    )
-    table = text[text.index("<table") :]
-    assert table.index(">index</a>") < table.index(">ring</a>") and table.count("doubtful") == 1
-
-
-def test_a_finger_that_failed_is_last_with_its_reason(hand: tf.Hand, tmp_path: Path) -> None:
-    rows = calibration_rows(hand, results(hand, {"ring": calibration(1.0)}))
-    assert [(row.name, row.tone) for row in rows] == [("ring", "fine"), ("index", "failed")]
-    write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
-    page = tmp_path / PAGE
-    assert "1 finger left out: index." in words(page) and "index was left out: no motion" in words(page)
-    assert "index/calibration.html" not in page.read_text("utf-8")
-
-
-def test_what_is_wrong_is_what_causes_explain_and_what_nothing_does(hand: tf.Hand) -> None:
-    def report(verdict: str, gain: float, unexplained: float) -> dict[str, Any]:
-        rms = {"test_rms": [1e-3]}
-        return {
-            "verdict": verdict,
-            "gain": {"value": gain},
-            "unexplained": {"share": unexplained},
-            "causes": [{"title": "it rubs", "joint": 1, "tendon": 2}] if gain else [],
-            "nominal": rms,
-        }
-
-    assert share_that_is_wrong(report("explained", 0.4, 0.0)) == pytest.approx(0.4)
-    assert share_that_is_wrong(report("unexplained", 0.0, 0.75)) == pytest.approx(0.5)
-    given = {"index": report("unexplained", 0.0, 0.75), "ring": report("explained", 0.4, 0.0)}
-    rows = diagnosis_rows(hand, results(hand, given))
-    assert [row.name for row in rows] == ["index", "ring"] and rows[1].cells[1] == "it rubs (at joint 1 on tendon 2)"
-    given["index"] = report("adequate", 0.0, 0.02)
-    rows = diagnosis_rows(hand, results(hand, given))
-    assert [(row.name, row.tone, row.badness) for row in rows] == [("ring", "bad", 0.4), ("index", "fine", 0.0)]
-
-
-def test_the_drawing_is_narrow_and_escapes_names(tmp_path: Path) -> None:
-    write_worn_hand(tmp_path)
-    names = ["thumb", *(f"finger_{k}" for k in range(4))]
-    file = write_hand(tmp_path, [{"name": name, "description": "index.json"} for name in names])
-    file.write_text(file.read_text().replace("right_hand", "<script>"))
-    hand = tf.read_hand(file)
-    rows = [PartRow(name, "fine", 0.0, "<b>", "", (), "x.html" * (name == "thumb")) for name in names]
-    svg = hand_svg(hand, rows)
-    width = float(svg.split('viewBox="0 0 ')[1].split()[0])
-    assert width <= 366 and "<script>" not in svg and "<b>" not in svg and svg.count("<circle") == 5
-    assert svg.count("<a href") == 1 and svg.count(COLOURS["fine"]) == 5
-
-
-def test_one_warning_for_several_fingers_is_one_line() -> None:
-    found = shared_warnings({"index": ["short", "cold"], "ring": ["short"]})
-    assert found == ["index, ring: short", "index: cold"]
+def test_the_worst_finger_is_first_and_one_that_failed_last(hand: tf.Hand, tmp_path: Path) -> None:
+    hand.path.write_text(hand.path.read_text().replace("right_hand", "<script>"))
+    hand = tf.read_hand(hand.path)
+    for reports, expected in (
+        ({"index": calibration(1.0), "ring": calibration(3.0)}, [("ring", "fine"), ("index", "fine")]),
+        ({"index": calibration(5.0), "ring": calibration(1.0)}, [("index", "bad"), ("ring", "fine")]),
+        ({"ring": calibration(1.0)}, [("ring", "fine"), ("index", "failed")]),
+    ):
+        rows = calibration_rows(hand, results(hand, reports))
+        assert [(row.name, row.tone) for row in rows] == expected
+        write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
+        page = (tmp_path / PAGE).read_text("utf-8")
+        assert "<script>" not in page and ('href="index/calibration.html"' in page) == ("index" in reports)
+        if "index" not in reports:
+            assert "index was left out: no motion" in words(tmp_path / PAGE)
 
 
 # --- splitting --------------------------------------------------------------------------------------------------------
@@ -168,14 +114,12 @@ def test_the_worse_finger_is_named(tmp_path: Path, call: Call) -> None:
 
 
 def test_a_finger_without_columns_is_its_row(tmp_path: Path, call: Call) -> None:
-    columns = worn_columns(1, seconds=20.0)
+    columns = worn_columns(1, seconds=4.0)
     files = write_worn_hand(tmp_path, day={name: column for name, column in columns.items() if "ring" not in name})
-    answer = call("diagnose", files["hand"], files["day"], "-o", "out", "--kinematics", "3")
+    answer = call("score", files["hand"], files["day"], "-o", "score.json", "--kinematics", "3")
     wanted = "no column ring_tendon_force[1]; expected 2 columns with tendon_force of ring, in N"
     assert answer.status == 0 and f"warning: ring: left out: {files['day']}: {wanted}" in answer.err
-    assert Path("out/index/diagnosis.json").is_file() and not Path("out/ring").exists()
-    answer = call("score", files["hand"], files["day"], "-o", "score.json", "--kinematics", "3")
-    assert answer.status == 0 and list(json.loads(Path("score.json").read_text())["failed"]) == ["ring"]
+    assert list(json.loads(Path("score.json").read_text())["failed"]) == ["ring"]
     answer = call("check", files["hand"], files["day"], "--json")
     assert answer.status == 1 and f"ring: recordings do not belong to {files['hand']}" in answer.err
     belongs = {name: part["recordings"][0]["belongs"] for name, part in json.loads(answer.out)["fingers"].items()}
@@ -208,9 +152,10 @@ def test_an_internal_error_of_one_finger_is_its_row(
     broken.add("ring")
     answer = call(*command, "--kinematics", "3")
     assert answer.status == 3 and answer.err.count("\n") == 1 and "a fault of tendonfmu" in answer.err
-    broken.clear()  # what failed is tried again
-    assert set(json.loads(call(*command, "--kinematics", "3", "--json").out)["fingers"]) == {"index", "ring"}
-    assert not Path("out/index/tendonfmu-error.txt").exists()
+    if kind:
+        broken.clear()  # what failed is tried again
+        assert set(json.loads(call(*command, "--kinematics", "3", "--json").out)["fingers"]) == {"index", "ring"}
+        assert not Path("out/index/tendonfmu-error.txt").exists()
 
 
 def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:
@@ -232,15 +177,6 @@ def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:
     assert "index" in report["failed"]  # it has no column with that label
 
 
-def test_a_scheduler_needs_a_hand_or_a_history(tmp_path: Path, call: Call) -> None:
-    write_worn_hand(tmp_path)
-    for command in ("calibrate", "diagnose"):
-        answer = call(command, tmp_path / "index.json", "free.csv", "-o", "out", "--scheduler", "tcp://127.0.0.1:1")
-        assert answer.status == 2 and answer.err.startswith("tendonfmu: --scheduler: given with")
-    answer = call("calibrate", tmp_path / "hand.json", "free.csv", "-o", "out", "--from", tmp_path / "index.json")
-    assert answer.status == 2 and "index.json: no hand; expected hand.json of an earlier calibration" in answer.err
-
-
 # --- for real ---------------------------------------------------------------------------------------------------------
 
 
@@ -259,39 +195,3 @@ def test_a_calibrated_hand_does_not_depend_on_jobs(tmp_path: Path, call: Call) -
     assert call("run", "one/hand.json", files["more"], "-o", "out.csv").status == 0
     assert call("calibrate", files["hand"], files["more"], "-o", "later", "--from", "one/hand.json").status == 0
     assert "previous" in json.loads(Path("later/ring/calibration.json").read_text())["error"]
-
-
-@pytest.mark.long
-def test_a_history_follows_each_finger(tmp_path: Path, call: Call) -> None:
-    days = {f"2026-03-{day:02d}": worn_columns(day, "ring", more=1.0 + 0.02 * day) for day in (9, 16, 23)}
-    files = write_worn_hand(tmp_path, well=worn_columns(1), **days)
-    command = ["diagnose", files["hand"], *(files[day] for day in days), "--history", "--reference", files["well"]]
-    answer = call(*command, "-o", "out", "--kinematics", "3", "--json")
-    assert answer.status == 0, answer.err
-    report = json.loads(answer.out)
-    assert list(report["fingers"]) == ["ring", "index"] and report["fingers"]["index"]["causes"] == []
-    assert report["fingers"]["ring"]["causes"][0]["where"]["effect"] == "joint_friction"
-    assert "ring is the worst: 1 change." in words(Path("out/hand.html"))
-    rows = {file: file.stat().st_mtime_ns for file in Path("out").glob("*/rows/*.json")}
-    call(*command, "-o", "out", "--kinematics", "3")
-    assert len(rows) >= 6 and {file: file.stat().st_mtime_ns for file in rows} == rows
-
-
-@needs_plant
-@pytest.mark.long
-def test_the_worse_finger_of_a_simulated_hand_is_first(tmp_path: Path, call: Call) -> None:
-    """The example: five fingers of four joints; only the ring finger's edges rub more later."""
-    made = run_script(ROOT / "examples/hand/make_hand.py", "-o", tmp_path / "hand", "--seconds", "16")
-    assert made.status == 0, made.err
-    hand, then, later = (tmp_path / "hand" / name for name in ("hand.json", "then.parquet", "later.parquet"))
-    assert pd.read_parquet(then).shape == (3200, 1 + 5 * 16)
-    checked = call("check", hand, then, later)
-    assert checked.status == 0 and checked.out.count("belongs to this finger") == 10
-    answer = call("diagnose", hand, later, "--reference", then, "-o", "out", "--jobs", "2", "--json")
-    assert answer.status == 0, answer.err
-    report = json.loads(answer.out)
-    names = list(report["fingers"])
-    assert names[0] == "ring" and len(names) == 5 and report["failed"] == {}
-    assert [cause["effect"] for cause in report["fingers"]["ring"]["causes"]] == ["edge_friction"]
-    assert {report["fingers"][name]["verdict"] for name in names[1:]} == {"adequate"}
-    assert words(Path("out/hand.html")).index("ring is the worst") > 0

@@ -37,15 +37,13 @@ def test_each_finger_gets_its_columns(hand: tf.Hand, columns: Columns) -> None:
             for column in ("tendon_force[2]", "tendon_position[1]", "joint_velocity[1]"):
                 np.testing.assert_array_equal(split[name][column], columns[f"{name}_{column}"])
             assert split[name].contact is None
-
-
-def test_columns_may_be_listed(hand: tf.Hand, columns: Columns, tmp_path: Path) -> None:
     data = json.loads(hand.path.read_text())
     ours = [f"tendon_{kind}[{i}]" for kind in ("force", "position") for i in (1, 2)]
-    data["fingers"][1]["columns"] = {column: f"R {column}" for column in ours}
+    data["fingers"][1]["columns"] = {column: f"R {column}" for column in ours}  # columns may be listed
     hand.path.write_text(json.dumps(data))
     renamed = {name.replace("ring_", "R "): values for name, values in columns.items() if "ring_joint" not in name}
-    split = tf.split_recording(tf.read_hand(hand.path), pd.DataFrame(renamed))
+    with pytest.warns(InputWarning, match="ignored columns: 'camera'; no finger of .*hand.json has them"):
+        split = tf.split_recording(tf.read_hand(hand.path), pd.DataFrame(renamed | {"camera": columns["time"]}))
     np.testing.assert_array_equal(split["ring"]["tendon_position[2]"], columns["ring_tendon_position[2]"])
     assert "joint_position" not in split["ring"].groups and "joint_position" in split["index"].groups
 
@@ -86,11 +84,6 @@ def test_what_is_refused(hand: tf.Hand, columns: Columns, call: Call, change: ob
         assert answer.status == 2 and words in answer.err and not Path("out").exists()
 
 
-def test_columns_of_nobody_are_ignored_with_a_warning(hand: tf.Hand, columns: Columns) -> None:
-    with pytest.warns(InputWarning, match="ignored columns: 'camera'; no finger of .*hand.json has them"):
-        tf.split_recording(hand, pd.DataFrame(columns | {"camera": columns["time"]}))
-
-
 def test_a_run_is_that_of_each_finger(hand: tf.Hand, columns: Columns, call: Call) -> None:
     write_table("day.csv", columns)
     answer = call("run", hand.path, "day.csv", "-o", "out.parquet", "--kinematics", "3", "--json")
@@ -107,17 +100,6 @@ def test_a_run_is_that_of_each_finger(hand: tf.Hand, columns: Columns, call: Cal
     assert refused.status == 2 and "a hand, given with --report; expected a finger" in refused.err
 
 
-def test_recordings_belong_or_not(hand: tf.Hand, columns: Columns, call: Call) -> None:
-    write_table("good.csv", columns)
-    columns["ring_tendon_position[1]"] = columns["ring_tendon_position[1]"] * 1e3
-    write_table("mm.csv", columns)
-    good, bad = call("check", hand.path, "good.csv"), call("check", hand.path, "mm.csv", "--json")
-    assert good.status == 0 and "good.csv:ring: belongs to this finger" in good.out
-    assert bad.status == 1 and "ring: recordings do not belong to" in bad.err and "mm.csv:ring" in bad.err
-    report = json.loads(bad.out)["fingers"]
-    assert [report[name]["recordings"][0]["belongs"] for name in FINGERS] == [True, False]
-
-
 # --- the wrist --------------------------------------------------------------------------------------------------------
 
 
@@ -129,17 +111,6 @@ def test_fingers_get_the_angles_of_all_joints(tmp_path: Path, wrist: str) -> Non
     for name in FINGERS:
         np.testing.assert_allclose(split[name]["joint_position"], truth[name], rtol=0, atol=1e-13)
         assert "joint_velocity" not in split[name].groups
-
-
-def test_the_wrist_angle_of_all_is_that_of_the_wrist(tmp_path: Path) -> None:
-    """A finger whose tendons say otherwise does not change it; its own joints follow the wrist."""
-    hand, recording, truth = write_wrist_hand(tmp_path, "measured")
-    table = read_table(recording, lambda file, names: names)
-    table["wrist.joint_position[1]"] = table["wrist.joint_position[1]"] + 0.1
-    split = tf.split_recording(tf.read_hand(hand), pd.DataFrame(table))
-    for name in FINGERS:
-        np.testing.assert_allclose(split[name]["joint_position[1]"], truth[name][:, 0] + 0.1, rtol=0, atol=1e-13)
-        assert np.abs(split[name]["joint_position[2]"] - truth[name][:, 1]).max() > 1e-3
 
 
 def test_encoders_of_the_fingers_are_used(tmp_path: Path) -> None:

@@ -39,15 +39,15 @@ def test_a_finger_is_read_from_path_text_dictionary_and_finger(finger: tf.Finger
     found = tf.read_finger(given)
     assert found == finger and hash(found) == hash(finger)
     given["tendons"][0]["stiffness"] = 1.0
-    assert found == finger  # it has its own copy
+    found.to_dict()["tendons"].clear()
+    assert found == finger  # it has its own copy, and gives copies
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.text = b""  # type: ignore[misc]
+    numbers = finger.to_dict()
+    numbers["tendons"][0]["moment_arms"] = np.array(numbers["tendons"][0]["moment_arms"])
+    numbers["tendons"][0]["stiffness"] = np.float64(numbers["tendons"][0]["stiffness"])
+    assert tf.read_finger(numbers) == finger
     assert (finger.name, finger.joints, finger.tendons) == ("two_joints", 2, 4)
-
-
-def test_a_dictionary_may_hold_numbers_of_numpy(finger: tf.Finger) -> None:
-    data = finger.to_dict()
-    data["tendons"][0]["moment_arms"] = np.array(data["tendons"][0]["moment_arms"])
-    data["tendons"][0]["stiffness"] = np.float64(data["tendons"][0]["stiffness"])
-    assert tf.read_finger(data) == finger
 
 
 @pytest.mark.parametrize(
@@ -70,15 +70,6 @@ def test_what_is_no_finger_is_refused(source: Any, words: str) -> None:
     with pytest.raises(tf.InputError) as refused:
         tf.read_finger(source)
     assert words in str(refused.value) and "\n" not in str(refused.value)
-
-
-def test_a_finger_cannot_be_changed(finger: tf.Finger) -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        finger.text = b""  # type: ignore[misc]
-    copied = finger.to_dict()
-    copied["name"] = "another"
-    copied["tendons"].clear()
-    assert (finger.name, finger.tendons) == ("two_joints", 4)
 
 
 def test_other_data_make_another_image_and_text(finger: tf.Finger) -> None:
@@ -122,13 +113,10 @@ def test_replace_makes_another_finger(finger: tf.Finger, tmp_path: Path) -> None
     ("values", "words"),
     [
         ({"tendons[9].stiffness": 1.0}, "tendons[9]: no such path; expected 1 to 4"),
-        ({"tendons[1].stiffnes": 1.0}, "tendons[1].stiffnes: unknown key; expected one of"),
         ({"tendons[1].stiffness": -1.0}, "tendons[1].stiffness = -1: expected above 0"),
         ({"tendons[1].stiffness": float("nan")}, "json: tendons[1].stiffness = nan: expected a finite number"),
-        ({"name[1]": 2.0}, "name[1]: no such path; name is no list"),
         ({"tendons[0].stiffness": 1.0}, "'tendons[0].stiffness': expected a path such as"),
         ({"": 1.0}, "'': expected a path such as"),
-        ({"contact.threshold[1]": "high"}, "contact.threshold[1]"),
         ({"joints[1].cover.rest_angle": 0.1}, "joints[1].cover.stiffness"),
     ],
 )
@@ -156,16 +144,6 @@ def test_a_recording_becomes_a_frame_and_comes_back(recording: tf.Recording, tmp
     pd.testing.assert_frame_equal(tf.read_recording(tmp_path / "again.csv").frame, frame, check_exact=True)
 
 
-def test_arrays_are_not_copied() -> None:
-    time, force = np.arange(3.0), np.ones((4, 3)).T  # of Fortran's order
-    position, label = np.zeros((3, 4)), [0, 1, 1]
-    found = tf.Recording.from_arrays(time, tendon_force=force, tendon_position=position, contact=label)
-    assert np.shares_memory(found.time, time) and np.shares_memory(found.groups["tendon_position"], position)
-    assert np.shares_memory(found.groups["tendon_force"], force)
-    assert found.contact is not None and found.contact.tolist() == [False, True, True]
-    assert found.frame["contact"].tolist() == [0, 1, 1]
-
-
 SMALL = {"time": [0.0, 0.1], "tendon_force[1]": [1.0, 2.0], "tendon_position[1]": [0.0, 0.1]}
 
 
@@ -175,9 +153,7 @@ SMALL = {"time": [0.0, 0.1], "tendon_force[1]": [1.0, 2.0], "tendon_position[1]"
         {"time": [0.0, 0.0]},
         {"tendon_force[1]": [1.0, np.nan]},
         {"tendon_force[2]": [1.0, 2.0]},
-        {"tendon_force_1": [1.0, 2.0]},
         {"contact": [0.0, 0.5]},
-        {"time": None},
     ],
 )
 def test_a_frame_is_refused_with_the_words_of_a_file(changed: dict[str, Any], tmp_path: Path) -> None:
@@ -202,7 +178,6 @@ def test_a_frame_is_refused_with_the_words_of_a_file(changed: dict[str, Any], tm
         ),
         ({"time": pd.to_timedelta([0, 1], unit="s")}, "such as df['time'].dt.total_seconds()"),
         ({"tendon_force[1]": ["1,5", "2,5"]}, "column tendon_force[1], row 1: '1,5'; expected a finite number"),
-        ({"tendon_force[1]": [True, False]}, "column tendon_force[1], row 1: bool values; expected numbers"),
         ({"tendon_force[1]": pd.array([1, None], dtype="Int64")}, "column tendon_force[1], row 2: nan; expected"),
     ],
 )
@@ -231,15 +206,12 @@ def test_a_frame_may_have_numbers_of_any_kind() -> None:
         ({"tendon_force": np.ones((2, 2))}, "arrays: tendon_force: 2 rows; expected 3 as of time"),
         ({"tendon_force": np.ones((3, 1))}, "2 columns tendon_position[...], expected 1 as of tendon_force[...]"),
         ({"tendon_force": np.full((3, 2), np.nan)}, "column tendon_force[1], row 1: nan; expected a finite number"),
-        ({"tendon_force": [["a", "b"]] * 3}, "values; expected numbers [N, m]"),
         ({"time": [0.0, 2.0, 1.0]}, "column time, row 3: 1.0 s after 2.0 s; expected increasing times"),
-        ({"time": [np.nan, 2.0, 3.0]}, "column time, row 1: nan"),
         ({"time": np.ma.masked_equal([0.0, 1.0, 2.0], 1.0)}, "arrays: time: masked in row 2; expected numbers [N]"),
         (
             {"tendon_force": np.ma.masked_equal([[1.0, 2.0]] * 2 + [[3.0, 9.0]], 9.0)},
             "arrays: tendon_force: masked in row 3; expected numbers [N, m]",
         ),
-        ({"contact": [0, 1, 2]}, "column contact, row 3: 2; expected 0 or 1"),
         ({"joint_position": np.zeros((3, 0))}, "joint_position: no columns; expected one per joint"),
         ({"time": [], "tendon_force": np.ones((0, 2)), "tendon_position": np.ones((0, 2))}, "no samples"),
     ],
@@ -249,18 +221,6 @@ def test_arrays_are_checked(changed: dict[str, Any], words: str) -> None:
     with pytest.raises(tf.InputError) as refused:
         tf.Recording.from_arrays(**given)
     assert words in str(refused.value)
-
-
-@pytest.mark.parametrize("source", [3, None, {"time": [0.0]}])
-def test_what_is_no_recording_is_refused(source: Any) -> None:
-    with pytest.raises(tf.InputError, match="expected a path, a DataFrame or a Recording"):
-        tf.read_recording(source)
-
-
-def test_a_dictionary_of_columns_is_no_recording() -> None:
-    for function in (tf.run, tf.fit):
-        with pytest.raises(tf.InputError, match=r"dict; expected .*, such as Recording\.from_frame\(pd\.DataFrame"):
-            function(FINGER, SMALL)  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(
@@ -281,17 +241,6 @@ def test_a_time_in_the_index_is_refused_with_a_way_that_works(index: Any, way: s
     assert str(refused.value).startswith("DataFrame: no column time, only an index (")
     assert str(refused.value).endswith(f"expected a column in s, such as {way}")
     assert tf.Recording.from_frame(eval(way, {"df": df})).time[0] == 0.0
-
-
-@pytest.mark.parametrize("function", [tf.fit, tf.tune, tf.score, tf.diagnose])
-def test_messages_name_the_place_in_a_list(function: Any) -> None:
-    good, bad = pd.DataFrame(SMALL), pd.DataFrame({**SMALL, "time": [0.0, 0.0]})
-    with pytest.raises(tf.InputError, match=r"^DataFrame 2: column time, row 2"):
-        function(FINGER, [good, bad])
-    with pytest.raises(tf.InputError, match=r"^DataFrame: column time, row 2"):
-        function(FINGER, [bad])
-    with pytest.raises(tf.InputError, match=r"^recordings\[2\]: int; expected a path, a DataFrame or a Recording$"):
-        function(FINGER, [good, 3])
 
 
 def test_messages_name_the_list() -> None:
@@ -327,32 +276,3 @@ def test_tendons_and_joints_may_be_named(finger: tf.Finger, recording: tf.Record
         finger.replace({"tendons[nobody].stiffness": 5000.0})
     fitted = tf.fit(finger, recording[:5.0], only=f"joints[{joint}].friction.coulomb")
     assert list(fitted.parameters.index) == ["joints[2].friction.coulomb"]
-
-
-def test_a_check_speaks_of_the_recording_in_memory(finger: tf.Finger, recording: tf.Recording) -> None:
-    assert tf.check(finger, recording).belongs and not tf.check(finger).findings
-    frame = recording.frame
-    frame["tendon_position[2]"] *= -1.0
-    wrong = tf.check(finger, frame)
-    assert not wrong.belongs and "tendon_position[2]" in wrong._repr_html_()
-    assert "correct it in memory: tendon_position[2]: times -1" in repr(wrong) and "map" not in repr(wrong)
-
-
-def test_a_log_is_converted_by_a_map(recording: tf.Recording, tmp_path: Path) -> None:
-    frame = recording.frame.rename(columns={"tendon_force[1]": "F 1"})
-    frame["F 1"] *= 1e3
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    units = {"time": "s", "tendon_force": "N", "tendon_position": "m"}
-    columns = {
-        name: {"column": name, "unit": units[name.split("[")[0]]}
-        for name in recording.frame.columns
-        if name != "tendon_force[1]"
-    }
-    columns["tendon_force[1]"] = {"column": "F 1", "unit": "mN"}
-    given = {"format": "tendonfmu-map-1", "columns": columns}
-    converted = tf.convert(tmp_path / "log.csv", given)
-    np.testing.assert_allclose(converted["tendon_force[1]"], recording["tendon_force[1]"], rtol=1e-12)
-    with pytest.raises(tf.InputError, match="F 2"):
-        tf.convert(
-            tmp_path / "log.csv", {**given, "columns": {**columns, "tendon_force[1]": {"column": "F 2", "unit": "N"}}}
-        )

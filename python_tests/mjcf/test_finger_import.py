@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ require("mujoco")
 
 import mujoco
 
-from command import Answer, Call
+from command import Call
 from mjcf_models import ARMS, BOWSTRING, fixed_model
 from tendonfmu.mjcf.finger_import import ImportedFinger, ImportSettings, import_finger
 
@@ -156,109 +158,97 @@ def test_links_place_the_tip_where_mujoco_has_it(tmp_path: Path) -> None:
     assert np.allclose(place + turned @ np.array(finger.data["tip"]), data.site("tip").xpos, atol=1e-12)
 
 
-def test_passive_springs_and_loops_on_request(tmp_path: Path) -> None:
-    finger = imported(tmp_path, fixed_model(), tendons=["spring", "deep"], bidirectional=["deep"], stiffness=900.0)
-    spring, deep = finger.data["tendons"]
-    assert spring["stiffness"] == 50.0 and spring["moment_arms"] == [0.0, -0.004] and "bidirectional" not in spring
-    assert deep["bidirectional"] and deep["stiffness"] == 4000.0
-    bow = imported(tmp_path, BOWSTRING, joints=["hinge"])
-    assert [tendon["stiffness"] for tendon in bow.data["tendons"]] == [1e9, 1e9]
-    soft = imported(tmp_path, BOWSTRING, joints=["hinge"], stiffness=900.0)
-    assert [tendon["stiffness"] for tendon in soft.data["tendons"]] == [900.0, 900.0]
+def no_friction(text: str) -> str:
+    return text.replace('damping="0.002" frictionloss="0.006"', "")
 
 
-def test_friction_that_the_model_does_not_have_is_noted(tmp_path: Path) -> None:
-    text = fixed_model().replace('damping="0.002" frictionloss="0.006"', "")
-    finger = imported(tmp_path, text.replace('frictionloss="0.004"', 'damping="0.003"'))
-    assert "friction" not in finger.data["joints"][0]
-    law = finger.data["joints"][1]["friction"]
-    assert (law["coulomb"], law["viscous"]) == (0.0, 0.003)
-    notes = "\n".join(finger.notes)
-    assert "joint mcp: neither frictionloss nor damping" in notes
-    assert "joint pip: damping without frictionloss" in notes
+def damping_alone(text: str) -> str:
+    return no_friction(text).replace('frictionloss="0.004"', 'damping="0.003"')
 
 
-def test_coefficients_that_are_no_lengths_are_warned_of(tmp_path: Path) -> None:
-    """As of hands whose fixed tendons couple joints with coefficients of 1."""
-    text = fixed_model().replace('coef="-0.009"', 'coef="1"').replace('coef="-0.006"', 'coef="1"')
-    (warning,) = imported(tmp_path, text).warnings
-    assert "tendon deep: a fixed tendon with coefficients up to 1" in warning
+def coefficients_of_1(text: str) -> str:
+    """As of hands whose fixed tendons couple joints."""
+    return text.replace('coef="-0.009"', 'coef="1"').replace('coef="-0.006"', 'coef="1"')
 
 
-def test_weight_that_the_rows_cannot_hold_is_warned_of(tmp_path: Path) -> None:
-    """Axes at right angles, taken as parallel without links."""
-    text = fixed_model(gravity=-9.81).replace('<joint name="pip"', '<joint name="pip" axis="1 0 0"')
-    crossed = imported(tmp_path, text.replace('pos="0.015 0 0"', 'pos="0.015 0.02 0"'), gravity=True)
-    assert any("gravity: the rows miss up to" in warning and "--tip" in warning for warning in crossed.warnings)
+def crossed_axes(text: str) -> str:
+    """At right angles, taken as parallel without links."""
+    crossed = text.replace('<joint name="pip"', '<joint name="pip" axis="1 0 0"')
+    return crossed.replace('pos="0.015 0 0"', 'pos="0.015 0.02 0"')
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (no_friction, "joint mcp: neither frictionloss nor damping"),
+        (damping_alone, "joint pip: damping without frictionloss"),
+        (coefficients_of_1, "tendon deep: a fixed tendon with coefficients up to 1"),
+        (crossed_axes, "gravity: the rows miss up to"),
+    ],
+)
+def test_what_model_and_description_do_not_share_is_said(
+    tmp_path: Path, change: Callable[[str], str], words: str
+) -> None:
+    found = imported(tmp_path, change(fixed_model(gravity=-9.81)), gravity=True)
+    assert words in "\n".join([*found.notes, *found.warnings])
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
 def test_the_command_writes_a_finger_that_check_accepts(tmp_path: Path, call: Call) -> None:
-    model, output = written(tmp_path, fixed_model(gravity=-9.81)), tmp_path / "finger.json"
-    answer = call("import", "mjcf", str(model), "--joints", "mcp,pip", "--tip", "tip", "--gravity", "-o", str(output))
-    assert answer.status == 0 and answer.out == ""
-    assert "left out: joint mcp, pip: limits" in answer.err and "2 joints, 4 tendons" in answer.err
-    assert call("check", str(output)).status == 0
-    assert json.loads(output.read_text())["name"] == "pair"
+    written(tmp_path, fixed_model(gravity=-9.81))
+    options = ("--joints", "mcp,pip", "--tip", "tip", "--gravity", "-o", "finger.json")
+    answer = call("import", "mjcf", "model.xml", *options)
+    assert answer.status == 0 and answer.out == "" and "left out: joint mcp, pip: limits" in answer.err
+    assert call("check", "finger.json").status == 0
+    assert json.loads(Path("finger.json").read_text())["name"] == "pair"
+    written(tmp_path, BOWSTRING)
+    assert call("import", "mjcf", "model.xml", "-o", "bow.json").status == 0  # the only chain needs no names
 
 
-def test_the_only_chain_needs_no_names(tmp_path: Path) -> None:
-    assert imported(tmp_path, BOWSTRING, joints=()).data["joints"][0]["name"] == "hinge"
+def without_motors(text: str) -> str:
+    return re.sub("<actuator>.*</actuator>", "", text, flags=re.DOTALL)
+
+
+def misspelt(text: str) -> str:
+    return text.replace('stiffness="0.02"', 'stifness="0.02"')
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--joints", "mcp,ring"], ["joint ring", "it has mcp, pip, thumb"]),
-        (["--joints", "pip,mcp"], ["joint mcp", "carries joint pip", "base first"]),
-        (["--joints", "mcp,thumb"], ["joint thumb", "not carried by joint mcp"]),
-        (["--joints", "mcp,mcp"], ["joint mcp", "twice"]),
-        (["--joints", "thrown"], ["joint thrown", "free", "hinge"]),
-        (["--joints", "shoulder"], ["joint shoulder", "ball", "hinge"]),
-        ([], ["2 chains of joints: mcp,pip; thumb", "--joints"]),
-        (["--joints", "mcp,pip", "--tendons", "deep,elsewhere"], ["tendon elsewhere", "none of the joints mcp, pip"]),
-        (["--joints", "mcp,pip", "--tendons", "deep,nerve"], ["tendon nerve", "it has deep"]),
-        (["--joints", "mcp,pip", "--tendons", "short,back"], ["joint pip", "none of the tendons"]),
-        (["--joints", "mcp,pip", "--tendons", "deep"], ["column rank", "moment_arms"]),
-        (["--joints", "slider"], ["no tendon", "slider"]),
-        (["--joints", "mcp,pip", "--bidirectional", "spring"], ["--bidirectional spring"]),
-        (["--joints", "mcp,pip", "--tip", "nail"], ["nail", "no site, geom or body"]),
-        (["--joints", "mcp,pip", "--tip", "first"], ["first", "beyond joint pip"]),
-        (["--joints", "mcp,pip", "--range", "mcp=1"], ["--range mcp=1", "JOINT=LOW:HIGH"]),
-        (["--joints", "mcp,pip", "--range", "mcp=1:0"], ["--range mcp=1:0", "LOW below HIGH"]),
-        (["--joints", "mcp,pip", "--range", "ring=0:1"], ["--range ring", "mcp, pip"]),
+        ("--joints mcp,ring", ["joint ring", "it has mcp, pip, thumb"]),
+        ("--joints pip,mcp", ["joint mcp", "carries joint pip", "base first"]),
+        ("--joints mcp,thumb", ["joint thumb", "not carried by joint mcp"]),
+        ("--joints mcp,mcp", ["joint mcp", "twice"]),
+        ("--joints thrown", ["joint thrown", "free", "hinge"]),
+        ("--joints shoulder", ["joint shoulder", "ball", "hinge"]),
+        ("", ["2 chains of joints: mcp,pip; thumb", "--joints"]),
+        ("--joints mcp,pip --tendons deep,elsewhere", ["tendon elsewhere", "none of the joints mcp, pip"]),
+        ("--joints mcp,pip --tendons deep,nerve", ["tendon nerve", "it has deep"]),
+        ("--joints mcp,pip --tendons short,back", ["joint pip", "none of the tendons"]),
+        ("--joints mcp,pip --tendons deep", ["column rank", "moment_arms"]),
+        ("--joints slider", ["no tendon", "slider"]),
+        ("--joints mcp,pip --bidirectional spring", ["--bidirectional spring"]),
+        ("--joints mcp,pip --tip nail", ["nail", "no site, geom or body"]),
+        ("--joints mcp,pip --tip first", ["first", "beyond joint pip"]),
+        ("--joints mcp,pip --range mcp=1:0", ["--range mcp=1:0", "LOW below HIGH"]),
+        ("--joints mcp,pip --range ring=0:1", ["--range ring", "mcp, pip"]),
+        (without_motors, ["model.xml: ", " tendons, none with an actuator or a motor on a slide"]),
+        (misspelt, ["model.xml", "MuJoCo refuses", "stifness"]),
+        (None, ["pip install mujoco"]),
     ],
 )
-def test_refusals_name_what_is_wrong(tmp_path: Path, call: Call, options: list[str], words: list[str]) -> None:
-    model, output = written(tmp_path, fixed_model()), tmp_path / "finger.json"
-    line = refused(call("import", "mjcf", str(model), *options, "-o", str(output)))
-    assert all(word in line for word in words), line
-    assert not output.exists()
-
-
-def test_a_model_whose_motors_are_at_the_joints_is_refused_as_such(tmp_path: Path, call: Call) -> None:
-    text = re.sub("<actuator>.*</actuator>", "", fixed_model(), flags=re.DOTALL)
-    line = refused(call("import", "mjcf", str(written(tmp_path, text)), "-o", str(tmp_path / "f.json")))
-    assert re.search(r"model.xml: \d+ tendons, none with an actuator or a motor on a slide; expected tendons", line)
-
-
-def refused(answer: Answer) -> str:
-    assert answer.status == 2 and answer.out == "" and len(answer.err.splitlines()) == 1, answer
-    return answer.err
-
-
-def test_a_model_that_does_not_compile_is_refused_with_mujoco_s_text(tmp_path: Path, call: Call) -> None:
-    model = written(tmp_path, fixed_model().replace('stiffness="0.02"', 'stifness="0.02"'))
-    line = refused(call("import", "mjcf", str(model), "--joints", "mcp", "-o", str(tmp_path / "f.json")))
-    assert "model.xml" in line and "MuJoCo refuses" in line and "stifness" in line
-    line = refused(call("import", "mjcf", str(tmp_path / "no.xml"), "--joints", "mcp", "-o", str(tmp_path / "f.json")))
-    assert "no such file" in line
-
-
-def test_without_mujoco_the_package_is_named(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
-    model = written(tmp_path, fixed_model())
-    line = refused(call("import", "mjcf", str(model), "--joints", "mcp", "-o", str(tmp_path / "f.json")))
-    assert "pip install mujoco" in line
+def test_refusals_name_what_is_wrong(
+    tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch, options: Any, words: list[str]
+) -> None:
+    """options: of the command; or a change of the model; or None where MuJoCo is not installed."""
+    written(tmp_path, options(fixed_model()) if callable(options) else fixed_model())
+    if options is None:
+        monkeypatch.setitem(sys.modules, "mujoco", None)
+    chosen = options.split() if isinstance(options, str) else [] if options is without_motors else ["--joints", "mcp"]
+    answer = call("import", "mjcf", "model.xml", *chosen, "-o", "finger.json")
+    assert answer.status == 2 and answer.out == "" and answer.err.count("\n") == 1, answer
+    assert all(word in answer.err for word in words), answer.err
+    assert not Path("finger.json").exists()

@@ -32,18 +32,9 @@ int main(int count, char** arguments) {
   return 0;
 }
 """
-FLAGS = [
-    "-ffast-math",
-    "-Ofast",
-    "-funsafe-math-optimizations",
-    "-fassociative-math",
-    "-fassociative-math -fno-signed-zeros -fno-trapping-math",
-    "-freciprocal-math",
-    "-ffinite-math-only",
-    "-fno-signed-zeros",
-    "-ffp-contract=fast",
-]
-SEEN_BY_ALL = ["-ffast-math", "-Ofast", "-ffinite-math-only"]  # clang has macros for no more
+REORDERS = "-fassociative-math -fno-signed-zeros -fno-trapping-math"
+FLAGS = ["-ffast-math", "-Ofast", "-ffinite-math-only", "-freciprocal-math", REORDERS, "-ffp-contract=fast"]
+SEEN_BY_ALL = FLAGS[:3]  # clang has macros for no more
 
 
 def compilers() -> list[str]:
@@ -65,7 +56,7 @@ def exponentials(compiler: str, flags: str, folder: Path) -> str | None:
 
 
 @pytest.mark.parametrize("compiler", compilers())
-@pytest.mark.parametrize("flags", repeated(FLAGS, 0, 3, 8))
+@pytest.mark.parametrize("flags", repeated(FLAGS, 0, 4, 5))
 def test_no_flag_gives_other_exponentials(compiler: str, flags: str, tmp_path: Path) -> None:
     plain, other = exponentials(compiler, "", tmp_path), exponentials(compiler, flags, tmp_path)
     assert plain is not None and plain.count("\n") == 2000

@@ -22,7 +22,6 @@ from fmu_binary import FINGER
 from random_extensions import random_extensions
 from random_fingers import random_case
 from repetitions import repeated
-from repository_paths import ROOT
 from tendonfmu.fmu.model_variables import describe_model, read_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
@@ -30,7 +29,6 @@ from tendonfmu.model.output_dependencies import Dependencies, dependencies, stru
 from tendonfmu.model.output_names import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
-INDEX_FINGER = ROOT / "examples" / "fingers" / "index_finger.json"
 
 Influence = set[tuple[str, int, str, int]]  # output, element, input, element; 0-based
 Sample = dict[str, Any]
@@ -109,13 +107,13 @@ def nothing_undeclared_influences(
     assert len(seen) > 0.25 * len(allowed)
 
 
-@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 3)))
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 6)))
 def test_nothing_undeclared_influences(seed: int, tmp_path: Path) -> None:
     description, recording = random_case(seed, samples=160)
     nothing_undeclared_influences(with_extension(description, seed), recording, (1, 40, 80, 120, 159), tmp_path)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", repeated(range(12), *range(0, 12, 3)))
 def test_nothing_undeclared_influences_with_extensions(seed: int, tmp_path: Path) -> None:
     description, recording = random_case(seed, samples=100)
     joints, tendons = len(description["joints"]), len(description["tendons"])
@@ -184,7 +182,7 @@ def slopes(finger: Instance, recording: Sample) -> Influence:
     return found
 
 
-@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 3)))
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 6)))
 def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
     description = with_extension(random_case(seed)[0], seed)
     recording = lively_recording(description, seed)
@@ -197,28 +195,7 @@ def test_each_declared_number_influences(seed: int, tmp_path: Path) -> None:
     assert seen == wanted
 
 
-def test_contact_depends_as_the_torques_do(tmp_path: Path) -> None:
-    """Its decision compares the compensated torque; that the mean force enters the threshold adds nothing to it."""
-    for seed in SEEDS:
-        found = declared(random_case(seed)[0], tmp_path)
-        assert found["joint_contact"] == found["compensated_torque"]
-        for name in INPUTS:
-            together = {i for element in found["compensated_torque"] for i in element[name]}
-            assert set(found["contact"][0][name]) == together
-
-
 # --- one finger by hand -----------------------------------------------------------------------------------------------
-
-
-def test_index_finger_torques_follow_the_routing() -> None:
-    found = dependencies(structure_of(read_finger(INDEX_FINGER)))
-    passing = [element["tendon_force"] for element in found["joint_torque"]]
-    assert passing == [list(range(8)), list(range(8)), [4, 5, 6, 7], [6, 7]]
-    for k in range(4):
-        assert found["joint_speed"][k]["joint_velocity"] == [k]
-        assert found["joint_angle"][k]["joint_position"] == [k]
-        assert found["joint_angle"][k]["joint_velocity"] == []
-        assert found["friction_torque"][k]["tendon_force"] == list(range(8))
 
 
 def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path) -> None:
@@ -235,7 +212,7 @@ def test_a_rigid_finger_without_friction_depends_on_forces_alone(tmp_path: Path)
     assert found["slack"][1] == {**only_forces, "tendon_force": [1]}
 
 
-# --- extensions ------------------------------------------------------------------------------------------------------
+# --- extensions -------------------------------------------------------------------------------------------------------
 
 
 def bare(row: dict[str, Any]) -> dict[str, Any]:
@@ -287,17 +264,3 @@ def test_a_delay_leaves_no_fixed_factor(tmp_path: Path) -> None:
     plain, late = described(others, tmp_path), described(ROWS, tmp_path)
     assert "fixed" in {kind for output in plain["outputs"] for kind in output["kinds"]}
     assert {kind for output in late["outputs"] for kind in output["kinds"]} == {"dependent"}
-
-
-def test_numbers_say_of_which_effect_they_are(tmp_path: Path) -> None:
-    found = {variable["name"]: variable for variable in described(ROWS, tmp_path)["variables"]}
-    numbers = {name: found[name] for name in found if name.startswith("extensions[")}
-    assert len(numbers) == 46
-    assert (
-        numbers["extensions[11].coulomb"]["description"]
-        == "Extension 11: coulomb, of load_friction at joint 2, tendon 1"
-    )
-    assert numbers["extensions[26].delay"]["description"] == "Extension 26: delay, of time_delay"
-    for number in numbers.values():
-        assert number["variability"] == "tunable" and number["causality"] == "parameter"
-    assert {numbers[f"extensions[{k}].displacement"]["unit"] for k in (18, 19, 29)} == {"rad", "m", "s"}

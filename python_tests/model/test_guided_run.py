@@ -60,33 +60,23 @@ def test_agrees_with_the_oracle(seeds: range) -> None:
     assert late and open_starts
 
 
-@pytest.mark.parametrize("seed", FINGERS[:8])
-def test_what_may_all_be_learned_from_is_an_ordinary_run_without_contact(seed: int) -> None:
-    description, recording = random_case(seed, SAMPLES, detection=True)
-    free = without_detection(description)
-    plain = native.Instance.from_description(free, 3).run(recording)
-    guided = native.Instance.from_description(free, 3).run_guided(recording, np.ones(SAMPLES, dtype=bool), None)
-    for name, values in plain.items():
-        np.testing.assert_array_equal(guided[name], values, err_msg=name)
-
-
-@pytest.mark.parametrize("seed", FINGERS[:8])
+@pytest.mark.parametrize("seed", FINGERS[:4])
 def test_contact_has_no_say(seed: int) -> None:
-    """Whatever the description detects, r is that of a description that detects nothing."""
+    """Whatever the description detects; with all to learn from it is an ordinary run of one that detects nothing."""
     description, recording = random_case(seed, SAMPLES, detection=True)
-    learns, known = guidance(seed, len(description["joints"]))
-    detecting = {**description, "sensor_fault": None}
-    runs = [
-        native.Instance.from_description(data, 3).run_guided(recording, learns, known)
-        for data in (detecting, without_detection(description))
-    ]
-    assert native.run_recording(detecting, recording, 3)["contact"].any()  # though there is some
-    assert not runs[0]["contact"].any()
-    for name in ("residual", "residual_variance", "bias_torque", "friction_torque"):
-        np.testing.assert_array_equal(runs[0][name], runs[1][name], err_msg=name)
+    detecting, free = {**description, "sensor_fault": None}, without_detection(description)
+    for learns, known in (guidance(seed, len(description["joints"])), (np.ones(SAMPLES, dtype=bool), None)):
+        runs = [
+            native.Instance.from_description(data, 3).run_guided(recording, learns, known) for data in (detecting, free)
+        ]
+        assert not runs[0]["contact"].any()
+        for name in ("residual", "residual_variance", "bias_torque", "friction_torque"):
+            np.testing.assert_array_equal(runs[0][name], runs[1][name], err_msg=name)
+    for name, values in native.Instance.from_description(free, 3).run(recording).items():
+        np.testing.assert_array_equal(runs[1][name], values, err_msg=name)
 
 
-@pytest.mark.parametrize("seed", [601, 604, 607])
+@pytest.mark.parametrize("seed", [601, 604])
 def test_each_part_begins_anew(seed: int) -> None:
     description, recording = random_case(seed, SAMPLES, detection=True, extensions=True)
     learns, known = guidance(seed, len(description["joints"]))

@@ -87,12 +87,6 @@ def test_find_package_gives_the_libraries(prefix: Path, tmp_path: Path) -> None:
         assert not has(prefix, part) or call(tmp_path / part) == printed
 
 
-def test_find_package_refuses_a_newer_version(prefix: Path, tmp_path: Path) -> None:
-    configured = configure(prefix, tmp_path, "999.0")
-    assert configured.returncode != 0
-    assert 'requested version "999.0"' in " ".join(configured.stderr.split())
-
-
 def flags_of(prefix: Path, *modules: str) -> list[str]:
     search = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
     for module in modules:
@@ -183,16 +177,6 @@ def control_loop(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return build / "control_loop"
 
 
-@pytest.mark.long
-def test_the_ros2_example_is_built_and_tested_without_ros(prefix: Path, tmp_path: Path) -> None:
-    """Where ROS 2 is sourced, the node is built as well."""
-    source = ROOT / "examples" / "ros2_contact_node"
-    flags = "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror"
-    call("cmake", "-G", "Ninja", "-S", source, "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", flags)
-    call("cmake", "--build", tmp_path)
-    assert "100% tests passed" in call("ctest", "--test-dir", tmp_path, "--no-tests=error")
-
-
 def contacts(lines: str) -> tuple[list[float], list[float]]:
     """Times at which contact begins, and at which it ends."""
     found = [line.split() for line in lines.splitlines()]
@@ -213,29 +197,3 @@ def test_control_loop_of_the_examples_feels_the_pushes_of_the_demo_recording(
     begins, _ = contacts(call(control_loop, calibrated, "--recording", tmp_path / "pushes.csv", "--no-wait"))
     assert len(begins) == len(onsets) == 11
     assert all(0.0 <= begin - onset < 0.5 for begin, onset in zip(begins, onsets, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("changed", "status", "said"),
-    [
-        (("tendon_force[2]", 3, float("nan")), 1, "0.006 s  refused: tendon_force[2]"),
-        (("time", 3, 0.001), 1, "0.001 s  refused: time = 0.001 s: expected a finite number"),
-        (("tendon_position[8]", 3, "fast"), 2, 'row 4, column 17: "fast": expected a number'),
-        (("tendon_force[8]", None, None), 2, "no column tendon_force[8]"),
-    ],
-)
-def test_control_loop_of_the_examples_says_what_it_refuses(
-    control_loop: Path, tmp_path: Path, changed: tuple[str, int | None, object], status: int, said: str
-) -> None:
-    recorded = pd.read_parquet(ROOT / "examples" / "demo_recording" / "index_finger_pushes.parquet").head(10)
-    column, row, value = changed
-    if row is None:
-        recorded = recorded.drop(columns=column)
-    else:
-        recorded[column] = recorded[column].astype(object)
-        recorded.loc[row, column] = value
-    recorded.to_csv(tmp_path / "damaged.csv", index=False, na_rep="nan")
-    command = [control_loop, FINGER, "--recording", tmp_path / "damaged.csv", "--no-wait"]
-    result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
-    assert result.returncode == status
-    assert said in result.stdout + result.stderr

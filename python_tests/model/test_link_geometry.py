@@ -20,7 +20,7 @@ from tendonfmu.fmu.fmpy_client import run_fmu
 from tendonfmu.fmu.model_variables import read_table
 from tendonfmu.fmu.packaging import build_fmu, package_file
 from tendonfmu.model.description import read_finger
-from tendonfmu.model.native import Instance, NativeError, image_from_json
+from tendonfmu.model.native import Instance
 from tendonfmu.model.output_names import PLACE
 from tendonfmu.recordings.recording import read_recording
 
@@ -160,42 +160,6 @@ def test_what_torques_cannot_tell(
 ) -> None:
     out = held(spatial_finger(SADDLE, [0.022, 0, 0]), np.array(angle), np.array(torque))
     assert (bool(out["fingertip_force_observable"]), int(out["contact_link"])) == (observable, link), what
-
-
-def test_torques_that_no_force_at_the_tip_makes_are_contradicted() -> None:
-    out = held(spatial_finger(SADDLE, [0.022, 0, 0]), np.array([0.2, 0.6, 0.9, 0.5]), np.array([0.0, 0.0, 0.06, -0.06]))
-    assert out["fingertip_force_misfit"] > 100.0
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"tip": None}, "tip: missing; expected a list of 3 numbers in m"),
-        ({"links": None}, "tip: not allowed without links"),
-        ({"links": SADDLE[:3]}, "links has 3 elements: expected a list of 4 links"),
-        ({"links": [{"axis": [0, 0, 0]}, *SADDLE[1:]]}, r"links\[1\].axis\[1\] = 0: expected an axis .* not all 0"),
-        ({"links": [{"axes": [0, 0, 1]}, *SADDLE[1:]]}, r"links\[1\].axes: unknown key"),
-        ({"tip": [0.0, 0.0, 22.0]}, r"tip\[3\] = 22: expected -10 to 10 m"),
-    ],
-)
-def test_what_cannot_be_is_refused(change: dict[str, Any], said: str) -> None:
-    with pytest.raises(NativeError, match=said):
-        image_from_json(json.dumps(spatial_finger(SADDLE, [0.022, 0, 0]) | change))
-
-
-def test_saved_states_hold_nothing_of_it() -> None:
-    plain, recording = random_case(3, samples=120)
-    finger = Instance.from_description(with_links(plain, 3), 2)
-    halves = [{name: values[part] for name, values in recording.items()} for part in (slice(0, 60), slice(60, 120))]
-    finger.run(halves[0])
-    state = finger.save_state()
-    first = finger.run(halves[1])
-    finger.restore_state(state)
-    again = finger.run(halves[1])
-    assert all(np.array_equal(first[name], again[name]) for name in first)
-    numbers = 6 * len(plain["joints"]) + 3  # the parameters in it, and no more
-    bare = Instance.from_description({k: v for k, v in with_links(plain, 3).items() if k not in ("links", "tip")})
-    assert len(state) == len(bare.save_state()) + 8 * numbers
 
 
 def test_the_fmu_has_the_outputs_where_there_are_links(tmp_path: Path) -> None:

@@ -10,9 +10,8 @@ import pytest
 
 import analytic_extension_cases  # noqa: F401  adds cases
 import analytic_force_cases  # noqa: F401
-import oracle
 from analytic_cases import CASES, DRY, finger, one_edge, recording
-from random_fingers import random_case, random_law, random_moment_arms
+from random_fingers import random_law, random_moment_arms
 from repetitions import repeated
 from runners import RUNNERS, SLOW, Runner
 
@@ -87,26 +86,6 @@ def test_friction_never_drives(runner: Runner, seed: int) -> None:
     assert (power > 0.0).all()
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_pulley_friction_takes_power_out_where_the_tendon_keeps_its_direction(runner: Runner, seed: int) -> None:
-    """Eq. (10) lets F_A(ẋ_{j+1}) act on joint j too, so its power is f_B·F_A(ẋ_{j+1})·ẋ_j.
-
-    It is positive where ẋ_j and ẋ_{j+1} have one sign; where they differ, the paper's equation may drive.
-    """
-    rng = np.random.default_rng([seed, 5])
-    arms = rng.uniform(0.004, 0.01, 3)
-    law = random_law(rng, 0.1, 0.005)
-    tendons = [
-        {"moment_arms": arms.tolist(), "pulley_friction": [law, law]},
-        {"moment_arms": [0.0, 0.01, 0.0]},
-        {"moment_arms": [0.0, 0.0, 0.01]},
-    ]
-    speed = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0, 3)
-    out = runner(finger(tendons, 3), recording([0.0, 0.1], 10.0, speed, tendons=3, joints=3), 3)
-    power = (out["friction_torque"] - out["bias_torque"]) @ speed
-    assert (power > 0.0).all()
-
-
 def test_defaults_are_those_of_the_contract(runner: Runner) -> None:
     """A finger with the required keys only equals one with every default written out."""
     short: dict[str, Any] = {
@@ -142,15 +121,3 @@ def test_defaults_are_those_of_the_contract(runner: Runner) -> None:
     assert runs[0]["contact"].any()
     for name, series in runs[0].items():
         np.testing.assert_array_equal(series, runs[1][name], err_msg=name)
-
-
-def test_a_run_is_the_same_sample_by_sample() -> None:
-    """A copied oracle continues as the original: nothing is remembered outside the object."""
-    description, inputs = random_case(3, samples=60)
-    whole = oracle.run(description, inputs, 1).outputs
-    finger_oracle = oracle.FingerOracle(description, 1)
-    for k, time in enumerate(inputs["time"]):
-        finger_oracle = copy.deepcopy(finger_oracle)
-        step = finger_oracle.step(time, {name: inputs[name][k] for name in oracle.INPUTS})
-        for name, series in whole.items():
-            np.testing.assert_array_equal(step.values[name], series[k])

@@ -1,9 +1,11 @@
-"""The random fingers take every branch of docs/reference/semantics.md; every runner agrees with the oracle."""
+"""Random fingers take every branch of docs/reference/semantics.md; every implementation agrees with the oracle."""
 
 from __future__ import annotations
 
 import functools
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,173 +13,224 @@ import pytest
 
 import agreement
 import oracle
-from random_fingers import Description, Recording, random_case
-from repetitions import repeated
-from runners import OTHERS, SLOW, Runner, assert_agreement
+import oracle_derivatives
+from random_extensions import MAKE
+from random_fingers import Description, Recording, failing_case, random_case, resting_case
+from runners import NATIVE, OTHERS, SLOW, Runner, assert_agreement, assert_state_continues, product
 
-FINGERS, FEWER = 50, 15
-SOURCES = (1, 2, 3)
-DETECTION_FINGERS = range(100, 136)  # with a subset of the optional keys of the detection each
-SOME = DETECTION_FINGERS[::2]  # these take every branch, too
-DETECTION_SAMPLES = 250
 
-# Every branch of section 5 as the oracle counts them; a new one there must be added here.
-BRANCHES = {
-    "first_sample_moves",
-    "first_sample_stuck",
-    "initial_bias",
-    "initial_torque",
-    "keeps_moving",
-    "reversal_between_samples",
-    "enter",
-    "enter_in_contact",
-    "stays_stuck",
-    "first_exit",
-    "first_exit_in_contact",
-    "exit_after_one_sample",
-    "exit_with_memory",
-    "exit_same_side",
-    "exit_other_side",
-    "exit_in_contact",
-    "moves_above_zero_threshold",
-    "symmetric_positive",
-    "symmetric_negative",
-    "asymmetric_positive",
-    "asymmetric_negative",
-    "working_points_below",
-    "working_points_inside",
-    "working_points_above",
-    "slack_at_spring",
-    "slack_by_loss",
-    "bidirectional_pulls",
-    "bidirectional_pushes",
-    "contact",
-    "no_contact",
-    "stuck_in_contact",
-    "noise_time",
-    "gain_zero_of_zero",
-}
+@dataclass(frozen=True)
+class Campaign:
+    """Random fingers of one kind."""
 
-# The same of the optional keys of the detection.
-DETECTION_BRANCHES = {
-    "gate_open",
-    "gate_held",
-    "gate_pushed",
-    "hysteresis_keeps_moving",
-    "hysteresis_stays_stuck",
-    "entry_load_taken_out",
-    "exit_with_absorption",
-    "exit_unabsorbed",
-    "uncertain_joint",
-    "certain_joint",
-    "innovation_alone",
-    "cusum_alone",
-    "residual_alone",
-    "evidence_without_bound",
-    "evidence_emptied",
-    "evidence_fastest",
-    "evidence_full",
-    "release_ratio_holds",
-    "held",
-    "update_in_contact",
-    "start_turned",
-    "drift_alone",
-    "drift_begins_anew",
-    "start_stands",
-}
+    case: Callable[[int], tuple[Description, Recording]]  # by seed
+    seeds: range
+    some: range  # of them, in `./test`; these take every branch, too
+    branches: set[str]  # that the oracle counts, beyond those of the plain model
+    outputs: tuple[str, ...] = ()  # that every implementation gives
+    sources: tuple[int, ...] = (1, 2, 3)  # kinematics, by the seed
+
+    def source(self, seed: int) -> int:
+        return self.sources[seed % len(self.sources)]
+
+
+def with_detection(seed: int) -> tuple[Description, Recording]:
+    """A subset of the optional keys of the detection."""
+    return random_case(seed, 250, detection=True)
+
+
+def with_extensions(seed: int) -> tuple[Description, Recording]:
+    """Every other finger has optional keys of the detection too, entry_load and hysteresis among them."""
+    return random_case(seed, 130, detection=seed % 2 == 0, extensions=True)
+
+
+CAMPAIGNS = {
+    "plain": Campaign(
+        random_case,
+        range(50),
+        range(15),
+        {
+            "first_sample_moves", "first_sample_stuck", "initial_bias", "initial_torque", "keeps_moving",
+            "reversal_between_samples", "enter", "enter_in_contact", "stays_stuck", "first_exit",
+            "first_exit_in_contact", "exit_after_one_sample", "exit_with_memory", "exit_same_side", "exit_other_side",
+            "exit_in_contact", "moves_above_zero_threshold", "symmetric_positive", "symmetric_negative",
+            "asymmetric_positive", "asymmetric_negative", "working_points_below", "working_points_inside",
+            "working_points_above", "slack_at_spring", "slack_by_loss", "bidirectional_pulls", "bidirectional_pushes",
+            "contact", "no_contact", "stuck_in_contact", "noise_time", "gain_zero_of_zero",
+        },
+    ),
+    "detection": Campaign(
+        with_detection,
+        range(100, 136),
+        range(100, 136, 2),
+        {
+            "gate_open", "gate_held", "gate_pushed", "hysteresis_keeps_moving", "hysteresis_stays_stuck",
+            "entry_load_taken_out", "exit_with_absorption", "exit_unabsorbed", "uncertain_joint", "certain_joint",
+            "innovation_alone", "cusum_alone", "residual_alone", "evidence_without_bound", "evidence_emptied",
+            "evidence_fastest", "evidence_full", "release_ratio_holds", "held", "update_in_contact", "start_turned",
+            "drift_alone", "drift_begins_anew", "start_stands",
+        },
+        agreement.DETECTION_OUTPUTS,
+    ),
+    "extensions": Campaign(
+        with_extensions,
+        range(600, 640),
+        range(602, 640, 3),
+        {
+            "friction_drift", "stribeck", "presliding", "presliding_from_rest", "presliding_turns", "gate_open",
+            "gate_held", "gate_pushed", "progressive_pull", "progressive_push", "inside_the_play",
+            "play_carried_along", "before_the_oldest", "delayed_forces", "delayed_tendon_position",
+            "delayed_joint_position",
+        },
+        sources=(1, 2, 1, 3),  # tendon positions see most
+    ),
+    "contact at rest": Campaign(
+        resting_case,
+        range(300, 312),
+        range(300, 312, 3),
+        {
+            "rest_not_yet", "rest_begins", "rest_ends", "contact_at_rest", "load_gone", "load_carried",
+            "carried_load_ends", "motor_gives_way", "motor_beyond_yield", "sudden_alone", "slow_alone",
+        },
+        ("contact_change", "contact_at_rest"),
+    ),
+    "sensor faults": Campaign(
+        failing_case,
+        range(512, 524),
+        range(512, 524, 2),
+        {
+            "jump", "force stands", "position stands", "recovers", "agrees_for_a_while", "joint_begins_anew",
+            "row_leaves", "row_cannot_leave",
+        },
+        ("sensor_fault", "contact_observable"),
+    ),
+}  # fmt: skip
 
 
 @functools.cache
-def case(seed: int) -> tuple[Description, Recording]:
-    return random_case(seed)
+def reference(name: str, seed: int) -> oracle.Result:
+    """The oracle's run."""
+    return oracle.run(*CAMPAIGNS[name].case(seed), CAMPAIGNS[name].source(seed))
 
 
-@functools.cache
-def oracle_run(seed: int, source: int) -> oracle.Result:
-    return oracle.run(*case(seed), source)
+every_campaign = pytest.mark.parametrize("name", CAMPAIGNS)
 
 
-@functools.cache
-def detection_case(seed: int) -> tuple[Description, Recording]:
-    return random_case(seed, DETECTION_SAMPLES, detection=True)
+def of_kernel(kernel: str) -> Callable[..., dict[str, Any]]:
+    def run(description: Description, recording: Recording, source: int) -> dict[str, Any]:
+        native = product("model.native")
+        finger = native.Instance.from_description(description, source)
+        try:
+            finger.kernel = kernel
+        except native.NativeError as refused:
+            pytest.skip(f"SKIPPED: no such kernel on this machine ({refused})")
+        outputs: dict[str, Any] = finger.run(recording, parts=True)
+        return outputs
+
+    return run
 
 
-@functools.cache
-def detection_oracle_run(seed: int) -> oracle.Result:
-    return oracle.run(*detection_case(seed), 1 + seed % 3)
+@every_campaign
+@pytest.mark.parametrize("all_seeds", [False, pytest.param(True, marks=pytest.mark.long)], ids=["some", "all"])
+@pytest.mark.parametrize("runner", [*OTHERS, Runner("sse2_kernel", of_kernel("sse2"))], ids=lambda runner: runner.name)
+def test_agrees_with_the_oracle(runner: Runner, all_seeds: bool, name: str) -> None:
+    campaign = CAMPAIGNS[name]
+    seeds = list(campaign.seeds if all_seeds else campaign.some)
+    chosen = seeds[:: 5 if runner in SLOW else 1]
+    outputs = campaign.outputs[:1] if (runner.name, name) == ("fmu", "detection") else campaign.outputs
+    cases = ((seed, *campaign.case(seed), campaign.source(seed), reference(name, seed)) for seed in chosen)
+    assert_agreement(runner, cases, *outputs)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fingers", repeated([FEWER, FINGERS], 0))
-def test_random_fingers_take_every_branch(fingers: int) -> None:
-    branches: Counter[str] = Counter()
-    for seed in range(fingers):
-        branches += oracle_run(seed, 1 + seed % 3).branches
-    rare = {name: branches[name] for name in BRANCHES if branches[name] < fingers / 5}
-    assert not rare
-    assert set(branches) == BRANCHES
+@every_campaign
+def test_random_fingers_take_every_branch(name: str) -> None:
+    campaign = CAMPAIGNS[name]
+    taken: Counter[str] = Counter()
+    for seed in campaign.seeds:
+        taken += reference(name, seed).branches
+    assert not {branch for branch in campaign.branches if taken[branch] < 3}
+    assert set().union(*(reference(name, seed).branches for seed in campaign.some)) >= campaign.branches
+    if name in ("plain", "detection"):  # a new branch of the oracle must be added here
+        assert set(taken) <= campaign.branches | CAMPAIGNS["plain"].branches
+    if name == "extensions":
+        effects = {row["effect"] for seed in campaign.seeds for row in campaign.case(seed)[0]["extensions"]}
+        assert effects == set(MAKE)
 
 
-@pytest.mark.parametrize("sources", repeated([1, 2], 0))
-@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
-def test_agrees_with_the_oracle_on_random_fingers(runner: Runner, sources: int) -> None:
-    """sources: how many of the kinematics each finger has; with one, it is the fewer fingers, of them some if slow."""
-    seeds = range(FINGERS) if sources > 1 else range(0, FEWER, 6 if runner in SLOW else 1)
-    chosen = ((seed, (seed + k) % 3 + 1) for seed in seeds for k in range(sources))
-    assert_agreement(runner, ((seed, *case(seed), source, oracle_run(seed, source)) for seed, source in chosen))
+@every_campaign
+def test_a_restored_state_gives_the_same_bits(name: str) -> None:
+    """Saved at any sample, continued elsewhere and again."""
+    campaign = CAMPAIGNS[name]
+    for seed in campaign.some:
+        description, recording = campaign.case(seed)
+        samples = len(recording["time"])
+        assert_state_continues(description, recording, campaign.source(seed), [1 + (37 * seed) % (samples - 1)])
 
 
-# --- the optional keys of the detection
+@every_campaign
+def test_kernels_give_the_same_bits(name: str) -> None:
+    campaign, native = CAMPAIGNS[name], product("model.native")
+    for seed in campaign.some[:5]:
+        description, recording = campaign.case(seed)
+        found = []
+        for kernel in ("plain", "sse2", "avx2"):
+            finger = native.Instance.from_description(description, campaign.source(seed))
+            try:
+                finger.kernel = kernel
+            except native.NativeError:  # not on this machine
+                continue
+            found.append((finger.run(recording, parts=True), finger.save_state()))
+        for outputs, state in found[1:]:
+            assert state == found[0][1], seed
+            for output, series in outputs.items():
+                np.testing.assert_array_equal(series, found[0][0][output], err_msg=f"finger {seed}, {output}")
 
 
-@pytest.mark.long
-def test_detection_fingers_take_every_branch() -> None:
-    branches: Counter[str] = Counter()
-    for seed in DETECTION_FINGERS:
-        branches += detection_oracle_run(seed).branches
-    rare = {name: branches[name] for name in DETECTION_BRANCHES if branches[name] < 10}
-    assert not rare
-    assert set(branches) - BRANCHES == DETECTION_BRANCHES
-    assert set().union(*(detection_oracle_run(seed).branches for seed in SOME)) >= DETECTION_BRANCHES
+@every_campaign
+def test_a_refused_sample_changes_nothing(name: str) -> None:
+    campaign, native = CAMPAIGNS[name], product("model.native")
+    for seed in campaign.some:
+        (description, recording), source = campaign.case(seed), campaign.source(seed)
+        whole = native.Instance.from_description(description, source).run(recording)
+        at = 1 + (53 * seed) % (len(recording["time"]) - 1)
+        head, tail = ({key: x[part] for key, x in recording.items()} for part in (slice(at), slice(at, None)))
+        finger = native.Instance.from_description(description, source)
+        finger.run(head)
+        for broken in ("tendon_force", {1: "tendon_position", 2: "joint_position", 3: "joint_velocity"}[source]):
+            wrong = {key: series[:1].copy() for key, series in tail.items()}
+            wrong[broken][0, -1] = np.nan
+            with pytest.raises(native.NativeError, match=broken):
+                finger.run(wrong)
+        for output, series in finger.run(tail).items():
+            np.testing.assert_array_equal(series, whole[output][at:], err_msg=f"finger {seed}, {output}")
 
 
-@pytest.mark.parametrize("seeds", repeated([SOME, DETECTION_FINGERS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
-def test_agrees_with_the_oracle_on_detection(runner: Runner, seeds: range) -> None:
-    chosen = seeds[:: 6 if runner in SLOW else 1]
-    cases = ((seed, *detection_case(seed), 1 + seed % 3, detection_oracle_run(seed)) for seed in chosen)
-    given = agreement.DETECTION_OUTPUTS[:1] if runner.name == "fmu" else agreement.DETECTION_OUTPUTS
-    assert_agreement(runner, cases, *given)
+@pytest.mark.parametrize("name", ["detection", "extensions"])
+@pytest.mark.parametrize("every", [12, pytest.param(4, marks=pytest.mark.long)])
+def test_derivatives_are_those_of_the_oracle(name: str, every: int) -> None:
+    """At one sample of a finger: while it rests, stops and leaves, in and out of contact; what is remembered stays."""
+    campaign, compared = CAMPAIGNS[name], Counter[str]()
+    for seed in campaign.seeds[::every]:
+        (description, inputs), source, k = campaign.case(seed), campaign.source(seed), 20 + seed % 7 * 10
+        recording = {key: series[: k + 1] for key, series in inputs.items()}
+        found, errors = oracle_derivatives.derivatives(description, recording, source, k)
+        finger = product("model.native").Instance.from_description(description, source)
+        finger.run(recording)
+        for given in oracle_derivatives.STEPS:
+            for column, unit in enumerate(np.eye(inputs[given].shape[1])):
+                slopes = finger.directional_derivative({given: unit})
+                for output in oracle_derivatives.OUTPUTS:
+                    scale = np.abs(found[output, given]).max() + 1e-6
+                    error = errors[output, given][:, column]
+                    known = error < 1e-5 * scale  # else there is a kink within the step
+                    difference = np.abs(slopes[output] - found[output, given][:, column])
+                    assert (difference < 10.0 * error + 1e-6 * scale)[known].all(), (seed, k, output, given, column)
+                    compared.update(known=int(known.sum()), all=known.size, not_0=int((slopes[output] != 0.0).sum()))
+    assert compared["known"] > 0.95 * compared["all"] and compared["not_0"] > 0.1 * compared["all"], compared
 
 
-# --- the agreement rule itself
-
-
-def changed(outputs: dict[str, Any], name: str, k: int, by: float) -> dict[str, Any]:
-    copy = {key: np.array(series) for key, series in outputs.items()}
-    copy[name][k, 0] = not copy[name][k, 0] if copy[name].dtype == bool else copy[name][k, 0] + by
-    return copy
-
-
-def test_tolerance_is_that_of_the_contract() -> None:
-    outputs = oracle_run(0, 1).outputs
-    for name in agreement.REAL_OUTPUTS:
-        source = ("joint_torque", "friction_torque") if name == "compensated_torque" else (name,)
-        allowed = 1e-9 * max(np.abs(outputs[each][:, 0]).max() for each in source) + 1e-12
-        assert agreement.compare(outputs, changed(outputs, name, 7, 0.99 * allowed)).agrees
-        found = agreement.compare(outputs, changed(outputs, name, 7, 1.01 * allowed))
-        assert found.first is not None
-        assert found.first[:3] == (7, name, 0)
-
-
-def test_booleans_and_nan_never_agree_by_tolerance() -> None:
-    outputs = oracle_run(0, 1).outputs
-    for name in ("joint_contact", "slack"):
-        assert not agreement.compare(outputs, changed(outputs, name, 9, 0.0)).agrees
-    assert not agreement.compare(outputs, changed(outputs, "bias_torque", 9, np.nan)).agrees
-
-
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", [1, 2, 3])
 def test_a_zero_shifts_the_readings_of_its_tendon(source: int) -> None:
     """Angles and contact at rest take the readings less their zeros; with measured angles nothing else changes."""
     description, recording = random_case(3)
@@ -185,8 +238,7 @@ def test_a_zero_shifts_the_readings_of_its_tendon(source: int) -> None:
     bare = [{key: value for key, value in tendon.items() if key != "zero"} for tendon in description["tendons"]]
     moved = [tendon | {"zero": zero} for tendon, zero in zip(bare, zeros, strict=True)]
     shifted = recording | {"tendon_position": recording["tendon_position"] + zeros}
-    for other in OTHERS[:1]:
-        as_is = other(description | {"tendons": bare}, recording, source)
-        out = other(description | {"tendons": moved}, shifted, source)
-        for name, values in as_is.items():
-            np.testing.assert_allclose(out[name], values, rtol=0.0, atol=1e-7 * max(1.0, np.abs(values).max()))
+    as_is = NATIVE(description | {"tendons": bare}, recording, source)
+    out = NATIVE(description | {"tendons": moved}, shifted, source)
+    for output, values in as_is.items():
+        np.testing.assert_allclose(out[output], values, rtol=0.0, atol=1e-7 * max(1.0, np.abs(values).max()))

@@ -6,20 +6,14 @@ A motion turns the joint by q and stretches both springs by c: x0 = ±0.01·q + 
 
 from __future__ import annotations
 
-import functools
-import json
-from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import oracle
 from analytic_cases import ARM, NO_UPDATE, Array, Outputs, close, finger
 from random_fingers import random_case
-from repetitions import repeated
-from runners import NATIVE, OTHERS, SLOW, Runner, assert_agreement, assert_state_continues, product
+from runners import NATIVE, Runner, product
 
 DT = 0.125
 STIFFNESS, TENSION = 1000.0, 20.0
@@ -31,8 +25,6 @@ FAULT = {
     "recovery_time": 2 * DT,
 }
 LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}
-SEEDS = range(512, 524)
-SOME = SEEDS[::2]  # these take every branch, too
 
 
 def pair(fault: Any = None, bias: Any = NO_UPDATE, tendons: int = 2, **contact: Any) -> dict[str, Any]:
@@ -110,12 +102,6 @@ def test_a_force_that_stands_while_its_spring_is_stretched(runner: Runner) -> No
     assert not out["contact"].any()
 
 
-def test_a_force_that_stands_with_its_spring(runner: Runner) -> None:
-    """At rest, and as the joint turns without a change of the springs."""
-    for q in (np.zeros(16), 0.05 * np.arange(16)):
-        assert not runner(pair(), moving(16, q=q, tension=np.full(16, TENSION)), 1)["sensor_fault"].any()
-
-
 def test_a_position_that_stands_while_the_joint_turns(runner: Runner) -> None:
     """From sample 4 on: 0.3 N of stretch and 0.1 N of turning a sample are missing, 0.5 + 0.01 + share allowed."""
     recording = moving(14)
@@ -143,28 +129,6 @@ def test_a_slack_tendon_is_no_fault(runner: Runner) -> None:
     assert not out["sensor_fault"].any()
 
 
-def test_a_force_that_reads_zero_as_a_slack_tendon_is_wound_up(runner: Runner) -> None:
-    """The same, but the sensor dies while the tendon is slack: it should pull again, and does not."""
-    k = np.arange(60)
-    stretch = 8.0 - 0.45 * np.minimum(k, 60 - k)
-    recording = moving(60, q=np.zeros(60), tension=np.full(60, TENSION))
-    recording["tendon_force"][:, 0] = np.where(k < 30, np.maximum(stretch, 0.0), 0.0)
-    recording["tendon_position"][:, 0] = stretch / STIFFNESS
-    out = runner(pair(), recording, 2)
-    first = faults(out).index(1)
-    assert stretch[first] > 0.6 >= stretch[first - 1]
-
-
-def test_without_other_tendons_nothing_can_be_told(runner: Runner) -> None:
-    """One tendon alone gives the angle of its joint, so its fault shows only beside the measured angle."""
-    recording = {
-        name: values if values.ndim == 1 or name == "joint_position" else values[:, :1]
-        for name, values in changed(moving(12), "tendon_force", 0, slice(6, None), 0.0).items()
-    }
-    assert not runner(pair(tendons=1), recording, 1)["sensor_fault"].any()
-    assert faults(runner(pair(tendons=1), recording, 2)) == [0] * 6 + [1] * 6
-
-
 # --- what a fault does
 
 
@@ -190,24 +154,6 @@ def test_the_bias_waits_and_begins_anew(runner: Runner) -> None:
     close(out["compensated_torque"][well, 0], 0.0)
 
 
-def test_a_fault_ends_only_with_the_force_of_the_spring(runner: Runner) -> None:
-    """5 N too much after the jump: the force moves, but never agrees."""
-    recording = moving(30)
-    recording["tendon_force"][8:, 0] += 5.0
-    assert faults(runner(pair(), recording, 1)) == [0] * 8 + [1] * 22
-
-
-def test_a_position_keeps_the_torques(runner: Runner) -> None:
-    """Contact is still found while a position fails."""
-    recording = moving(20)
-    recording = changed(recording, "tendon_position", 0, slice(5, None), recording["tendon_position"][4, 0])
-    recording["tendon_force"][14:, 1] -= 5.0
-    recording["tendon_position"][14:, 1] -= 5.0 / STIFFNESS
-    out = runner(pair(), recording, 1)
-    assert out["sensor_fault"][13:, 0].all() and not out["sensor_fault"][:, 1].any()
-    assert not out["contact"][:14].any() and out["contact"][14:].all()
-
-
 def test_a_second_fault_leaves_nothing_to_tell_the_angle(runner: Runner) -> None:
     """Positions of both tendons of one joint: the second one's row cannot leave."""
     recording = moving(24, tendons=2)
@@ -219,37 +165,6 @@ def test_a_second_fault_leaves_nothing_to_tell_the_angle(runner: Runner) -> None
     assert out["sensor_fault"][12:].all() and observable(out)[12:] == [0] * 12
 
 
-def test_without_angles_nothing_is_observable(runner: Runner) -> None:
-    """Both positions stand at once: the row of the first leaves, that of the second cannot."""
-    recording = moving(14)
-    recording["tendon_position"][5:] = recording["tendon_position"][4]
-    out = runner(pair(), recording, 1)
-    first = faults(out).index(1)
-    assert first == 6 and out["sensor_fault"][first:].all()
-    assert observable(out) == [1] * first + [0] * (14 - first)
-
-
-def test_other_joints_are_watched_on(runner: Runner) -> None:
-    """Two joints without a common tendon: contact is found at the one while a force of the other fails."""
-    data = finger(
-        [{"moment_arms": arms, "stiffness": STIFFNESS} for arms in ([ARM, 0.0], [-ARM, 0.0], [0.0, ARM], [0.0, -ARM])],
-        joints=[{}, {}],
-        bias=NO_UPDATE,
-        contact={"threshold": [0.02, 0.02]},
-    )
-    one = moving(20)
-    recording = {"time": one["time"]}
-    for name in ("tendon_force", "tendon_position", "joint_position"):
-        recording[name] = np.hstack([one[name], one[name]])
-    recording = changed(recording, "tendon_force", 0, slice(6, None), 0.0)
-    recording["tendon_force"][12:, 3] -= 5.0
-    recording["tendon_position"][12:, 3] -= 5.0 / STIFFNESS
-    out = runner(data | {"sensor_fault": FAULT}, recording, 1)
-    assert not out["joint_contact"][:, 0].any()
-    assert [int(each) for each in out["joint_contact"][:, 1]] == [0] * 12 + [1] * 8
-    assert observable(out) == [1] * 6 + [0] * 14
-
-
 def test_no_key_no_outputs_and_nothing_else_changes() -> None:
     description, recording = random_case(500, 300, detection=True)
     plain = NATIVE(description, recording, 1)
@@ -259,25 +174,6 @@ def test_no_key_no_outputs_and_nothing_else_changes() -> None:
         np.testing.assert_array_equal(watched[name], values, err_msg=name)
 
 
-@pytest.mark.parametrize(
-    ("fault", "message"),
-    [
-        ({"hold_time": -1.0}, r"sensor_fault\.hold_time = -1"),
-        ({"force_resolution": -1.0}, r"sensor_fault\.force_resolution = -1"),
-        ({"position_resolution": 1e10}, r"sensor_fault\.position_resolution = 1e\+10"),
-        ({"jump_margin": 0.0}, r"sensor_fault\.jump_margin = 0: expected above 0"),
-        ({"recovery_time": "soon"}, r"sensor_fault\.recovery_time"),
-        ({"margin": 1.0}, r"sensor_fault\.margin"),
-        (1.0, r"sensor_fault"),
-    ],
-)
-def test_refusals(fault: Any, message: str) -> None:
-    native = product("model.native")
-    data = finger([{"moment_arms": [ARM]}], contact={"threshold": [1.0]}) | {"sensor_fault": fault}
-    with pytest.raises(native.NativeError, match=message):
-        native.image_from_json(json.dumps(data))
-
-
 def test_positions_are_needed_with_every_source() -> None:
     native = product("model.native")
     recording = {name: values for name, values in moving(5).items() if name != "tendon_position"}
@@ -285,103 +181,7 @@ def test_positions_are_needed_with_every_source() -> None:
         native.Instance.from_description(pair(), 2).run(recording)
 
 
-# --- random fingers whose sensors fail now and then
-
-
-def failing_case(seed: int) -> tuple[Any, dict[str, Array]]:
-    """A random finger whose springs agree with its sensors but for noise, and sensors that fail for a while."""
-    description, recording = random_case(seed, 400, detection=True)
-    rng = np.random.default_rng([seed, 13])
-    R = np.array([tendon["moment_arms"] for tendon in description["tendons"]], dtype=float)
-    k = np.array([tendon["stiffness"] for tendon in description["tendons"]], dtype=float)
-    samples, (m, n) = len(recording["time"]), R.shape
-    phase = np.linspace(0.0, 12.0, samples)[:, None] + rng.uniform(0.0, 6.0, n)
-    q = 0.3 * np.sin(phase)
-    tension = 20.0 + 8.0 * np.sin(2.3 * np.linspace(0.0, 12.0, samples)[:, None] + rng.uniform(0.0, 6.0, m))
-    force = np.maximum(tension - 15.0 * (rng.random(m) < 0.2), 0.0)
-    position = q @ R.T + tension / k + rng.normal(0.0, 1e-8, (samples, m))
-    force = force + rng.normal(0.0, 0.005, (samples, m)) * (rng.random(m) < 0.8)
-    for begin in range(40, samples - 80, 80):
-        i, rows = int(rng.integers(m)), slice(begin, begin + int(rng.integers(20, 50)))
-        what = rng.integers(6)
-        if what == 0:
-            force[rows, i] = 0.0
-        elif what == 1:
-            force[rows, i] = force[begin, i]
-        elif what == 2:
-            force[rows, i] += rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 10.0)
-        elif what == 5:
-            position[rows] = position[begin]  # of all: what reads them hangs
-        else:
-            position[rows, i] = position[begin, i]
-            if what == 4:
-                force[begin + 5 : rows.stop, (i + 1) % m] = 0.0
-    recording |= {"tendon_force": force, "tendon_position": position, "joint_position": q}
-    step = float(np.median(np.diff(recording["time"])))
-    fault = {
-        "hold_time": step * rng.uniform(1.0, 4.0),
-        "force_resolution": rng.uniform(0.002, 0.02),
-        "position_resolution": rng.uniform(1e-7, 1e-6),
-        "jump_margin": rng.uniform(0.2, 1.0),
-        "recovery_time": step * rng.uniform(2.0, 15.0),
-    }
-    kept = {key: value for key, value in fault.items() if key == "recovery_time" or rng.random() < 0.9}
-    return description | {"sensor_fault": kept}, recording
-
-
-BRANCHES = {
-    "jump", "force stands", "position stands", "recovers", "agrees_for_a_while", "joint_begins_anew", "row_leaves",
-    "row_cannot_leave",
-}  # fmt: skip
-
-
-@functools.cache
-def oracle_run(seed: int) -> oracle.Result:
-    return oracle.run(*failing_case(seed), 1 + seed % 3)
-
-
-@pytest.mark.long
-def test_random_fingers_take_every_branch_of_the_watch() -> None:
-    seen: Counter[str] = Counter()
-    for seed in SEEDS:
-        seen += oracle_run(seed).branches
-    assert not [name for name in BRANCHES if seen[name] < 3], {name: seen[name] for name in BRANCHES}
-    assert set(BRANCHES) <= set().union(*(oracle_run(seed).branches for seed in SOME))
-
-
-@pytest.mark.parametrize("seeds", repeated([SOME, SEEDS], 0), ids=["some", "all"])
-@pytest.mark.parametrize("runner", OTHERS, ids=lambda runner: runner.name)
-def test_agrees_with_the_oracle(runner: Runner, seeds: range) -> None:
-    chosen = seeds[:: 4 if runner in SLOW else 1]
-    cases = ((seed, *failing_case(seed), 1 + seed % 3, oracle_run(seed)) for seed in chosen)
-    assert_agreement(runner, cases, "sensor_fault", "contact_observable")
-
-
 # --- the FMU, the saved state, the derivative
-
-
-def test_the_fmu_has_the_outputs_only_with_the_key(tmp_path: Path) -> None:
-    import fmpy
-
-    names = {}
-    for name, data in (("watched", pair()), ("plain", {k: v for k, v in pair().items() if k != "sensor_fault"})):
-        (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-        fmu = product("fmu.packaging").build_fmu(tmp_path / f"{name}.json", tmp_path / f"{name}.fmu", illustrated=False)
-        variables = fmpy.read_model_description(str(fmu)).modelVariables
-        names[name] = {variable.name: variable for variable in variables}
-    added = set(names["watched"]) - set(names["plain"])
-    keys = {f"sensor_fault.{key}" for key in FAULT}
-    assert added == keys | {"contact_observable", "sensor_fault[1]", "sensor_fault[2]"}
-    assert not set(names["plain"]) - set(names["watched"])
-    assert all(names["watched"][key].variability == "tunable" for key in keys)
-    assert names["watched"]["sensor_fault[2]"].type == names["watched"]["contact_observable"].type == "Boolean"
-    assert names["watched"]["sensor_fault.jump_margin"].unit == "N"
-
-
-def test_a_saved_fault_goes_on() -> None:
-    description, recording = failing_case(504)
-    assert NATIVE(description, recording, 1)["sensor_fault"].any()
-    assert_state_continues(description, recording, 1, (30, 41, 60, 100, 125, 140, 200, 300))
 
 
 def test_the_derivative_is_that_of_the_rows_in_use() -> None:

@@ -65,17 +65,13 @@ def test_held_out_error_is_that_of_refitting(made: tuple[Numbers, Numbers, Numbe
     expected, by_stretch = brute_force(target, nominal, values @ MIX, low, high, ridge)
     assert error == pytest.approx(expected, rel=1e-5)  # columns are kept in single precision
     assert grams.by_stretch(MIX, magnitudes) == pytest.approx(by_stretch, rel=1e-3)
+    none = grams_of(target, nominal, values[:, :, :0], scale)
+    assert none.without == pytest.approx(grams.without)  # of a description that lacks nothing
     assert magnitudes.shape == (8, 3) and np.all(magnitudes >= low) and np.all(magnitudes <= high)
     assert (np.max(magnitudes[:, 1]) == 0.1) == bound
     nothing = brute_force(target, nominal, values[:, :, :0], *(np.zeros(0),) * 2, ridge)[0]
     assert grams.without == pytest.approx(nothing, rel=1e-5)
     assert grams.by_stretch(None, None).sum() == pytest.approx(nothing, rel=1e-5)
-
-
-def test_a_ridge_changes_what_is_refitted(made: tuple[Numbers, Numbers, Numbers]) -> None:
-    target, nominal, values = made
-    loose, tight = (grams_of(target, nominal, values, np.full(4, size)) for size in (1e6, 1e-3))
-    assert tight.without > 2.0 * loose.without
 
 
 def test_errors_of_other_targets_are_those_of_their_own_grams(made: tuple[Numbers, Numbers, Numbers]) -> None:
@@ -124,6 +120,7 @@ def test_residual_and_magnitudes_are_those_of_one_fit_of_everything(made: tuple[
     grams = grams_of(target, nominal, values)
     found = grams.magnitudes(np.eye(6), np.full(6, -np.inf), np.full(6, np.inf))
     assert found[2] == pytest.approx(0.4, abs=0.05)
+    assert standard_error([1.0]) == np.inf
     assert np.abs(np.delete(found, 2)).max() < 0.1
     splines = basis(bias_splines(series_with(target)).toarray())
     y = np.stack([without(target[:, j], splines) for j in range(JOINTS)], axis=1)
@@ -143,17 +140,7 @@ def test_what_lies_in_the_bias_is_nothing(made: tuple[Numbers, Numbers, Numbers]
     assert grams.error(np.eye(7)[:, 6:], FREE[0][:1], FREE[1][:1])[0] == pytest.approx(grams.without)
 
 
-def test_nothing_but_nominal_or_candidates(made: tuple[Numbers, Numbers, Numbers]) -> None:
-    """A description without numbers, and one that lacks nothing."""
-    target, nominal, values = made
-    none = np.zeros((BLOCKS, JOINTS, 0))
-    assert grams_of(target, nominal, none).without == pytest.approx(grams_of(target, nominal, values).without)
-    bare = grams_of(target, none, values)
-    assert bare.without == pytest.approx(bare.square, rel=1e-6)
-    assert bare.error(MIX, *FREE)[0] < bare.without
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_bounded_is_bounded_least_squares(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a = rng.standard_normal((50, 6)) @ np.diag(10.0 ** rng.uniform(-4, 4, 6))
@@ -166,20 +153,6 @@ def test_bounded_is_bounded_least_squares(seed: int) -> None:
     best = lsq_linear(a, b, (low, high), tol=1e-14)
     # numbers are set to their bounds one after another: near the best, not always it
     assert 0.5 * np.sum((a @ found - b) ** 2) <= best.cost * 1.05 + 1e-9
-
-
-def test_bounded_without_bounds_solves() -> None:
-    a = np.random.default_rng(3).standard_normal((40, 4))
-    b = a @ [1.0, -2.0, 3.0, 0.0]
-    found = bounded((a.T @ a)[None], (a.T @ b)[None], np.full(4, -np.inf), np.full(4, np.inf))[0]
-    assert found == pytest.approx([1, -2, 3, 0], abs=1e-6)
-    assert bounded(np.zeros((1, 0, 0)), np.zeros((1, 0)), np.zeros(0), np.zeros(0)).shape == (1, 0)
-
-
-def test_standard_error_of_a_sum() -> None:
-    gains = np.random.default_rng(4).standard_normal((400, 50)) + 0.5
-    assert np.std(gains.sum(axis=1)) == pytest.approx(np.mean([standard_error(each) for each in gains]), rel=0.1)
-    assert standard_error([1.0]) == np.inf
 
 
 # --- folds ------------------------------------------------------------------------------------------------------------
@@ -207,17 +180,14 @@ def test_no_stretch_reaches_across_a_gap() -> None:
     assert folds.run.max() == 2
 
 
-@pytest.mark.parametrize(("seconds", "stretches", "folds"), [(1.0, 1, 1), (5.0, 2, 1), (9.0, 4, 2), (16.0, 8, 4)])
+@pytest.mark.parametrize(
+    ("seconds", "stretches", "folds"), [(1.0, 1, 1), (5.0, 2, 1), (9.0, 4, 2), (16.0, 8, 4), (0.0, 0, 0)]
+)
 def test_short_recordings_have_fewer_folds(seconds: float, stretches: int, folds: int) -> None:
-    found = make_folds(series_with(np.zeros((round(seconds / STEP), JOINTS))))
-    assert (found.stretches, found.folds) == (stretches, folds)
-    assert found.enough == (stretches >= 4)
-
-
-def test_nothing_used_has_no_folds() -> None:
-    series = series_with(np.zeros((300, JOINTS)))
-    found = make_folds(replace(series, used=np.zeros(300, dtype=bool)))
-    assert (len(found.rows), found.stretches, found.enough) == (0, 0, False)
+    series = series_with(np.zeros((round(seconds / STEP) or 300, JOINTS)))
+    found = make_folds(series if seconds else replace(series, used=np.zeros(300, dtype=bool)))
+    assert (found.stretches, found.enough) == (stretches, stretches >= 4)
+    assert found.folds == folds or not seconds
 
 
 def test_unused_blocks_do_not_matter(made: tuple[Numbers, Numbers, Numbers]) -> None:

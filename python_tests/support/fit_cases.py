@@ -146,3 +146,30 @@ def off_start(unknowns: Sequence[Any], seed: int) -> Array:
     start = np.array([each.start for each in unknowns])
     moved = start * rng.uniform(0.8, 1.2, len(start))
     return np.clip(moved, [each.lower for each in unknowns], [each.upper for each in unknowns])
+
+
+# Settings of the bias that the filters of the estimation treat each in its own way.
+BIASES: dict[str, Description] = {
+    "as given": {},
+    "initial_variance": {"initial_variance": 4e-3},
+    "noise_per_force": {"noise_std_per_force": 4e-4},
+    "noise_time": {"noise_time": 0.02},
+    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
+    "initial_torque of default variance": {"initial_torque": [0.02, -0.01]},
+    "no wandering": {"drift_variance": 0.0},
+    "known start": {"initial_variance": 0.0},
+    "forgets at once": {"forget_rate": 1e3},
+    "never forgets": {"forget_rate": 0.0},
+    "all": {"initial_torque": [0.01, 0.0], "noise_time": 0.01, "noise_std_per_force": 1e-4, "initial_variance": 1e-4},
+}
+
+
+def leave_out(seed: int, samples: int) -> Array:
+    """[N] bool: a few stretches and single samples not used, at times the first ones."""
+    rng = np.random.default_rng([seed, 11])
+    use = rng.random(samples) > 0.05
+    for start in rng.integers(0, samples, 3):
+        use[start : start + int(rng.integers(1, 30))] = False
+    if seed % 3 == 0:
+        use[: 1 + seed % 7] = False
+    return np.asarray(use)

@@ -140,14 +140,6 @@ def derivatives(trace: Trace, unknowns: Unknowns, z: Array, samples: slice = sli
     return tuple(np.moveaxis(np.broadcast_to(each.imag, (len(z), *each.shape[1:])) / scale, 0, -1) for each in (T, db))  # type: ignore[return-value]
 
 
-def derivatives_with_frozen_forces(trace: Trace, unknowns: Unknowns, z: Array) -> tuple[Array, Array]:
-    """The same as the paper takes them: f_A and f_B do not follow the parameters."""
-    step = unknowns.steps(z)
-    T, db = trace.evaluate(unknowns.theta(z + 1j * np.diag(step)), frozen=unknowns.theta(z))
-    scale = step[:, None, None]
-    return tuple(np.moveaxis(each.imag / scale, 0, -1) for each in (T, db))  # type: ignore[return-value]
-
-
 class Likelihood:
     """One recording's part of the cost: whitened residual and Jacobian per joint, dense.
 

@@ -5,8 +5,8 @@ reach, and what each friction effect did is written down (`Course`); after that 
 that take complex numbers too: the imaginary part of one evaluation at θ + i h is the exact derivative along h, without
 the cancellation of a difference. Tests hold the formulas and the derivatives against the oracle itself.
 
-Extensions of step 4 and of friction are part of the formulas; those that change the signals (`time_delay`, `backlash`,
-`tendon_nonlinearity`) move the kinematics, which stay those of the description.
+Of `extensions`, only those that are springs are part of the formulas; the others are held against differences of the
+oracle (`run_recorder`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import oracle
-from oracle_extensions import Row, distance_of, factor_of, next_share, torque_of
 from oracle_finger import NEAR, Effect, given
 
 Array = NDArray[Any]
@@ -57,8 +56,7 @@ class Course:
     """What one friction effect did over a recording, all [N].
 
     direction: 0 stuck, else sgn(v). speed: |v|. angle: that its working points see. at_plus, at_minus: b of the sample
-    is at_plus·F(+v_min) + at_minus·F(−v_min), F with its sign. travel: with the extension `presliding` Δ, and the
-    direction is then the side of the law, also at rest.
+    is at_plus·F(+v_min) + at_minus·F(−v_min), F with its sign.
     """
 
     direction: Array
@@ -66,7 +64,6 @@ class Course:
     angle: Array
     at_plus: Array
     at_minus: Array
-    travel: Array
 
 
 class Recorder(oracle.FingerOracle):
@@ -106,13 +103,8 @@ class Recorder(oracle.FingerOracle):
         elif not first and direction == 0 and not stuck:
             assert side is not None
             of_side[side] += 1.0
-        self.rows.setdefault(id(effect), []).append((direction, abs(v), angle, of_side[1], of_side[-1], 0.0))
+        self.rows.setdefault(id(effect), []).append((direction, abs(v), angle, of_side[1], of_side[-1]))
         return F, b
-
-    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Any) -> float:
-        side = self.extensions.side_of(effect, key)
-        self.rows.setdefault(id(effect), []).append((side, abs(v), angle, 0.0, 0.0, travel))
-        return super()._slide(effect, displacement, v, angle, travel, key)
 
     def course(self, effect: Effect) -> Course:
         return Course(*np.array(self.rows[id(effect)], dtype=float).T)
@@ -158,14 +150,11 @@ class Trace:
         self.near = np.array([step.margin for step in steps]) < NEAR
         self.residual = np.array([np.full(self.n, np.nan), *finger.residuals])
         self.branches = finger.branches
-        self.rows = finger.extensions.rows
-        self.finger = finger
-        self.units = self._unit_torques(finger)
+        self.springs = [(f"extensions[{k + 1}]", row) for k, row in enumerate(finger.extensions.rows)]
+        if not {row.effect for _, row in self.springs} <= set(SPRINGS):
+            raise ValueError("extensions: only springs are part of the formulas")
         self.laws: dict[Place, tuple[Course, float, Array, list[tuple[str, str]]]] = {}
-        self.grips: dict[Place, list[int]] = {}  # rows of extensions that change the friction of a place
-        rows_of = {id(effect): rows for (_, _, effect), rows in zip(finger.places, finger.grips, strict=True)}
         for place, path, entry, effect in self._places(finger):
-            self.grips[place] = [k for k, row in enumerate(self.rows) if any(row is one for one in rows_of[id(effect)])]
             self.laws[place] = (finger.course(effect), effect.threshold, *self._points(effect, path, entry, finger))
 
     def _places(self, finger: Recorder) -> list[tuple[Place, str, Any, Effect]]:
@@ -196,60 +185,6 @@ class Trace:
             sides.append((f"{own}.positive", f"{own}.negative") if "positive" in law else (own, own))
         return weights, sides
 
-    def _unit_torques(self, finger: Recorder) -> dict[str, Array]:
-        """[N, n] torque of step 4 by each number of the extensions, but for springs (their rest angles may change),
-        for friction (it may build up) and for what is not linear.
-        """
-
-        def series(row: Row, numbers: Mapping[str, float]) -> Array:
-            cosines = finger.extensions.cosines
-            return np.array([torque_of(row, numbers, moment, self.R, cosines) for moment in finger.moments])
-
-        found = {}
-        for k, row in enumerate(self.rows):
-            if row.effect not in (*SPRINGS, "pulley_eccentricity", "preload_friction", "load_friction"):
-                for name in row.numbers:
-                    unit = dict.fromkeys(row.numbers, 0.0) | {name: 1.0}
-                    found[f"extensions[{k + 1}].{name}"] = series(row, unit)
-        return found
-
-    def _numbers(self, k: int, theta: Values) -> dict[str, Any]:
-        return {name: theta[f"extensions[{k + 1}].{name}"] for name in self.rows[k].numbers}
-
-    def _grip(self, place: Place, theta: Values) -> tuple[Any, Any]:
-        """What multiplies F and b [U, N], and ζ [U, N] where the effect slides (else None)."""
-        factor, share = 1.0, None
-        course, threshold = self.laws[place][:2]
-        for k in self.grips[place]:
-            numbers = self._numbers(k, theta)
-            factor = factor * factor_of(self.rows[k], numbers, course.speed, self.time - self.time[0])
-            if self.rows[k].effect == "presliding":
-                distance = distance_of(self.rows[k], numbers["displacement"], threshold)
-                share = self._shares(course.travel, distance)
-        return factor, share
-
-    def _side(self, theta: Values, tendon: int | None, joint: int) -> Any:
-        """s of ẋ or q̇ [N], or ζ [U, N] where it slides."""
-        extensions = self.finger.extensions
-        rows = extensions.rows_at("joint", (joint,)) if tendon is None else extensions.rows_at("edge", (tendon, joint))
-        row = next((row for row in rows if row.effect == "presliding"), None)
-        moments = self.finger.moments
-        if row is None:
-            sides = [each.joint_side[joint] if tendon is None else each.tendon_side[tendon, joint] for each in moments]
-            return np.array(sides)
-        displacement = self._numbers(next(k for k, one in enumerate(self.rows) if one is row), theta)["displacement"]
-        distance = distance_of(row, displacement, self.finger.thresholds[int(tendon is None)])
-        travels = [each.travelled[0][joint] if tendon is None else each.travelled[1][tendon, joint] for each in moments]
-        return self._shares(travels, distance)
-
-    @staticmethod
-    def _shares(travels: Any, distance: Any) -> Array:
-        """ζ [U, N]."""
-        series = [0.0 * distance]
-        for travel in travels[1:]:
-            series.append(next_share(series[-1], travel, distance))
-        return np.concatenate([np.atleast_2d(each) for each in series], axis=-1)
-
     def _friction_and_jump(self, place: Place, theta: Values, samples: slice) -> tuple[Any, Any]:
         """F and b of one effect, [U, N]."""
         if place not in self.laws:
@@ -269,20 +204,10 @@ class Trace:
             forward, backward = magnitude(positive, speed), -magnitude(negative, speed)
             F = F + weight * np.where(direction > 0, forward, np.where(direction < 0, backward, 0.0))
             b = b + weight * (at_plus * magnitude(positive, threshold) - at_minus * magnitude(negative, threshold))
-        if not self.grips[place]:
-            return F, b
-        factor, share = self._grip(place, theta)
-        if np.ndim(factor):
-            factor = factor[..., samples]
-        return factor * (F if share is None else share[..., samples] * np.where(direction > 0, F, -F)), factor * b
+        return F, b
 
-    def evaluate(
-        self, theta: Values, samples: slice = slice(None), frozen: Values | None = None
-    ) -> tuple[Array, Array]:
-        """T and Δb, [U, samples, n]; U = 1 where all numbers are plain.
-
-        frozen: parameters that the forces f_A, f_B are computed with instead (the paper's linearisation).
-        """
+    def evaluate(self, theta: Values, samples: slice = slice(None)) -> tuple[Array, Array]:
+        """T and Δb, [U, samples, n]; U = 1 where all numbers are plain."""
         T, db = self._springs(theta, samples), 0.0 * self._springs(theta, samples)
         load = [0.0] * self.n
         for i in range(self.m):
@@ -292,14 +217,10 @@ class Trace:
             for j in range(self.n):
                 edge, edge_jump = self._friction_and_jump(("edge_friction", i, j), theta, samples)
                 pulley, pulley_jump = self._friction_and_jump(("pulley_friction", i, j), theta, samples)
-                edge_of_force, pulley_of_force = edge, pulley
-                if frozen is not None:
-                    edge_of_force = self._friction_and_jump(("edge_friction", i, j), frozen, samples)[0]
-                    pulley_of_force = self._friction_and_jump(("pulley_friction", i, j), frozen, samples)[0]
                 before = self._magnitude(i, f_A)
-                f_B = self._not_slack(i, f_A - before * edge_of_force)
+                f_B = self._not_slack(i, f_A - before * edge)
                 between = self._magnitude(i, f_B)
-                f_A = self._not_slack(i, f_B - between * pulley_of_force)
+                f_A = self._not_slack(i, f_B - between * pulley)
                 loss = loss + before * edge + between * pulley
                 jump = jump + before * edge_jump + between * pulley_jump
                 T[..., j] += self.R[i, j] * loss
@@ -333,7 +254,7 @@ class Trace:
         return np.where(force.real < 0.0, -force, force) if self.bidirectional[i] else force
 
     def _springs(self, theta: Values, samples: slice) -> Array:
-        """Covers and torques of extensions, complex [U, samples, n]."""
+        """Covers and springs of extensions, complex [U, samples, n]."""
         size = max((np.size(value) for value in theta.values()), default=1)
         q = self.q[samples]
         torque = np.zeros((size, *q.shape), dtype=complex)
@@ -343,32 +264,13 @@ class Trace:
 
         for j in range(self.n):
             torque[..., j] += theta.get(f"joints[{j + 1}].cover.stiffness", 0.0) * bend(j)
-        for k, row in enumerate(self.rows):
-            if row.effect in SPRINGS:
-                assert row.joint is not None
-                stiffness = self._numbers(k, theta)["stiffness"]
-                if row.effect == "cover_hardening":
-                    torque[..., row.joint] += stiffness * bend(row.joint) ** 3
-                else:
-                    pull = stiffness * (bend(row.joint) - bend(row.joint + 1))
-                    torque[..., row.joint] += pull
-                    torque[..., row.joint + 1] -= self._numbers(k, theta)["reaction"] * pull
-            elif row.effect == "pulley_eccentricity":
-                assert row.joint is not None
-                numbers = self._numbers(k, theta)
-                turned = numbers["turns"] * q[:, row.joint]
-                arm = numbers["sine"] * np.sin(turned) + numbers["cosine"] * np.cos(turned)
-                torque[..., row.joint] -= arm * self.force[samples, row.tendon]
-            elif row.effect == "preload_friction":
-                numbers = self._numbers(k, theta)
-                for before in range(self.n) if row.joint is None else [row.joint]:
-                    lost = numbers["coulomb"] * self._side(theta, row.tendon, before)[..., samples]
-                    for j in range(before, self.n):
-                        torque[..., j] += self.R[row.tendon, j] * lost * (1.0 if j == before else numbers["beyond"])
-            elif row.effect == "load_friction":
-                lost = self._numbers(k, theta)["coulomb"] * self._side(theta, None, row.joint)[..., samples]
-                torque[..., row.joint] += lost * np.abs(self.force[samples, row.tendon])
-        for path, unit in self.units.items():
-            if path in theta:
-                torque += np.asarray(theta[path])[..., None] * unit[samples]
+        for path, row in self.springs:
+            assert row.joint is not None
+            stiffness = theta[f"{path}.stiffness"]
+            if row.effect == "cover_hardening":
+                torque[..., row.joint] += stiffness * bend(row.joint) ** 3
+            else:
+                pull = stiffness * (bend(row.joint) - bend(row.joint + 1))
+                torque[..., row.joint] += pull
+                torque[..., row.joint + 1] -= theta[f"{path}.reaction"] * pull
         return torque

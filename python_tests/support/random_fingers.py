@@ -415,3 +415,77 @@ def random_case(
         bias = description.setdefault("bias", {})
         bias["initial_torque"] = (torque + rng.normal(0.0, 0.01, len(torque))).tolist()
     return description, recording
+
+
+def resting_case(seed: int) -> tuple[Description, Recording]:
+    """A random finger whose motors stand in blocks, with steps of its forces there; motors give way in some."""
+    description, recording = random_case(seed, 400, detection=True)
+    rng = np.random.default_rng([seed, 11])
+    samples, m = recording["tendon_force"].shape
+    arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
+    scale = np.abs(arms).sum(axis=0) * float(np.abs(recording["tendon_force"]).mean()) * 0.02
+    step = float(np.median(np.diff(recording["time"])))
+    for begin in range(20, samples - 60, 70):
+        rows = slice(begin, begin + 50)
+        force, position = recording["tendon_force"][begin].copy(), recording["tendon_position"][begin].copy()
+        load = np.zeros((50, m))
+        for first in rng.integers(8, 45, 3):
+            load[first:] += rng.normal(0.0, 0.1, m) * np.abs(force).mean()
+        gives_way = 1e-4 * (rng.random() < 0.5) * rng.choice([1.0, 0.1])
+        recording["tendon_force"][rows] = force + load + rng.normal(0.0, 1e-3, (50, m))
+        recording["tendon_position"][rows] = position - gives_way * load + rng.normal(0.0, 1e-7, (50, m))
+    rest: dict[str, Any] = {"travel": 2e-6, "threshold": (scale * rng.uniform(0.3, 1.5, arms.shape[1])).tolist()}
+    rest["settle_time"] = step * rng.uniform(0.5, 5.0)
+    optional = {
+        "averaging_time": 0.0 if rng.random() < 0.2 else step * rng.uniform(0.5, 3.0),
+        "threshold_per_force": rng.uniform(0.0, 1e-4, arms.shape[1]).tolist(),
+        "creep": (scale * rng.uniform(0.0, 3.0, arms.shape[1])).tolist(),
+        "fall_share": rng.uniform(0.0, 0.6),
+        "innovation": {
+            "time": step * rng.uniform(2.0, 30.0),
+            "threshold": (scale * rng.uniform(0.2, 1.0, arms.shape[1])).tolist(),
+        },
+    }
+    rest |= {key: value for key, value in optional.items() if rng.random() < 0.7}
+    return description | {"contact": description["contact"] | {"rest": rest}}, recording
+
+
+def failing_case(seed: int) -> tuple[Description, Recording]:
+    """A random finger whose springs agree with its sensors but for noise, and sensors that fail for a while."""
+    description, recording = random_case(seed, 400, detection=True)
+    rng = np.random.default_rng([seed, 13])
+    R = np.array([tendon["moment_arms"] for tendon in description["tendons"]], dtype=float)
+    k = np.array([tendon["stiffness"] for tendon in description["tendons"]], dtype=float)
+    samples, (m, n) = len(recording["time"]), R.shape
+    phase = np.linspace(0.0, 12.0, samples)[:, None] + rng.uniform(0.0, 6.0, n)
+    q = 0.3 * np.sin(phase)
+    tension = 20.0 + 8.0 * np.sin(2.3 * np.linspace(0.0, 12.0, samples)[:, None] + rng.uniform(0.0, 6.0, m))
+    force = np.maximum(tension - 15.0 * (rng.random(m) < 0.2), 0.0)
+    position = q @ R.T + tension / k + rng.normal(0.0, 1e-8, (samples, m))
+    force = force + rng.normal(0.0, 0.005, (samples, m)) * (rng.random(m) < 0.8)
+    for begin in range(40, samples - 80, 80):
+        i, rows = int(rng.integers(m)), slice(begin, begin + int(rng.integers(20, 50)))
+        what = rng.integers(6)
+        if what == 0:
+            force[rows, i] = 0.0
+        elif what == 1:
+            force[rows, i] = force[begin, i]
+        elif what == 2:
+            force[rows, i] += rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 10.0)
+        elif what == 5:
+            position[rows] = position[begin]  # of all: what reads them hangs
+        else:
+            position[rows, i] = position[begin, i]
+            if what == 4:
+                force[begin + 5 : rows.stop, (i + 1) % m] = 0.0
+    recording |= {"tendon_force": force, "tendon_position": position, "joint_position": q}
+    step = float(np.median(np.diff(recording["time"])))
+    fault = {
+        "hold_time": step * rng.uniform(1.0, 4.0),
+        "force_resolution": rng.uniform(0.002, 0.02),
+        "position_resolution": rng.uniform(1e-7, 1e-6),
+        "jump_margin": rng.uniform(0.2, 1.0),
+        "recovery_time": step * rng.uniform(2.0, 15.0),
+    }
+    kept = {key: value for key, value in fault.items() if key == "recovery_time" or rng.random() < 0.9}
+    return description | {"sensor_fault": kept}, recording

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
-
 import pytest
 
-from tendonfmu.cli.console import PRINTED, PhaseDisplay, time_left
+from tendonfmu.cli.console import PRINTED, PhaseDisplay
 from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}
@@ -31,22 +29,6 @@ def seen_of(names: object, clock: Clock) -> tuple[Phases, list[PhaseState]]:
     return Phases(names, seen.append, clock), seen  # type: ignore[arg-type]
 
 
-def test_every_step_is_told(clock: Clock) -> None:
-    phases, seen = seen_of(["reading", "fitting"], clock)
-    with phases.start("reading"):
-        pass
-    with phases.start("fitting", total=2) as step:
-        step(1)
-        step(2)
-    told = [(state.number, state.count, state.words, state.done, state.total) for state in seen]
-    assert told == [
-        (1, 2, "reading", 0, None),
-        (2, 2, "fitting", 0, 2),
-        (2, 2, "fitting", 1, 2),
-        (2, 2, "fitting", 2, 2),
-    ]
-
-
 def test_the_time_left_follows_the_work_that_is_done(clock: Clock) -> None:
     phases, seen = seen_of(SHARES, clock)
     with phases.start("reading"):
@@ -63,41 +45,18 @@ def test_the_time_left_follows_the_work_that_is_done(clock: Clock) -> None:
     assert seen[-1].left_s == pytest.approx(0.0) and seen[-1].seconds == pytest.approx(10.0)
 
 
-def test_a_phase_that_is_skipped_is_neither_done_nor_left(clock: Clock) -> None:
+def test_a_phase_may_be_skipped_and_fail(clock: Clock) -> None:
     phases, seen = seen_of(SHARES, clock)
     with phases.start("reading"):
         clock.now += 4.0
     with phases.start("judging", total=1) as step:
-        assert (seen[-1].number, seen[-1].count) == (3, 3)
-        assert seen[-1].left_s == pytest.approx(12.0)
-        step(1)
-
-
-def test_a_phase_may_come_again(clock: Clock) -> None:
-    phases, seen = seen_of({"searching": 1.0, "fitting": 1.0}, clock)
-    for _ in range(3):
-        for words in ("searching", "fitting"):
-            with phases.start(words, total=1) as step:
-                clock.now += 5.0
-                step(1)
-    assert [state.number for state in seen] == [1, 1, 2, 2] * 3
-    assert seen[-1].left_s == pytest.approx(0.0) and seen[-3].left_s == pytest.approx(5.0)
-
-
-def test_an_error_ends_a_phase_as_it_is(clock: Clock) -> None:
-    phases, _ = seen_of(["reading"], clock)
+        assert (seen[-1].number, seen[-1].count, seen[-1].left_s) == (3, 3, pytest.approx(12.0))
+        step(9)  # more than all is all
+    assert seen[-1].left_s == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(KeyError), phases.start("reading"):
         raise KeyError
     with pytest.raises(ValueError, match="dancing"), phases.start("dancing"):
         pass
-
-
-def test_more_than_all_is_all(clock: Clock) -> None:
-    phases, seen = seen_of(["reading", "fitting"], clock)
-    with phases.start("reading", total=2) as step:
-        clock.now += 4.0
-        step(9)
-    assert seen[-1].left_s == pytest.approx(4.0)
 
 
 # --- shown ------------------------------------------------------------------------------------------------------------
@@ -129,31 +88,3 @@ def test_lines_where_there_is_no_terminal(
     assert lines[0] == "phase 1 of 3: reading" and lines[1] == "phase 2 of 3: fitting"
     assert lines[2] == "phase 2 of 3: fitting, 20 of 60, about 30 s left"
     assert lines[-1] == "writing the files" and len(lines) == 6
-
-
-def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch, clock: Clock) -> None:
-    stream = io.StringIO()
-    monkeypatch.setenv("TTY_COMPATIBLE", "1")
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "160")
-    monkeypatch.setattr("sys.stderr", stream)
-    display = PhaseDisplay(None)
-    phases = Phases(SHARES, display, clock)
-    with display:
-        with phases.start("reading"):
-            clock.now += 4.0
-        with phases.start("fitting", total=40) as step:
-            clock.now += 20.0
-            step(20)
-            display.refresh()
-    shown = stream.getvalue()
-    assert "phase 2 of 3: fitting" in shown and "20/40" in shown and "about 36 s left" not in shown
-    assert "about 35 s left" in shown
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(None, ""), (0.2, "about 5 s left"), (22.0, "about 20 s left"), (100.0, "about 2 min left")],
-)
-def test_an_estimate_is_coarse(seconds: float | None, words: str) -> None:
-    assert time_left(seconds) == words
