@@ -154,10 +154,7 @@ BAD_CALLS: dict[str, BadCall] = {
         lambda i: i.call("GetFloat64", None, 1, (c_double * 1)(), 1),
         "fmi3GetFloat64: valueReferences is NULL",
     ),
-    "no values": (
-        lambda i: i.transfer("Set", "Float64", first(i, FORCE), None, 3),
-        "fmi3SetFloat64: values is NULL",
-    ),
+    "no values": (lambda i: i.transfer("Set", "Float64", first(i, FORCE), None, 3), "fmi3SetFloat64: values is NULL"),
     "time going back": (lambda i: i.step(0.003), "not before the sample already taken, got point 0.003 s"),
     "step of no length": (lambda i: i.step(0.005, 0.0), "fmi3DoStep: expected a finite communicationStepSize above 0"),
     "state to nowhere": (lambda i: i.call("GetFMUState", None), "fmi3GetFMUState: FMUState is NULL"),

@@ -1,11 +1,10 @@
 """What the FMUs compute is what the core and the simulated finger compute, bit by bit, in both versions of FMI.
 
-That the core, and the FMU in fmpy, agree with the independent implementation: test_reference_traces.py here, and model/.
+That the core and the FMU agree with the independent implementation: test_reference_traces.py here, and model/.
 """
 
 from __future__ import annotations
 
-import json
 from ctypes import c_double
 from itertools import pairwise
 from pathlib import Path

@@ -255,9 +255,7 @@ def test_energy_balance_closes(pulley_torque: str, loss: str) -> None:
         joint_coupling=[0.02],
         friction={"bristle_damping": 0.002, "pulley_torque": pulley_torque, "tension_loss": loss, "preload": 0.5},
         obstacle={"centre": [0.07, 0.0, -0.05], "radius": 0.04, "stiffness": 300.0, "damping": 2.0},
-        pushes=[
-            {"start": 0.3, "rise": 0.1, "hold": 0.2, "fall": 0.1, "force": 1.0, "direction": [0.0, 0.0, 1.0]},
-        ],
+        pushes=[{"start": 0.3, "rise": 0.1, "hold": 0.2, "fall": 0.1, "force": 1.0, "direction": [0.0, 0.0, 1.0]}],
         wrist={"amplitude": 0.2, "period": 2.0, "arms": [0.005, -0.005, 0.004, 0.003], "friction": law},
     )
     rig["physics"]["tendons"] = [{"hardening": 1e6, "damping": 2.0}] * 4

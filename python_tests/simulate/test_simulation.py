@@ -33,10 +33,7 @@ def short_rig(**changes: Any) -> dict[str, Any]:
     """Two seconds of the index finger with a push, all columns."""
     data = index_rig()
     data["motion"] |= {"duration": 2.0, "still": 0.1}
-    data["recording"] = {
-        "duration": 2.0,
-        "columns": ["joint_position", "joint_velocity", "external_torque", "contact"],
-    }
+    data["recording"] = {"duration": 2.0, "columns": ["joint_position", "joint_velocity", "external_torque", "contact"]}
     data["pushes"] = [{"start": 0.5, "rise": 0.1, "hold": 0.3, "fall": 0.1, "force": 1.5, "direction": [0.0, 0.0, 1.0]}]
     data["settle"] = 1.0
     return data | changes

@@ -89,8 +89,7 @@ def test_the_model_is_configured_without_eigen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("version", "reason"),
     repeated(
-        [("5.8.0", "is not of version 6 or 7"), ("8.0.0", "is not of version 6 or 7"), ("6.4.1", "cannot be linked")],
-        1,
+        [("5.8.0", "is not of version 6 or 7"), ("8.0.0", "is not of version 6 or 7"), ("6.4.1", "cannot be linked")], 1
     ),
 )
 def test_an_unusable_installation_is_refused_with_its_version(tmp_path: Path, version: str, reason: str) -> None:

@@ -195,10 +195,7 @@ def random_motion(rng: np.random.Generator, n: int) -> Table:
         )
     knots = int(rng.integers(1, 4))
     time = np.cumsum(rng.uniform(0.2, 2.0, knots)) - 0.2
-    return {
-        "joints": joints,
-        "pretension": {"time": time.tolist(), "value": rng.uniform(1.0, 20.0, knots).tolist()},
-    }
+    return {"joints": joints, "pretension": {"time": time.tolist(), "value": rng.uniform(1.0, 20.0, knots).tolist()}}
 
 
 def random_pushes(rng: np.random.Generator, n: int) -> list[Table]:
