@@ -24,7 +24,7 @@ from tendonfmu.recordings.recording import read_recording
 from tendonfmu.simulate import plant as binding
 from tendonfmu.simulate.plant import Plant, PlantError, SolverError
 from tendonfmu.simulate.rig import read_rig
-from tendonfmu.simulate.simulation import CHUNK, ENERGIES, Simulation, simulate
+from tendonfmu.simulate.simulation import ENERGIES, Simulation, simulate
 
 pytestmark = needs_plant
 
@@ -72,17 +72,9 @@ def test_the_recording_is_one_of_the_contract(call: Call, tmp_path: Path) -> Non
     assert np.array_equal(recording.time, np.arange(1000) / 500)
     assert recording.contact is not None and 200 < recording.contact.sum() < 250
     assert sorted(file.name for file in tmp_path.iterdir()) == ["rec.parquet", "rig.json"]
-
-
-def test_columns_are_those_asked_for(tmp_path: Path) -> None:
-    data = short_rig(recording={"duration": 0.1})
-    assert set(simulated(tmp_path, data).recording) == {
-        "time",
-        *(f"{name}[{i}]" for name in ("tendon_force", "tendon_position") for i in range(1, 9)),
-    }
-    data["recording"]["columns"] = ["contact", "joint_position"]
-    wanted = [*(f"joint_position[{j}]" for j in range(1, 5)), "contact"]
-    assert list(simulated(tmp_path, data).recording)[17:] == wanted
+    first = Path("rec.parquet").read_bytes()
+    assert call("simulate", tmp_path / "rig.json", "-o", "rec.parquet").status == 0
+    assert Path("rec.parquet").read_bytes() == first
 
 
 def test_sensors_stand_between_truth_and_recording(result: Simulation) -> None:
@@ -115,16 +107,13 @@ def test_the_truth_is_whole_and_consistent(result: Simulation) -> None:
     force = np.linalg.norm(group(truth, "contact_force"), axis=1)
     assert np.array_equal(truth["contact"], force > 0.05) and abs(force.max() - 1.5) < 1e-9
     assert np.abs(group(truth, "external_torque")[~truth["contact"]]).max() < 0.05 * 0.1
+    assert_energy_is_kept(truth)
+
+
+def assert_energy_is_kept(truth: dict[str, Any]) -> None:
     balance = truth["kinetic_energy"] + truth["potential_energy"] + truth["friction_work"] + truth["damping_work"]
     balance = balance - truth["motor_work"] - truth["push_work"]
     assert np.ptp(balance) < 1e-4 * np.ptp(truth["friction_work"])
-
-
-def test_progress_is_told_to_the_end(tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
-    simulated(tmp_path, short_rig(), progress=lambda done, total: told.append((done, total)))
-    assert told[0] == (0, 1000) and told[-1] == (1000, 1000)
-    assert len(told) == 1000 // CHUNK + 1 and [done for done, _ in told] == sorted(done for done, _ in told)
 
 
 # --- reproducibility --------------------------------------------------------------------------------------------------
@@ -152,14 +141,6 @@ def test_the_processor_does_not_show(integrator: str, tmp_path: Path) -> None:
         assert (tmp_path / f"with{file}").read_bytes() == (tmp_path / f"without{file}").read_bytes()
 
 
-def test_the_same_seed_gives_the_same_bytes(call: Call, tmp_path: Path) -> None:
-    rig = written(tmp_path, with_everything() | {"recording": {"duration": 1.0, "columns": ["contact"]}})
-    for name in ("a", "b"):
-        assert call("simulate", rig, "-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet").status == 0
-    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
-    assert (tmp_path / "a_truth.parquet").read_bytes() == (tmp_path / "b_truth.parquet").read_bytes()
-
-
 def test_another_seed_changes_the_noise_alone(tmp_path: Path, result: Simulation) -> None:
     other = simulated(tmp_path, short_rig(seed=99), truth=True)
     assert result.truth is not None and other.truth is not None
@@ -167,32 +148,13 @@ def test_another_seed_changes_the_noise_alone(tmp_path: Path, result: Simulation
     assert not np.array_equal(group(other.recording, "tendon_force"), group(result.recording, "tendon_force"))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", repeated(range(4), 0, 1))
 def test_random_rigs_run_and_keep_their_energy(tmp_path: Path, seed: int) -> None:
     truth = simulated(tmp_path, random_rig(seed, duration=8.0), truth=True).truth
     assert truth is not None
-    balance = truth["kinetic_energy"] + truth["potential_energy"] + truth["friction_work"] + truth["damping_work"]
-    balance = balance - truth["motor_work"] - truth["push_work"]
-    assert np.ptp(balance) < 1e-4 * np.ptp(truth["friction_work"])
+    assert_energy_is_kept(truth)
     moved = np.ptp(group(truth, "joint_position"), axis=0)
     assert moved.min() > 0.05 and not group(truth, "slack").any()
-
-
-def test_the_index_rigs_begin_alike_and_differ_by_pretension(tmp_path: Path) -> None:
-    """The same motion at 10 and 40 N; joints lag more where friction is four times as strong."""
-    found = []
-    for name in ("index_finger.json", "index_finger_x4.json"):
-        data = {"format": "tendonfmu-rig-1", "base": str(RIGS / name), "recording": {"duration": 6.0}}
-        found.append(simulated(tmp_path, data, truth=True).truth)
-    low, high = found
-    assert low is not None and high is not None
-    ratio = group(high, "tendon_force").mean() / group(low, "tendon_force").mean()
-    assert abs(ratio - 4.0) < 0.05
-    # the motors do the same but for the springs' stretch, within ten times the relative tolerance of 10 mm
-    stretch = group(high, "tendon_position") - group(low, "tendon_position")
-    assert np.ptp(stretch, axis=0).max() < 1e-7
-    friction = [np.sqrt((group(truth, "friction_torque") ** 2).mean(axis=0)) for truth in (low, high)]
-    assert np.all(friction[1] > 2.0 * friction[0])
 
 
 # --- failure ----------------------------------------------------------------------------------------------------------
@@ -268,12 +230,6 @@ def test_no_file_of_the_rig_is_overwritten(call: Call, tmp_path: Path) -> None:
     data = short_rig(motion={"kind": "file", "file": "motion.csv", "pretension": 10.0})
     answer = call("simulate", written(tmp_path, data), "-o", "motion.csv")
     assert answer.status == 2 and "motion.csv: the same file as the input" in answer.err
-
-
-def test_without_a_plant_simulate_says_so(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(binding, "HAS_PLANT", False)
-    answer = call("simulate", written(tmp_path, short_rig()), "-o", "rec.csv")
-    assert (answer.status, answer.err) == (2, f"tendonfmu: {binding.PLANT_MISSING}\n")
 
 
 # --- the binding ------------------------------------------------------------------------------------------------------
