@@ -6,11 +6,8 @@ Then what `build --reference` puts into an FMU for others to check by, and the s
 from __future__ import annotations
 
 import io
-import os
 import re
 import shutil
-import subprocess
-import sys
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -26,7 +23,6 @@ from reference import make_reference_traces as traces
 
 import tendonfmu as tf
 from command import Answer, run_script
-from optional_parts import require
 from repository_paths import ROOT, TESTS
 from tendonfmu.fmu import build_fmu
 
@@ -114,18 +110,14 @@ def check(fmu: Path, *more: Path | str) -> Answer:
     return run_script(EXAMPLE / "check_reference.py", fmu, *more)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_script_agrees(fmus: Path, name: str) -> None:
-    done = check(fmus / f"{name}.fmu", REFERENCE / name)
-    assert done.status == 0, done.out + done.err
-    rows = [line.split() for line in done.out.splitlines()]
-    assert [row[0] for row in rows[1:-1]] == list(read_csv(REFERENCE / f"{name}_ref.csv").dtype.names)[1:]
-    assert {row[-1] for row in rows[1:-1]} == {"agrees"}
-    assert all(float(row[1]) <= float(row[2]) for row in rows[1:-1])
-
-
-def test_the_script_shows_a_changed_number(fmus: Path) -> None:
-    """A tunable parameter that is set, or another finger: what does not depend on it still agrees."""
+def test_the_script_agrees_and_shows_a_changed_number(fmus: Path) -> None:
+    """With another value of a parameter, what does not depend on it still agrees."""
+    for name in NAMES:
+        done = check(fmus / f"{name}.fmu", REFERENCE / name)
+        assert done.status == 0, done.out + done.err
+        rows = [line.split() for line in done.out.splitlines()]
+        assert [row[0] for row in rows[1:-1]] == list(read_csv(REFERENCE / f"{name}_ref.csv").dtype.names)[1:]
+        assert {row[-1] for row in rows[1:-1]} == {"agrees"}
     done = check(fmus / "asymmetric_pair.fmu", REFERENCE / "asymmetric_pair", "--set", "bias.forget_rate=5.5")
     assert done.status == 1, done.out + done.err
     assert re.search(r"^compensated_torque\[\d\] .* DIFFERS$", done.out, re.MULTILINE)
@@ -134,14 +126,10 @@ def test_the_script_shows_a_changed_number(fmus: Path) -> None:
 
 
 SPOILED = {
-    "output as input": ("_in.csv", r"tendon_force\[1\]", "slack[1]", r"causality output; expected input"),
     "missing output": ("_ref.csv", r'"bias_torque\[1\]"', '"bias.forget_rate"', r"no column bias_torque\[1\]"),
-    "unknown output": ("_ref.csv", r'"bias_torque\[1\]"', '"bias"', "bias is not a numeric variable"),
     "text": ("_ref.csv", r"\n0\.0078125,[^,]*", "\n0.0078125,high", r"line 3, column compensated_torque\[1\]: 'high'"),
     "NaN": ("_in.csv", r"\n0\.0078125,[^,]*", "\n0.0078125,nan", r"line 3, column tendon_force\[1\]: 'nan'; expected"),
-    "short row": ("_in.csv", r"\n0\.0078125,[^,]*", "\n0.0078125", "line 3: 2 columns; expected 3"),
     "no stop time": ("_ref.opt", "StopTime", "Stop", "StopTime missing"),
-    "step of 0": ("_ref.opt", r"StepSize,\S*", "StepSize,0", "StepSize above 0"),
 }
 
 
@@ -164,30 +152,6 @@ def test_the_script_refuses_what_is_no_fmu_or_setting(fmus: Path, tmp_path: Path
     for setting in ("bias.forget_rate", "forget=1", "bias.forget_rate=nan"):
         done = check(fmus / "cable_loop.fmu", REFERENCE / "cable_loop", "--set", setting)
         assert done.status == 2 and done.out == ""
-
-
-@pytest.mark.long
-def test_the_shell_script_checks_every_fmu_of_a_folder(fmus: Path, tmp_path: Path) -> None:
-    """The worst answer of all is its own; without fmpy it says so in one line."""
-
-    def run_all(folder: Path, traces_folder: Path, python: Path) -> subprocess.CompletedProcess[str]:
-        environment = dict(os.environ, PYTHON=str(python))
-        command = ["sh", str(EXAMPLE / "reference_check.sh"), str(folder), str(traces_folder)]
-        return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-
-    done = run_all(fmus, REFERENCE, Path(sys.executable))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.findall(r"0 of \d+ variables differ from (\w+)", done.stdout) == sorted(NAMES)
-    shutil.copytree(REFERENCE, tmp_path / "traces")
-    spoiled = tmp_path / "traces" / "cable_loop_ref.csv"
-    spoiled.write_text(re.sub(r"\n0\.0,[^,]*", "\n0.0,1.0", spoiled.read_text(), count=1))
-    one = run_all(fmus, tmp_path / "traces", Path(sys.executable))
-    assert one.returncode == 1 and one.stderr == f"reference_check: 1 of {len(NAMES)} FMUs failed: cable_loop.fmu\n"
-    bare = tmp_path / "bare"  # -S leaves the installed packages out
-    bare.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "$@"\n')
-    bare.chmod(0o755)
-    done = run_all(fmus, REFERENCE, bare)
-    assert done.returncode == 2 and "no fmpy" in done.stderr and done.stderr.count("\n") == 1
 
 
 # --- what build puts into an FMU --------------------------------------------------------------------------------------
@@ -284,15 +248,10 @@ def test_a_recording_of_another_finger_is_warned_of(tmp_path: Path) -> None:
     assert (tmp_path / "other.fmu").exists()
 
 
-@pytest.mark.parametrize("name", ["finger.zip", "finger", ".fmu", "finger.fmu.json"])
-@pytest.mark.parametrize("source", [DESCRIPTION, ROOT / "examples/rigs/index_finger.json"])
-def test_an_output_of_another_suffix_is_refused(tmp_path: Path, source: Path, name: str) -> None:
-    with pytest.raises(tf.InputError, match=rf"{re.escape(name)}: expected a name that ends in \.fmu"):
-        tf.build(source, tmp_path / name)
-    assert not list(tmp_path.iterdir())
-
-
 def test_what_cannot_be_a_reference_is_refused(tmp_path: Path) -> None:
+    for name in ("finger.zip", ".fmu", "finger.fmu.json"):
+        with pytest.raises(tf.InputError, match=rf"{re.escape(name)}: expected a name that ends in \.fmu"):
+            tf.build(DESCRIPTION, tmp_path / name)
     one = tf.Recording.from_arrays([0.0], tendon_force=[[5.0]], tendon_position=[[0.0]])
     with pytest.raises(tf.InputError, match="one sample; expected two or more"):
         tf.build(DESCRIPTION, tmp_path / "a.fmu", reference=one)
@@ -360,24 +319,6 @@ def test_the_forms_of_other_tools_are_read(fmu: Path, tmp_path: Path) -> None:
         assert float(done.out.splitlines()[1].split()[2]) == pytest.approx(allowed, rel=1e-3)
 
 
-def test_an_experiment_in_the_newer_form_sets_parameters(fmu: Path, tmp_path: Path) -> None:
-    """Times in a child element, and a parameter set with another value than the FMU's."""
-
-    def edit(files: dict[str, bytes]) -> None:
-        files[EXPERIMENT] = b"""<Experiments name="two"><Experiment name="first"><TransientSimulation startTime="0"
-            stopTime="1.9921875" stepSize="0.0078125"/><Parameters source="set.ssv"/>
-            <Stimuli source="cable_loop_in.csv"/><References source="cable_loop_ref.csv"/></Experiment></Experiments>"""
-        files[f"{FOLDER}/set.ssv"] = b"""<ssv:ParameterSet version="1.0" name="set"
-            xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"><ssv:Parameters>
-            <ssv:Parameter name="bias.forget_rate"><ssv:Real value="7"/></ssv:Parameter>
-            <ssv:Parameter name="of another model"><ssv:Real value="1"/></ssv:Parameter>
-            </ssv:Parameters></ssv:ParameterSet>"""
-
-    done = check(edited(fmu, tmp_path, edit))
-    assert done.status == 1 and done.out.splitlines()[-1].endswith("differ from first"), done.err
-    assert re.search(r"compensated_torque\[1\] .* DIFFERS", done.out) and re.search(r"joint_angle.* agrees", done.out)
-
-
 ELSEWHERE = b'<fmiReferences><Related source="https://example.org/a.csv" role="result"/></fmiReferences>'
 MISSING: dict[str, tuple[str, bytes | None, str]] = {
     "no manifest": (MANIFEST, None, "no extra/.* in it; expected reference results in the FMU, or FOLDER/NAME"),
@@ -399,42 +340,3 @@ def test_a_bad_file_in_the_fmu_is_named(fmu: Path, tmp_path: Path, missing: str)
     done = check(edited(fmu, tmp_path, edit))
     assert done.status == 2 and done.err.count("\n") == 1 and done.out == ""
     assert re.search(message, done.err), done.err
-
-
-DECAY = """
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real, String
-
-class Decay(Fmi2Slave):
-    def __init__(self, **arguments):
-        super().__init__(**arguments)
-        self.x, self.rate, self.high, self.label = 1.0, 1.0, True, "no number"
-        output = {"causality": Fmi2Causality.output, "variability": Fmi2Variability.discrete}
-        self.register_variable(String("label", **output))
-        self.register_variable(Real("x", causality=Fmi2Causality.output))
-        self.register_variable(Boolean("high", **output))
-        self.register_variable(Real("rate", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
-        self.default_experiment = DefaultExperiment(start_time=0, stop_time=5, step_size=0.1)
-
-    def do_step(self, time, step):
-        self.x -= step * self.rate * self.x
-        self.high = self.x > 0.5
-        return True
-"""
-
-
-@pytest.mark.long
-def test_the_fmu_of_another_tool_with_its_result(tmp_path: Path) -> None:
-    """A result as the Reference FMUs have it: Euler's steps, in closed form."""
-    require("pythonfmu")
-    (tmp_path / "decay.py").write_text(DECAY)
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "decay.py"], cwd=tmp_path, check=True)
-    rows = ["time,x,high,label"]
-    rows += [f"{0.1 * k!r},{0.9**k!r},{str(0.9**k > 0.5).lower()},no number" for k in range(51)]
-    with zipfile.ZipFile(tmp_path / "Decay.fmu", "a") as archive:
-        archive.writestr(MANIFEST, RESULT_ALONE.replace("SOURCE", "Decay_out.csv"))
-        archive.writestr(f"{FOLDER}/Decay_out.csv", "\n".join(rows) + "\n")
-    done = check(tmp_path / "Decay.fmu", "--tolerance", "1e-12")
-    assert done.status == 0, done.out + done.err
-    assert [line.split()[0] for line in done.out.splitlines()[1:-1]] == ["x", "high"]
-    done = check(tmp_path / "Decay.fmu", "--set", "rate=1.1")
-    assert done.status == 1 and re.search(r"^x .* DIFFERS$", done.out, re.MULTILINE)
