@@ -107,11 +107,9 @@ def get(instance: Instance, references: list[int], count: int) -> int:
 
 
 def derive(instance: Instance, name: str, unknown: str, known: str, seed: list[float], count: int) -> int:
-    """Call for a derivative of one variable by one; count: of the sensitivity, which FMI 3.0 is told."""
-    seeds, found = (c_double * len(seed))(*seed), (c_double * 9)()
-    numbers = (seeds, len(seed), found, count) if instance.version == 3 else (seeds, found)
-    lists = (instance.vrs(instance.fmu.whole([each])) for each in (unknown, known))
-    return instance.call(f"Get{name}Derivative", *(x for refs in lists for x in (refs, 1)), *numbers)
+    """Call for a derivative of the variable of an element by another."""
+    status: int = instance.derive(name, *(instance.fmu.whole([each]) for each in (unknown, known)), seed, count)[0]
+    return status
 
 
 def first(instance: Instance, name: str) -> Any:

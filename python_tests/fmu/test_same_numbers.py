@@ -5,7 +5,6 @@ That the core and the FMU agree with the independent implementation: test_refere
 
 from __future__ import annotations
 
-from ctypes import c_double
 from itertools import pairwise
 from pathlib import Path
 
@@ -135,10 +134,8 @@ def with_derivatives(fmu: UnpackedFmu) -> list[str]:
 def derive(instance: Instance, name: str, unknowns: list[str], knowns: list[str], seed: list[float]) -> list[float]:
     """A derivative of whole variables. name: Directional or Adjoint."""
     count = instance.fmu.count(unknowns if name == "Directional" else knowns)
-    found, seeds = (c_double * count)(*[np.nan] * count), (c_double * len(seed))(*seed)
-    lists = instance.vrs(unknowns), len(unknowns), instance.vrs(knowns), len(knowns)
-    numbers = (seeds, len(seed), found, count) if instance.version == 3 else (seeds, found)
-    assert instance.call(f"Get{name}Derivative", *lists, *numbers) == OK, instance.last_message
+    status, found = instance.derive(name, unknowns, knowns, seed, count)
+    assert status == OK, instance.last_message
     return list(found)
 
 

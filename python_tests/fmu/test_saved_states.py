@@ -89,16 +89,6 @@ def test_a_saved_state_continues_in_a_new_process(
     assert pickle.loads(answer.stdout) == expected
 
 
-def test_going_back_and_forth_in_one_instance(kind: Kind) -> None:
-    with kind.brought_to("s") as instance:
-        saved = instance.save()
-        futures = []
-        for _ in range(3):
-            assert instance.restore(saved) == OK
-            futures.append(kind.advance(instance, 5, 20))
-        assert futures[0] == futures[1] == futures[2]
-
-
 # --- damaged states ---------------------------------------------------------------------------------------------------
 
 

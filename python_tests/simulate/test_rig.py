@@ -20,7 +20,6 @@ import pytest
 
 from command import Call
 from plant_rigs import needs_plant
-from random_rigs import random_rig
 from repetitions import repeated
 from rig_cases import (
     EXAMPLES,
@@ -166,16 +165,8 @@ BAD: list[tuple[str, Any, str]] = [
 ]
 BAD_PHYSICS: list[tuple[str, Any, str]] = [
     ("physics.links.1.mass", -0.01, r"physics\.links\[2\]\.mass = -0\.01: expected .*kg"),
-    ("physics.links.1.inertia", [1e-6, 1e-6, 1e-5], r"physics\.links\[2\]\.inertia = .*: expected three moments"),
-    ("physics.friction.presliding.edge", 0.0, r"physics\.friction\.presliding\.edge = 0\.0: expected"),
-    ("physics.gravity", [0.0, -9.81], r"physics\.gravity has 2 elements: expected a list of 3 numbers"),
-    ("physics.spring", 1.0, r"physics\.spring.*"),
     ("sensors.tendon_force.noise", -1.0, r"sensors\.tendon_force\.noise = -1\.0: expected"),
-    ("sensors.joint_position.backlash", 0.1, r"sensors\.joint_position.*backlash"),
-    ("integration.method", "euler", r'integration\.method = "euler": expected'),
-    ("integration.relative_tolerance", 1.0, r"integration\.relative_tolerance = 1\.0: expected"),
     ("pushes", [{"start": 1.0}], r"pushes\[1\]\."),
-    ("finger.tendons.0.stiffness", 1e12, r"stiffness|physics\.links\[\d\]"),
     # all tendons pull the last joint the same way: nothing holds it against pretension
     ("finger.tendons.7.moment_arms.3", 0.0045, r"finger\.tendons\[\d\]\.moment_arms: expected .*positive null vector"),
 ]
@@ -201,7 +192,7 @@ def test_a_rig_without_a_recording_cannot_be_recorded(tmp_path: Path) -> None:
 
 
 @needs_plant
-@pytest.mark.parametrize("data", [with_everything(), *map(random_rig, range(5))], ids=lambda data: data["name"])
+@pytest.mark.parametrize("data", [index_rig(), with_everything()], ids=lambda data: data["name"])
 def test_the_plant_and_the_schema_take_good_rigs(tmp_path: Path, data: dict[str, Any]) -> None:
     found = plant_of(read_rig(written(tmp_path, data)))
     assert found.joints == len(data["finger"]["joints"]) and not found.initialised

@@ -308,6 +308,15 @@ class Instance:
         """All outputs that are numbers, then the flags."""
         return self.read([*self.fmu.names("output"), *self.fmu.names("output", "Boolean")])
 
+    def derive(
+        self, name: str, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float], count: int
+    ) -> Any:
+        """Call for a derivative of whole variables, Directional or Adjoint: return the status and `count` numbers."""
+        seeds, found = (c_double * len(seed))(*seed), (c_double * count)(*[np.nan] * count)
+        numbers = (seeds, len(seed), found, count) if self.version == 3 else (seeds, found)
+        lists = self.vrs(unknowns), len(unknowns), self.vrs(knowns), len(knowns)
+        return self.call(f"Get{name}Derivative", *lists, *numbers), list(found)
+
     # --- life
 
     def enter_initialisation(

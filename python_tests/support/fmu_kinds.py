@@ -156,10 +156,9 @@ def _state_arguments(instance: Instance, name: str) -> tuple[Any, ...]:
 
 
 def _derivative_arguments(instance: Instance, name: str) -> tuple[Any, ...]:
-    """Of all compensated torques by all tendon forces."""
-    unknown, known = (instance.fmu.names(*of) for of in (("output",), ("input",)))
-    outputs = instance.fmu.whole([each for each in unknown if each.startswith("compensated_torque[")])
-    inputs = instance.fmu.whole([each for each in known if each.startswith("tendon_force[")])
+    """Of all compensated torques by all tendon forces of the small finger."""
+    outputs = instance.fmu.whole(["compensated_torque[1]", "compensated_torque[2]"])
+    inputs = instance.fmu.whole([f"tendon_force[{i}]" for i in (1, 2, 3)])
     rows, columns = instance.fmu.count(outputs), instance.fmu.count(inputs)
     of_outputs, of_inputs = (c_double * rows)(), (c_double * columns)()
     lists = instance.vrs(outputs), len(outputs), instance.vrs(inputs), len(inputs)

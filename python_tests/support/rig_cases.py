@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from random_rigs import random_rig
+from plant_fmu_rig import fmu_rig
 from repository_paths import ROOT
 from tendonfmu.errors import InputError
 from tendonfmu.simulate.rig import read_rig
@@ -28,7 +28,10 @@ def index_rig() -> dict[str, Any]:
 
 def with_everything() -> dict[str, Any]:
     """A valid rig of 2 joints and 4 tendons that switches on every effect and uses every key."""
-    data = random_rig(1, joints=2)
+    data = fmu_rig()
+    data["motion"]["duration"] = 20.0
+    data["recording"] = {"duration": 20.0, "columns": ["joint_position", "external_torque", "contact"]}
+    data["sensors"]["tendon_position"] = {"resolution": 2e-6}
     data["settle"] = 1.0
     data["integration"]["step"] = 2e-4
     data["physics"] |= everything_of_physics(data["physics"])
