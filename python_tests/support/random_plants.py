@@ -1,7 +1,6 @@
 """Seeded random expanded rigs and states for checks of the simulated finger's right-hand side.
 
-They are made to exercise every term and switch of the equations, not to be simulated for long: whole rigs as users
-write them are random_rigs.py's business.
+They are made to exercise every term and switch of the equations, not to be simulated for long.
 """
 
 from __future__ import annotations
