@@ -8,13 +8,12 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from fmu_binary import FINGER, OK, SOURCE, Instance, UnpackedFmu, motion, unpack
-from fmu_kinds import friction_kind
+from fmu_kinds import declared_dependencies, friction_kind
 from plant_fmu_rig import SEED, play
 from plant_rigs import needs_plant
 from random_fingers import Recording, random_case
@@ -106,7 +105,7 @@ def compare_slopes(instance: Instance, finger: native.Instance) -> None:
     """Directional derivatives have the bits of the C interface, and are 0 where no dependency is declared."""
     fmu = instance.fmu
     outputs, inputs = with_derivatives(fmu), fmu.names("input")
-    found, declared = jacobian(instance, outputs, inputs), dependencies(fmu)
+    found, declared = jacobian(instance, outputs, inputs), declared_dependencies(fmu.folder)
     for column, name in enumerate(inputs):
         group, index = name.rstrip("]").split("[")
         count = sum(each.startswith(f"{group}[") for each in inputs)
@@ -115,12 +114,6 @@ def compare_slopes(instance: Instance, finger: native.Instance) -> None:
         np.testing.assert_array_equal(found[:, column], expected)
         for output, slope in zip(outputs, found[:, column], strict=True):
             assert not slope or fmu.place(name)[0] in declared[fmu.place(output)[0]], (output, name)
-
-
-def dependencies(fmu: UnpackedFmu) -> dict[str, set[str]]:
-    """Inputs that each output depends on; arrays in FMI 3.0."""
-    description = fmpy.read_model_description(str(fmu.folder), validate=False)
-    return {u.variable.name: {d.name for d in u.dependencies or ()} for u in description.outputs}
 
 
 # --- derivatives ------------------------------------------------------------------------------------------------------

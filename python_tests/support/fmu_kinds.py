@@ -6,8 +6,10 @@ import ctypes
 from collections.abc import Callable, Mapping
 from ctypes import c_double, c_int, c_size_t, c_void_p
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import fmpy
 import pytest
 
 import plant_fmu_rig
@@ -113,6 +115,12 @@ def kinds(*values: Any, only: str = "") -> list[Any]:
 def kind_of(name: str, request: pytest.FixtureRequest) -> Kind:
     fixture, make = MAKERS[name]
     return make(request.getfixturevalue(fixture))
+
+
+def declared_dependencies(folder_or_file: Path) -> dict[str, set[str]]:
+    """Return the inputs that each output of an FMU depends on; arrays in FMI 3.0."""
+    description = fmpy.read_model_description(str(folder_or_file), validate=False)
+    return {u.variable.name: {d.name for d in u.dependencies or ()} for u in description.outputs}
 
 
 # --- calls with good arguments ----------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -73,12 +74,13 @@ def unloaded(fmu: UnpackedFmu) -> Callable[[int], None]:
     """The library loaded from a copy, one instance made and freed, the library unloaded."""
     import _ctypes
 
-    copy = fmu.binary.with_name("unloaded.so")
-    shutil.copy(fmu.binary, copy)
+    folder = tempfile.TemporaryDirectory()  # until the process ends
+    copy = str(shutil.copy(fmu.binary, Path(folder.name) / "unloaded.so"))
     arguments = (b"finger", 1, fmu.identifier, fmu.resources, None, 0, 0)
 
     def cycle(_: int) -> None:
-        library = ctypes.CDLL(str(copy))
+        assert folder
+        library = ctypes.CDLL(copy)
         library.fmi2Instantiate.restype = ctypes.c_void_p
         library.fmi2FreeInstance(ctypes.c_void_p(library.fmi2Instantiate(*arguments)))
         _ctypes.dlclose(library._handle)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from fmu_binary import LAW, OK, Instance
@@ -53,8 +52,3 @@ def play(instance: Instance, steps: int, begin: int = 0, start: float = 0.0, ste
         assert instance.step(start + k * step, step) == OK, instance.last_message
         rows.append(instance.outputs())
     return rows
-
-
-def plant_binary(folder: Path) -> Path:
-    """The library in an unpacked FMU."""
-    return next(path for path in (folder / "binaries").rglob("*") if path.is_file())
