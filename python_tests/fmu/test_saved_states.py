@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, motion, pointer, unpack
 from fmu_kinds import Kind, friction_kind, kind_of, kinds, plant_kind
-from plant_fmu_rig import SEED, TOLERANCE, fmu_rig, play
+from plant_fmu_rig import SEED, TOLERANCE, fmu_rig
 from plant_rigs import needs_plant
 from repetitions import repeated
 from repository_paths import ROOT, SUPPORT
@@ -309,19 +309,6 @@ def restart_errors(
         group: float(max(share[k] for k, name in enumerate(names) if name.startswith(group)) / tolerance)
         for group in RESTART_ERROR
     }
-
-
-@needs_plant
-def test_a_run_restored_with_the_fixed_step_is_the_uninterrupted_one(plant_fmu: UnpackedFmu) -> None:
-    """To the bit; the state brings its settings."""
-    with Instance(plant_fmu) as instance, plant_kind(plant_fmu).brought_to("s") as other:
-        assert instance.write({"integrator": 2}) == OK
-        instance.initialise()
-        play(instance, 130)
-        saved = instance.save()
-        uninterrupted = play(instance, 100, begin=130)
-        assert other.restore(saved) == OK and other.read(["integrator"]) == [2]
-        assert play(other, 100, begin=130) == uninterrupted
 
 
 def second(instance: Instance, begin: int) -> NDArray[Any]:
