@@ -16,8 +16,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 
 from command import Answer, Call, DemoRun, run_script
-from fmi3_binary import UnpackedFmu3, unpack3
 from fmu_binary import FINGER, UnpackedFmu, unpack
+from fmu_kinds import Kind, kind_of, kinds
 from made_once import made_once
 from optional_parts import require
 from plant_fmu_rig import fmu_rig
@@ -28,15 +28,19 @@ if TYPE_CHECKING:
 pytest_plugins = ["processor_time"]
 
 
+def built(factory: pytest.TempPathFactory, name: str, fmi: int) -> Path:
+    """The packed FMU of fmu_binary.FINGER."""
+    from tendonfmu.fmu import build_fmu
+
+    folder = factory.mktemp(name)
+    (folder / "finger.json").write_text(json.dumps(FINGER))
+    return build_fmu(folder / "finger.json", folder / "small_finger.fmu", fmi=fmi)
+
+
 @pytest.fixture(scope="session")
 def small_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The packed FMU of fmu_binary.FINGER."""
-    from tendonfmu.fmu.packaging import build_fmu
-
-    folder = tmp_path_factory.mktemp("small_fmu")
-    (folder / "finger.json").write_text(json.dumps(FINGER))
-    build_fmu(folder / "finger.json", folder / "small_finger.fmu")
-    return folder / "small_finger.fmu"
+    """In FMI 2.0."""
+    return built(tmp_path_factory, "small_fmu", 2)
 
 
 @pytest.fixture(scope="session")
@@ -47,18 +51,14 @@ def small_fmu(small_fmu_path: Path) -> UnpackedFmu:
 
 @pytest.fixture(scope="session")
 def small_fmu3_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The packed FMU of fmu_binary.FINGER in FMI 3.0."""
-    from tendonfmu.fmu import build_fmu
-
-    folder = tmp_path_factory.mktemp("small_fmu3")
-    (folder / "finger.json").write_text(json.dumps(FINGER))
-    return build_fmu(folder / "finger.json", folder / "small_finger.fmu", fmi=3)
+    """In FMI 3.0."""
+    return built(tmp_path_factory, "small_fmu3", 3)
 
 
 @pytest.fixture(scope="session")
-def small_fmu3(small_fmu3_path: Path) -> UnpackedFmu3:
+def small_fmu3(small_fmu3_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
-    return unpack3(small_fmu3_path, small_fmu3_path.parent / "unpacked")
+    return unpack(small_fmu3_path, small_fmu3_path.parent / "unpacked")
 
 
 @pytest.fixture(scope="session")
@@ -75,6 +75,19 @@ def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plant_fmu(plant_fmu_path: Path) -> UnpackedFmu:
     """The same, unpacked and loaded."""
     return unpack(plant_fmu_path, plant_fmu_path.parent / "unpacked")
+
+
+@pytest.fixture(params=["small_fmu", "small_fmu3"], ids=["fmi2", "fmi3"])
+def small(request: pytest.FixtureRequest) -> UnpackedFmu:
+    """The friction FMU of fmu_binary.FINGER in each version of FMI."""
+    fmu: UnpackedFmu = request.getfixturevalue(request.param)
+    return fmu
+
+
+@pytest.fixture(params=kinds())
+def kind(request: pytest.FixtureRequest) -> Kind:
+    """Each of the three FMUs: friction in FMI 2.0 and 3.0, and the simulated finger."""
+    return kind_of(request.param, request)
 
 
 @pytest.fixture(scope="session")

@@ -1,18 +1,17 @@
-/* The library of an FMU in a host in which one allocation after another fails: test_failing_allocations.py.
+/* A host in which one allocation after another fails, linked with the library of an FMU: test_library.py.
  *
- *   failing_allocations LIBRARY GUID LOCATION
+ *   failing_allocations GUID LOCATION
  *
  * Prints: allocations of an instance's life; how many of them refuse a call when they fail; how many of these with a
  * message about memory; how many leave bytes behind, life after life. */
 #define _GNU_SOURCE
 
-#include <dlfcn.h>
 #include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2FunctionTypes.h"
+#include "fmi2Functions.h"
 
 static long allocations, failing = -1, messages;
 
@@ -28,15 +27,6 @@ void* calloc(size_t count, size_t size) {
 }
 void* realloc(void* block, size_t size) {
   return allocations++ == failing ? NULL : __libc_realloc(block, size);
-}
-
-static void* function(void* library, const char* name) {
-  void* found = dlsym(library, name);
-  if (!found) {
-    fprintf(stderr, "failing_allocations: %s\n", dlerror());
-    exit(1);
-  }
-  return found;
 }
 
 static void must(fmi2Status status, const char* what) {
@@ -59,38 +49,23 @@ static void* no_allocation(size_t count, size_t size) {
 }
 
 /* Life of an instance in which allocation number `which` fails: 1 if a call was refused for it. */
-static int life(void* library, const char* guid, const char* location, long which, long* left) {
+static int life(const char* guid, const char* location, long which, long* left) {
   const fmi2CallbackFunctions callbacks = {log_line, no_allocation, free, NULL, NULL};
-  fmi2InstantiateTYPE* instantiate;
-  fmi2EnterInitializationModeTYPE* enter;
-  fmi2ExitInitializationModeTYPE* leave;
-  fmi2DoStepTYPE* step;
-  fmi2GetFMUstateTYPE* get_state;
-  fmi2FreeFMUstateTYPE* free_state;
-  fmi2FreeInstanceTYPE* free_instance;
-  *(void**)&instantiate = function(library, "fmi2Instantiate");
-  *(void**)&enter = function(library, "fmi2EnterInitializationMode");
-  *(void**)&leave = function(library, "fmi2ExitInitializationMode");
-  *(void**)&step = function(library, "fmi2DoStep");
-  *(void**)&get_state = function(library, "fmi2GetFMUstate");
-  *(void**)&free_state = function(library, "fmi2FreeFMUstate");
-  *(void**)&free_instance = function(library, "fmi2FreeInstance");
-
   const size_t before = mallinfo2().uordblks;
   int refused = 1;
   messages = allocations = 0;
   failing = which;
-  fmi2Component finger = instantiate("hungry", fmi2CoSimulation, guid, location, &callbacks, fmi2False, fmi2True);
+  fmi2Component finger = fmi2Instantiate("hungry", fmi2CoSimulation, guid, location, &callbacks, fmi2False, fmi2True);
   if (finger) {
     fmi2FMUstate state = NULL;
-    must(enter(finger), "fmi2EnterInitializationMode");
-    must(leave(finger), "fmi2ExitInitializationMode");
-    must(step(finger, 0.001, 0.001, fmi2True), "fmi2DoStep");
-    refused = get_state(finger, &state) != fmi2OK;
+    must(fmi2EnterInitializationMode(finger), "fmi2EnterInitializationMode");
+    must(fmi2ExitInitializationMode(finger), "fmi2ExitInitializationMode");
+    must(fmi2DoStep(finger, 0.001, 0.001, fmi2True), "fmi2DoStep");
+    refused = fmi2GetFMUstate(finger, &state) != fmi2OK;
     if (state) {
-      must(free_state(finger, &state), "fmi2FreeFMUstate");
+      must(fmi2FreeFMUstate(finger, &state), "fmi2FreeFMUstate");
     }
-    free_instance(finger);
+    fmi2FreeInstance(finger);
   }
   failing = -1;
   *left = (long)mallinfo2().uordblks - (long)before;
@@ -98,25 +73,23 @@ static int life(void* library, const char* guid, const char* location, long whic
 }
 
 int main(int count, char** words) {
-  void* library = count == 4 ? dlopen(words[1], RTLD_NOW | RTLD_LOCAL) : NULL;
-  if (!library) {
-    fprintf(stderr, "failing_allocations: %s\n", count == 4 ? dlerror() : "expected LIBRARY GUID LOCATION");
-    return 1;
+  long refused = 0, reported = 0, leaks = 0, left = 0;
+  if (count != 3) {
+    return 2;
   }
-  long refused = 0, said = 0, leaks = 0, left = 0;
-  life(library, words[2], words[3], -1, &left); /* what the C library keeps for itself */
-  life(library, words[2], words[3], -1, &left);
+  life(words[1], words[2], -1, &left); /* what the C library keeps for itself */
+  life(words[1], words[2], -1, &left);
   const long all = allocations;
   for (long which = 0; which < all; ++which) {
     long total = 0;
     for (int again = 0; again < 50; ++again) { /* the allocator keeps what the first ones free for the next */
-      const int no = life(library, words[2], words[3], which, &left);
+      const int no = life(words[1], words[2], which, &left);
       total += again < 10 ? 0 : left;
       refused += again == 49 && no;
-      said += again == 49 && no && messages > 0;
+      reported += again == 49 && no && messages > 0;
     }
     leaks += total >= 40;
   }
-  printf("%ld %ld %ld %ld\n", all, refused, said, leaks);
+  printf("%ld %ld %ld %ld\n", all, refused, reported, leaks);
   return 0;
 }

@@ -5,10 +5,7 @@ Each is made from a sound one: other bytes, names, headers and members.
 
 from __future__ import annotations
 
-import gzip
-import io
 import struct
-import tarfile
 import tempfile
 import zipfile
 from collections.abc import Callable
@@ -58,17 +55,6 @@ def linked(target: str) -> Maker:
     return make
 
 
-def bomb(fmu: Path, file: Path) -> None:
-    """2 GiB of zeros in 9 MiB."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, content in members(fmu).items():
-            archive.writestr(name, content)
-        for k in range(2):
-            with archive.open(f"resources/big{k}", "w", force_zip64=True) as out:
-                for _ in range(64):
-                    out.write(bytes(1 << 24))
-
-
 def in_headers(field: int, size: int, value: int) -> Maker:
     """A field of the central directory's first entries, set to a value."""
 
@@ -81,10 +67,6 @@ def in_headers(field: int, size: int, value: int) -> Maker:
         file.write_bytes(bytes(content))
 
     return make
-
-
-def many(fmu: Path, file: Path) -> None:
-    written([*members(fmu).items(), *((f"resources/{k}", b"") for k in range(70_000))], file)
 
 
 def bytes_of(change: Callable[[bytes], bytes]) -> Maker:
@@ -103,43 +85,20 @@ ENTITY = (
 XML = "modelDescription.xml"
 
 
-def gzip_of(data: bytes) -> bytes:
-    return gzip.compress(data)
-
-
-def tar_of(data: bytes) -> bytes:
-    out = io.BytesIO()
-    with tarfile.open(fileobj=out, mode="w") as archive:
-        info = tarfile.TarInfo(XML)
-        info.size = len(data)
-        archive.addfile(info, io.BytesIO(data))
-    return out.getvalue()
-
-
 ARCHIVES: dict[str, Maker] = {
     "empty": bytes_of(lambda b: b""),
-    "text": bytes_of(lambda b: b"no archive\n" * 100),
     "half": bytes_of(lambda b: b[: len(b) // 2]),
     "without its end": bytes_of(lambda b: b[:-1]),
-    "end alone": bytes_of(lambda b: b[-22:]),
-    "gzip": bytes_of(gzip_of),
-    "tar": bytes_of(lambda b: tar_of(b[: len(b) // 2])),
-    "zeros in the middle": bytes_of(lambda b: b[: len(b) // 3] + bytes(4096) + b[len(b) // 3 + 4096 :]),
     "path up": with_member("../../../../../../../../tmp/reliability_evil", b"evil"),
-    "path up, inside": with_member("resources/../../reliability_evil", b"evil"),
     "absolute path": with_member("/tmp/reliability_evil", b"evil"),
     "backslashes": with_member("..\\..\\reliability_evil", b"evil"),
     "drive": with_member("C:\\reliability_evil", b"evil"),
     "link to a file": linked("/etc/passwd"),
-    "link to a folder": linked("/tmp"),
     "long name": with_member("resources/" + "x" * 5000, b""),
     "name with NUL": with_member("resources/a\0b", b""),
     "name of a folder and of a file": with_member("resources", b"a file"),
     "twice the same name": with_member(XML, b"<x/>"),
-    "70,000 members": many,
-    "bomb of 2 GiB": bomb,
     "10 GB in the headers": in_headers(24, 4, 0xFFFFFFF0),
-    "zip64 without its field": in_headers(24, 4, 0xFFFFFFFF),
     "unknown compression": in_headers(10, 2, 99),
     "encrypted": in_headers(8, 2, 1),
     "wrong checksum": in_headers(16, 4, 12345),
@@ -148,25 +107,21 @@ ARCHIVES: dict[str, Maker] = {
     "no binary": without("binaries/"),
     "no image": without("model.image"),
     "description is no XML": replaced(XML, lambda b: b"<fmiModelDescription"),
-    "description is empty": replaced(XML, lambda b: b""),
     "entities of 10^12 characters": replaced(XML, lambda b: LAUGHS),
     "entity of a file": replaced(XML, lambda b: ENTITY),
     "FMI 1.0": replaced(XML, lambda b: b.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"')),
-    "FMI 9": replaced(XML, lambda b: b.replace(b'fmiVersion="2.0"', b'fmiVersion="9.0"')),
     "another GUID": replaced(XML, lambda b: b.replace(b'guid="{', b'guid="{0')),
     "identifier with a path": replaced(XML, lambda b: b.replace(b'modelIdentifier="', b'modelIdentifier="../../../')),
     "references that are no numbers": replaced(XML, lambda b: b.replace(b'valueReference="1', b'valueReference="x1')),
     "binary is a text": replaced(".so", lambda b: b"no library\n"),
     "binary ends early": replaced(".so", lambda b: b[: len(b) // 2]),
     "binary of another machine": replaced(".so", lambda b: b[:18] + struct.pack("<H", 183) + b[20:]),
-    "image ends early": replaced("model.image", lambda b: b[:-9]),
     "image of zeros": replaced("model.image", lambda b: bytes(len(b))),
 }
 
 
 # What reading the FMU does not need: such an FMU may be run without it.
 HARMLESS = {"long name", "name with NUL", "twice the same name"}
-SLOW = {"bomb of 2 GiB", "70,000 members"}  # to make; others are refused by the same checks
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +144,7 @@ def outcome(file: Path, recording: Recording) -> str:
     return "run"
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long if n in SLOW else ()) for n in ARCHIVES])
+@pytest.mark.parametrize("name", ARCHIVES)
 def test_refused_in_one_line(
     small_fmu_path: Path, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from oracle_plant import PlantTwin
-from oracle_plant_parts import Multibody
 from plant_rigs import needs_plant
 from random_plants import random_plant, random_state
 from repetitions import repeated
@@ -49,7 +48,7 @@ def scales(twin: PlantTwin, t: float, y: Array, expected: Array) -> dict[str, fl
 
 
 @needs_plant
-@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 6)))
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(0, len(SEEDS), 12)))
 def test_derivative_agrees_with_twin(seed: int) -> None:
     rig = random_plant(seed)
     twin, plant = PlantTwin(rig), Plant(json.dumps(rig))
@@ -78,7 +77,7 @@ def differences(plant: Plant, t: float, y: Array, column: int, step: float) -> A
 
 
 @needs_plant
-@pytest.mark.parametrize("seed", range(0, 60, 2))
+@pytest.mark.parametrize("seed", repeated(SEEDS, *range(2, len(SEEDS), 12)))
 def test_jacobian_agrees_with_differences(seed: int) -> None:
     """Random states lie farther from any kink than the steps taken here."""
     rig = random_plant(seed)
@@ -99,36 +98,3 @@ def test_jacobian_agrees_with_differences(seed: int) -> None:
                 floor = 1e-6 * np.abs(expected[row]).max(initial=0.0) + 1e-12 * rate[row].max(initial=0.0) / step
                 difference = np.abs(found - expected[row]).max(initial=0.0)
                 assert difference <= floor, f"seed {seed}, column {name} {column}: {found} against {expected[row]}"
-
-
-def test_twin_mass_matrix_and_energy() -> None:
-    """The twin against itself: M symmetric and positive, and its energy balance stands still along its own flow."""
-    for seed in range(10):
-        twin = PlantTwin(random_plant(seed))
-        rng = np.random.default_rng([seed, 7])
-        t, y = rng.uniform(0.0, 4.0), random_state(rng, twin)
-        found, rate = twin.parts(t, y), twin.derivative(t, y)
-        np.testing.assert_allclose(found["mass"], found["mass"].T, rtol=1e-13, atol=1e-20)
-        assert np.linalg.eigvalsh(found["mass"]).min() > 0.0
-        step = 1e-5 / np.abs(rate[: 2 * twin.n]).max()
-        drift = (twin.balance(t, y + step * rate) - twin.balance(t, y - step * rate)) / (2.0 * step)
-        powers = sum(abs(found[name]) for name in ("motor_power", "friction_power", "damping_power"))
-        assert abs(drift) < 1e-2 * powers, f"seed {seed}: {drift} W of {powers} W"
-
-
-def test_twin_double_pendulum_by_hand() -> None:
-    """Two point masses at the ends of links of lengths a, b in one plane: the textbook's mass matrix and C."""
-    a, b, first, second = 0.04, 0.03, 0.02, 0.05
-    point = {"axis": [0.0, 1.0, 0.0], "inertia": [1e-12, 1e-12, 1e-12]}
-    links = [
-        point | {"mass": first, "centre_of_mass": [a, 0.0, 0.0]},
-        point | {"mass": second, "centre_of_mass": [b, 0.0, 0.0], "offset": [a, 0.0, 0.0]},
-    ]
-    body, q, v = Multibody({"links": links}), np.array([0.2, 0.7]), np.array([1.3, -0.4])
-    cross = second * a * b * np.cos(q[1])
-    corner = second * (a * a + b * b) + 2.0 * cross + first * a * a
-    expected = [[corner, second * b * b + cross], [second * b * b + cross, second * b * b]]
-    np.testing.assert_allclose(body.mass_matrix(q), expected, rtol=1e-6)
-    h = second * a * b * np.sin(q[1])
-    terms = [-h * (2.0 * v[0] * v[1] + v[1] ** 2), h * v[0] ** 2]
-    np.testing.assert_allclose(body.velocity_terms(q, v), terms, rtol=1e-9)

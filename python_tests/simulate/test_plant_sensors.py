@@ -129,9 +129,3 @@ def test_sensor_rate() -> None:
         assert np.all(samples == samples[:, :1])
         np.testing.assert_allclose(samples[:, 0], found[name][: len(samples) * every : every], rtol=1e-12, atol=1e-15)
     assert len(np.unique(found["measured_joint_position"])) > 60 and len(time) == 801
-
-
-def test_sensors_off() -> None:
-    rig = calm(small_rig(motion=legs_of(LEGS, [0.0]), sensors={"tendon_force": {"gain": 2.0, "noise": 1.0}}))
-    found = run(rig, grid(0.5, 1e-2), sensors=False)
-    np.testing.assert_allclose(found["measured_tendon_force"], found["tendon_force"], rtol=1e-12)

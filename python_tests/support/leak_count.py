@@ -14,6 +14,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -54,26 +55,11 @@ def handles() -> int:
 # --- what is done with an instance ------------------------------------------------------------------------------------
 
 
-def bare(fmu: UnpackedFmu) -> Callable[[int], None]:
-    """Created, initialised, stepped, freed; no Python object in between."""
-    library = fmu.library
-    arguments = (b"finger", 1, fmu.guid.encode(), fmu.location, None, 0, 0)
-
-    def cycle(_: int) -> None:
-        component = library.fmi2Instantiate(*arguments)
-        library.fmi2EnterInitializationMode(component)
-        assert library.fmi2ExitInitializationMode(component) == OK
-        assert library.fmi2DoStep(component, 0.0, 0.001, 1) == OK
-        library.fmi2FreeInstance(component)
-
-    return cycle
-
-
 def whole(fmu: UnpackedFmu) -> Callable[[int], None]:
     """Stepped, saved, in error; every tenth is refused."""
 
     def cycle(k: int) -> None:
-        with Instance(fmu, guid=fmu.guid.encode() if k % 10 else b"wrong") as instance:
+        with Instance(fmu, identifier=fmu.identifier if k % 10 else b"wrong") as instance:
             if instance.component:
                 instance.initialise()
                 assert instance.step(0.0) == OK
@@ -88,21 +74,21 @@ def unloaded(fmu: UnpackedFmu) -> Callable[[int], None]:
     """The library loaded from a copy, one instance made and freed, the library unloaded."""
     import _ctypes
 
-    copy = fmu.binary.with_name("unloaded.so")
-    shutil.copy(fmu.binary, copy)
-    arguments = (b"finger", 1, fmu.guid.encode(), fmu.location, None, 0, 0)
+    folder = tempfile.TemporaryDirectory()  # until the process ends
+    copy = str(shutil.copy(fmu.binary, Path(folder.name) / "unloaded.so"))
+    arguments = (b"finger", 1, fmu.identifier, fmu.resources, None, 0, 0)
 
     def cycle(_: int) -> None:
-        library = ctypes.CDLL(str(copy))
+        assert folder
+        library = ctypes.CDLL(copy)
         library.fmi2Instantiate.restype = ctypes.c_void_p
-        library.fmi2FreeInstance.argtypes = [ctypes.c_void_p]
-        library.fmi2FreeInstance(library.fmi2Instantiate(*arguments))
+        library.fmi2FreeInstance(ctypes.c_void_p(library.fmi2Instantiate(*arguments)))
         _ctypes.dlclose(library._handle)
 
     return cycle
 
 
-CYCLES = {function.__name__: function for function in (bare, whole, unloaded)}
+CYCLES = {function.__name__: function for function in (whole, unloaded)}
 
 
 def growths(cycle: Callable[[int], None], count: int) -> Iterator[tuple[int, int]]:

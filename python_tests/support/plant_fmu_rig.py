@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from fmu_binary import LAW, OK, Instance
@@ -49,12 +48,7 @@ def play(instance: Instance, steps: int, begin: int = 0, start: float = 0.0, ste
     rows = []
     for k in range(begin, begin + steps):
         if k % 100 == 0:
-            assert instance.set_real({"pretension": 0.1 * (k // 100), "tendon_position_command[1]": 1e-5 * k}) == OK
+            assert instance.write({"pretension": 0.1 * (k // 100), "tendon_position_command[1]": 1e-5 * k}) == OK
         assert instance.step(start + k * step, step) == OK, instance.last_message
         rows.append(instance.outputs())
     return rows
-
-
-def plant_binary(folder: Path) -> Path:
-    """The library in an unpacked FMU."""
-    return next(path for path in (folder / "binaries").rglob("*") if path.is_file())

@@ -1,7 +1,6 @@
 """Seeded random expanded rigs and states for checks of the simulated finger's right-hand side.
 
-They are made to exercise every term and switch of the equations, not to be simulated for long: whole rigs as users
-write them are random_rigs.py's business.
+They are made to exercise every term and switch of the equations, not to be simulated for long.
 """
 
 from __future__ import annotations
@@ -11,43 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import random_fingers
+
 Array = NDArray[Any]
 Table = dict[str, Any]
-TENDON_SPEED, JOINT_SPEED = 0.005, 0.15  # m/s, rad/s: Stribeck velocities are drawn around these
-
-
-def random_side(rng: np.random.Generator, level: float, velocity: float) -> Table:
-    coulomb = level * rng.uniform(0.3, 1.0)
-    side = {
-        "static": coulomb * (1.0 if rng.random() < 0.2 else rng.uniform(1.0, 1.7)),
-        "coulomb": coulomb,
-        "stribeck_velocity": velocity * float(np.exp(rng.uniform(-1.0, 1.0))),
-    }
-    if rng.random() < 0.7:
-        side["viscous"] = level / velocity * rng.uniform(0.0, 0.1)
-    return side
-
-
-def random_law(rng: np.random.Generator, level: float, velocity: float) -> Table:
-    if rng.random() < 0.4:
-        return {name: random_side(rng, level, velocity) for name in ("positive", "negative")}
-    return random_side(rng, level, velocity)
-
-
-def random_edge(rng: np.random.Generator) -> Table:
-    """One law, or working points over the angle of the joint before."""
-    if rng.random() < 0.4:
-        return random_law(rng, 0.04, TENDON_SPEED)
-    points = int(rng.integers(1, 5))
-    angles = np.cumsum(rng.uniform(0.1, 0.5, points))
-    angles = angles - angles.mean() + rng.uniform(-0.2, 0.2)
-    return {"angles": angles.tolist(), "laws": [random_law(rng, 0.04, TENDON_SPEED) for _ in range(points)]}
-
-
-def with_gaps(rng: np.random.Generator, make: Any, count: int) -> list[Any]:
-    """Some entries null, the list cut short at times."""
-    entries = [None if rng.random() < 0.25 else make() for _ in range(count)]
-    return entries[: int(rng.integers(0, count + 1))] if rng.random() < 0.2 else entries
+TENDON_SPEED = 0.005  # m/s: Stribeck velocities are drawn around this
 
 
 def random_arms(rng: np.random.Generator, m: int, n: int) -> Array:
@@ -70,31 +37,15 @@ def random_arms(rng: np.random.Generator, m: int, n: int) -> Array:
 
 
 def random_finger(rng: np.random.Generator, n: int, m: int) -> Table:
-    R = random_arms(rng, m, n)
-    joints = []
-    for j in range(n):
-        joint: Table = {"name": f"joint_{j + 1}"}
-        if rng.random() < 0.8:
-            joint["cover"] = {"stiffness": rng.uniform(0.0, 0.05), "rest_angle": rng.uniform(-0.4, 0.4)}
-        if rng.random() < 0.75:
-            joint["friction"] = random_law(rng, 0.006, JOINT_SPEED)
-        if rng.random() < 0.75:
-            joint["load_friction"] = random_law(rng, 5e-5, JOINT_SPEED)
-        joints.append(joint)
-    tendons = [
-        {
-            "name": f"tendon_{i + 1}",
-            "stiffness": rng.uniform(3000.0, 20000.0),
-            "moment_arms": R[i].tolist(),
-            "pulley_friction": with_gaps(rng, lambda: random_law(rng, 0.03, TENDON_SPEED), n - 1),
-            "edge_friction": with_gaps(rng, lambda: random_edge(rng), n),
-        }
-        for i in range(m)
-    ]
+    """Joints and tendons of random_fingers.py with other arms."""
+    tendons = [random_fingers.random_tendon(rng, i + 1, row, False) for i, row in enumerate(random_arms(rng, m, n))]
+    for tendon in tendons:
+        tendon.pop("bidirectional", None)  # the plant's tendons pull
+        tendon["stiffness"] = rng.uniform(3000.0, 20000.0)
     return {
         "format": "tendonfmu-finger-1",
         "name": "random_plant",
-        "joints": joints,
+        "joints": [random_fingers.random_joint(rng, j + 1) for j in range(n)],
         "tendons": tendons,
         "contact": {"threshold": [0.05] * n},
     }
@@ -162,7 +113,7 @@ def random_friction(rng: np.random.Generator, finger: Table) -> Table:
 def random_diversions(rng: np.random.Generator, finger: Table) -> list[Table]:
     found: list[Table] = []
     for i, tendon in enumerate(finger["tendons"]):
-        for j, law in enumerate(tendon["edge_friction"]):
+        for j, law in enumerate(tendon.get("edge_friction", [])):
             if j == 0 or law is None or rng.random() < 0.6:
                 continue
             entry: Table = {
@@ -195,10 +146,7 @@ def random_motion(rng: np.random.Generator, n: int) -> Table:
         )
     knots = int(rng.integers(1, 4))
     time = np.cumsum(rng.uniform(0.2, 2.0, knots)) - 0.2
-    return {
-        "joints": joints,
-        "pretension": {"time": time.tolist(), "value": rng.uniform(1.0, 20.0, knots).tolist()},
-    }
+    return {"joints": joints, "pretension": {"time": time.tolist(), "value": rng.uniform(1.0, 20.0, knots).tolist()}}
 
 
 def random_pushes(rng: np.random.Generator, n: int) -> list[Table]:
@@ -244,7 +192,7 @@ def random_plant(seed: int) -> Table:
             "amplitude": rng.uniform(0.05, 0.5),
             "period": rng.uniform(2.0, 30.0),
             "arms": rng.uniform(-0.01, 0.01, m).tolist(),
-            "friction": random_side(rng, 0.03, TENDON_SPEED),
+            "friction": random_fingers.random_side(rng, 0.03, TENDON_SPEED),
         }
         if rng.random() < 0.5:
             physics["wrist"]["presliding"] = rng.uniform(1e-5, 6e-5)
