@@ -72,13 +72,6 @@ TEST(Bristle, SlidesSteadilyAtTheLevelOfTheLaw) {
   }
 }
 
-TEST(Bristle, BendsAsASpringAtFirst) {
-  const law one = two_sided();
-  const Response r = respond_once(one, 1e-9, 1, {1.0, 0.0, 0.0, true}, 0.0);
-  EXPECT_DOUBLE_EQ(r.rate, 1e-9 / length);
-  EXPECT_NEAR(r.share_by_bristle, one.break_away, 1e-15);  // break-away share per presliding distance
-}
-
 // With a span the bristle is where the exact solution has it, and an implicit step comes to just there.
 TEST(Bristle, MovesExactlyThroughASpan) {
   const law one = two_sided();
@@ -94,17 +87,6 @@ TEST(Bristle, MovesExactlyThroughASpan) {
         EXPECT_NEAR(r.share, one.break_away * after + side.viscous * v, 1e-14);
       }
     }
-  }
-}
-
-TEST(Bristle, IsFreeWithoutDryFriction) {
-  law one;
-  one.positive.viscous = one.negative.viscous = 0.2;
-  for (const double span : {0.0, 1e-3}) {
-    const Response r = respond_once(one, 0.05, 1, {1.0, 1e-3, span, true}, 0.4);
-    EXPECT_DOUBLE_EQ(r.share, 0.01);
-    EXPECT_EQ(r.share_by_bristle, 0.0);
-    EXPECT_TRUE(std::isfinite(r.rate));
   }
 }
 
@@ -202,19 +184,6 @@ TEST(SiteLaw, IsInterpolatedBetweenWorkingPointsAndConstantOutside) {
       EXPECT_NEAR(sliding_at(site, 0.45, v), 0.5 * (low + high), 1e-15);
     }
   }
-}
-
-TEST(SiteLaw, TakesTheFormOfTheDiversion) {
-  const double angle = 0.9, theta = 0.3 + 0.8 * (0.9 - 0.1), fast = 1.0;  // far beyond the Stribeck velocity
-  const double shape = 0.02 / 0.02;
-  EXPECT_NEAR(sliding_at(diverted(diversion::form::sine), angle, fast), shape * 0.06 * std::sin(theta), 1e-15);
-  EXPECT_NEAR(sliding_at(diverted(diversion::form::capstan_share), angle, fast), shape * (1 - std::exp(-0.06 * theta)),
-              1e-15);
-  EXPECT_NEAR(sliding_at(diverted(diversion::form::capstan_exponent), angle, fast), shape * 0.06 * theta, 1e-15);
-  // the other sign has its own coefficient
-  const double bent = -0.9, negative = 0.3 + 0.8 * (-0.9 - 0.1);
-  EXPECT_NEAR(sliding_at(diverted(diversion::form::sine), bent, fast), 0.03 * std::sin(-negative), 1e-15);
-  EXPECT_NEAR(sliding_at(diverted(diversion::form::capstan_exponent), bent, fast), 0.03 * -negative, 1e-15);
 }
 
 TEST(SiteLaw, KnowsItsSlopesByTheAngle) {

@@ -174,86 +174,6 @@ TEST(LinkGeometry, LinksWithoutLengthAreNotTouched) {
   EXPECT_EQ(Placed(turning_on_itself).least(), (std::vector<int>{2, 2}));
 }
 
-TEST(TipForce, IsFoundExactlyWithoutNoise) {
-  Draws draws;
-  int observable = 0;
-  for (int trial = 0; trial < 400; ++trial) {
-    const Chain chain = draws.chain(3 + trial % 14);
-    const std::vector<double> angle = draws.numbers(chain.joints()), lever = Placed(chain).levers(angle);
-    const Three force = draws.vector();
-    std::vector<double> torque;
-    for (std::size_t j = 0; j < chain.joints(); ++j) {
-      torque.push_back(-dot({lever[3 * j], lever[3 * j + 1], lever[3 * j + 2]}, force));
-    }
-    const std::vector<double> deviation = draws.deviations(chain.joints());
-    const tip_force found =
-        find_tip_force(chain.joints(), lever.data(), torque.data(), trial % 2 ? deviation.data() : nullptr);
-    observable += found.observable;
-    if (!found.observable) {
-      continue;
-    }
-    for (int k = 0; k < 3; ++k) {
-      EXPECT_NEAR(found.force[k], force[k], 1e-11 * length(force)) << trial;
-    }
-    EXPECT_LT(found.misfit, 1e-15) << trial;
-  }
-  EXPECT_GT(observable, 300);
-}
-
-TEST(TipForce, NoForceFitsBetter) {
-  Draws draws;
-  for (int trial = 0; trial < 100; ++trial) {
-    const std::size_t n = 4 + trial % 13;
-    const std::vector<double> lever = draws.numbers(3 * n, 0.05), torque = draws.numbers(n, 0.1);
-    const std::vector<double> deviation = draws.deviations(n);
-    const auto sum = [&](const Three& force) {
-      double total = 0.0;
-      for (std::size_t j = 0; j < n; ++j) {
-        const double left = torque[j] + dot({lever[3 * j], lever[3 * j + 1], lever[3 * j + 2]}, force);
-        total += left / deviation[j] * left / deviation[j];
-      }
-      return total;
-    };
-    const tip_force found = find_tip_force(n, lever.data(), torque.data(), deviation.data());
-    if (!found.observable) {
-      continue;
-    }
-    const Three force = {found.force[0], found.force[1], found.force[2]};
-    EXPECT_NEAR(found.misfit, sum(force) / static_cast<double>(n - 3), 1e-9 * found.misfit);
-    for (int k = 0; k < 20; ++k) {
-      EXPECT_GE(sum(force + draws.vector(1e-3)), sum(force) * (1 - 1e-12)) << trial;
-    }
-  }
-}
-
-TEST(TipForce, MisfitIsOneOfTorquesWithTheirOwnNoise) {
-  Draws draws;
-  const std::vector<double> lever = draws.numbers(18, 0.05), deviation = draws.deviations(6);
-  double sum = 0.0;
-  const int trials = 20000;
-  for (int trial = 0; trial < trials; ++trial) {
-    std::vector<double> torque;
-    for (std::size_t j = 0; j < 6; ++j) {
-      torque.push_back(draws.number(deviation[j]) - lever[3 * j] * 0.7);
-    }
-    sum += find_tip_force(6, lever.data(), torque.data(), deviation.data()).misfit;
-  }
-  EXPECT_NEAR(sum / trials, 1.0, 4 * std::sqrt(2.0 / 3.0 / trials)); /* χ² of three degrees over three */
-}
-
-TEST(TipForce, SidewaysIsNotObservableInAPlane) {
-  const Chain chain = planar();
-  const std::vector<double> angle = {0.3, 0.9}, lever = Placed(chain).levers(angle);
-  const Three force = {0.4, 0.7, -1.1};
-  const std::vector<double> torque = chain.torques(1, chain.tip, force, angle);
-  const tip_force found = find_tip_force(2, lever.data(), torque.data(), nullptr);
-  EXPECT_FALSE(found.observable);
-  EXPECT_NEAR(found.force[0], force[0], 1e-6); /* what is in the plane is found, nothing is made up across it */
-  EXPECT_NEAR(found.force[1], 0.0, 1e-12);
-  EXPECT_NEAR(found.force[2], force[2], 1e-6);
-  EXPECT_EQ(found.deviation[0] + found.deviation[1] + found.deviation[2], 0.0); /* not known */
-}
-
 TEST(TipForce, AlongAStretchedFingerIsNotObservable) {
   Placed finger(index_finger());
   const std::vector<double> deviation(4, 0.004);
@@ -310,29 +230,6 @@ TEST(TipForce, StaysFiniteAtTheEdgesOfDoubles) {
   }
 }
 
-TEST(TipForce, SpreadsAsItsDeviationSays) {
-  Draws draws;
-  const std::vector<double> lever = draws.numbers(15, 0.05), deviation = draws.deviations(5);
-  const Three force = {0.3, -0.8, 0.5};
-  double squares[3] = {}, said[3] = {};
-  const int trials = 20000;
-  for (int trial = 0; trial < trials; ++trial) {
-    std::vector<double> torque;
-    for (std::size_t j = 0; j < 5; ++j) {
-      torque.push_back(draws.number(deviation[j]) - dot({lever[3 * j], lever[3 * j + 1], lever[3 * j + 2]}, force));
-    }
-    const tip_force found = find_tip_force(5, lever.data(), torque.data(), deviation.data());
-    ASSERT_TRUE(found.observable);
-    for (int k = 0; k < 3; ++k) {
-      squares[k] += (found.force[k] - force[k]) * (found.force[k] - force[k]) / trials;
-      said[k] = found.deviation[k];
-    }
-  }
-  for (int k = 0; k < 3; ++k) {
-    EXPECT_NEAR(std::sqrt(squares[k]) / said[k], 1.0, 0.02); /* four of its own 1/√(2·trials) */
-  }
-}
-
 /* What is claimed: contact is on the link that is named, or beyond. */
 TEST(ContactLink, NeverLiesBeyondTheForce) {
   Draws draws;
@@ -348,33 +245,6 @@ TEST(ContactLink, NeverLiesBeyondTheForce) {
     named[static_cast<std::size_t>(found == static_cast<int>(link) + 1)] += 1;
   }
   EXPECT_GT(named[1], 1900); /* the very link: a force through an axis is rare */
-}
-
-TEST(ContactLink, ForcesThatTorquesCannotTellNameALesserLink) {
-  const Chain chain = index_finger();
-  const std::vector<int> least = Placed(chain).least();
-  const std::vector<double> deviation(4, 5e-4), angle = {0.1, 0.5, 0.6, 0.4};
-  const auto named = [&](std::size_t link, const Three& point, const Three& force) {
-    return find_contact_link(4, least.data(), chain.torques(link, point, force, angle).data(), deviation.data());
-  };
-  const Three tip = chain.tip, inner = chain.place(2, {0, 0, 0}, angle), outer = chain.place(3, tip, angle);
-  const Three side = {-std::sin(angle[0]), std::cos(angle[0]), 0.0}; /* along all the axes but the first */
-  EXPECT_EQ(named(3, tip, {1.0, 0.0, 0.0}), 4);
-  EXPECT_EQ(named(3, tip, side), 2);                                            /* parallel to axes 2 to 4 */
-  EXPECT_EQ(named(3, tip, outer - chain.place(3, {0, 0, 0}, angle)), -1);       /* 22 mN: too weak for any */
-  EXPECT_EQ(named(3, tip, (1.0 / length(outer - inner)) * (outer - inner)), 4); /* through axis 3, not through 4 */
-  EXPECT_EQ(named(3, {0, 0, 0}, {0.0, 0.0, 1.0}), 3);                           /* on axis 4 */
-  EXPECT_EQ(named(0, {0, 0.01, 0}, {1.0, 0.0, 0.0}), 2); /* the saddle's inner part has no length */
-  EXPECT_EQ(named(2, {0.01, 0, 0}, {0.0, 0.0, 0.0}), -1);
-}
-
-TEST(ContactLink, NeedsTheDeviations) {
-  const std::vector<double> torque = {1.0, 1.0};
-  const std::vector<int> least = {1, 2};
-  EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), nullptr), -1);
-  const std::vector<double> large = {0.19, 0.21}, larger = {0.21, 0.21};
-  EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), large.data()), 1);
-  EXPECT_EQ(find_contact_link(2, least.data(), torque.data(), larger.data()), -1);
 }
 
 }  // namespace

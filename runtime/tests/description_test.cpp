@@ -1,15 +1,15 @@
 // Descriptions that are accepted, and the numbers they stand for.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <string>
+#include <vector>
 
 #include "described_finger.h"
-#include "test_finger.h"
+#include "model_inside.h"
 
 using nlohmann::json;
-using nlohmann::json_pointer;
 
 namespace {
 
@@ -24,7 +24,6 @@ class Described {
   }
   bool has(const char* path) { return !std::isnan((*this)[path]); }
   tendonfmu_finger* handle() { return finger_; }
-  const std::vector<unsigned char>& image() const { return reading_.image; }
 
  private:
   static const std::vector<unsigned char>& checked(const Reading& reading) {
@@ -72,7 +71,7 @@ TEST(Description, EveryNumberArrivesUnderItsPath) {
   EXPECT_EQ(finger["extensions[1].stiffness"], 0.3);
 }
 
-TEST(Description, MinimalOneHasTheDefaults) {
+TEST(Description, OptionalNumbersHaveDefaults) {
   Described finger(json::parse(R"({"format": "tendonfmu-finger-1", "name": "one", "joints": [{}],
     "tendons": [{"stiffness": 4000, "moment_arms": [0.01]}], "contact": {"threshold": [0.03]}})"));
   EXPECT_EQ(finger["velocity_threshold.tendon"], 0.0005);
@@ -87,31 +86,24 @@ TEST(Description, MinimalOneHasTheDefaults) {
   EXPECT_FALSE(finger.has("bias.initial_torque[1]"));
   EXPECT_FALSE(finger.has("bias.noise_time"));
   EXPECT_FALSE(finger.has("joints[1].cover.stiffness"));
+  EXPECT_FALSE(finger.has("position_filter.jerk_density"));
   // stiffness, moment arm, 3 thresholds of velocity and filter, 4 of the bias, 2 of contact
   EXPECT_EQ(tendonfmu_parameter_count(finger.handle()), 11u);
-}
-
-TEST(Description, PositionFilter) {
-  EXPECT_FALSE(Described(small_finger()).has("position_filter.jerk_density"));
-  Described finger(with("/position_filter", {{"noise", {1e-4, 2e-4}}}));
-  EXPECT_EQ(finger["position_filter.noise[1]"], 1e-4);
-  EXPECT_EQ(finger["position_filter.noise[2]"], 2e-4);
-  EXPECT_EQ(finger["position_filter.jerk_density"], 1.0);
-  EXPECT_EQ(read(with("/position_filter", nullptr)).image, read(small_finger()).image);
-}
-
-TEST(Description, ViscousAndRestAngleDefaultToZero) {
-  json finger = small_finger();
-  finger["joints"][0]["cover"].erase("rest_angle");
-  finger["joints"][0]["friction"].erase("viscous");
-  finger["tendons"][0]["edge_friction"][0]["negative"].erase("viscous");
-  Described described(finger);
+  json more = small_finger();
+  more["joints"][0]["cover"].erase("rest_angle");
+  more["joints"][0]["friction"].erase("viscous");
+  more["tendons"][0]["edge_friction"][0]["negative"].erase("viscous");
+  more["position_filter"] = {{"noise", {1e-4, 2e-4}}};
+  Described described(more);
   EXPECT_EQ(described["joints[1].cover.rest_angle"], 0.0);
   EXPECT_EQ(described["joints[1].friction.viscous"], 0.0);
   EXPECT_EQ(described["tendons[1].edge_friction[1].negative.viscous"], 0.0);
+  EXPECT_EQ(described["position_filter.noise[2]"], 2e-4);
+  EXPECT_EQ(described["position_filter.jerk_density"], 1.0);
 }
 
-TEST(Description, NullMeansAbsent) {
+// Both are the same finger: what is null, left out, or written in another way.
+TEST(Description, MayBeWrittenInSeveralWays) {
   for (const char* optional : {"/joints/0/name",
                                "/joints/0/cover",
                                "/joints/0/cover/rest_angle",
@@ -135,12 +127,34 @@ TEST(Description, NullMeansAbsent) {
                                "/bias/initial_torque",
                                "/bias/noise_time",
                                "/contact/threshold_per_force",
-                               "/extensions"}) {
+                               "/extensions",
+                               "/position_filter"}) {
     const Reading absent = read(without(optional)), null = read(with(optional, nullptr));
     EXPECT_EQ(absent.status, TENDONFMU_OK) << optional << ": " << absent.message;
-    EXPECT_EQ(null.status, TENDONFMU_OK) << optional << ": " << null.message;
     EXPECT_EQ(null.image, absent.image) << optional;
   }
+  const std::vector<unsigned char> image = read(small_finger()).image;
+  EXPECT_EQ(read(without("/tendons/0/bidirectional")).image, image);
+  EXPECT_NE(read(with("/tendons/0/bidirectional", true)).image, image);
+  EXPECT_EQ(read(with("/name", "Zeigefinger – 人差し指 \"100 %\"")).image, image);
+  EXPECT_EQ(read(with("/joints/1/name", "tip")).image, image);
+  EXPECT_EQ(read(with("/tendons/0/stiffness", 4000.0)).image, image);
+  EXPECT_EQ(read(with("/extensions/0/joint", 2.0)).image, image);
+  EXPECT_EQ(read("\r\n\t" + small_finger().dump(7) + "\n").image, image);
+  EXPECT_EQ(read("\xef\xbb\xbf" + small_finger().dump()).image, image); /* a byte order mark */
+}
+
+TEST(Description, TakesNumbersAtTheEndsOfTheirRanges) {
+  for (const char* number : {"/bias/drift_variance", "/bias/initial_variance", "/bias/forget_rate", "/bias/noise_std",
+                             "/bias/noise_std_per_force", "/velocity_filter_cutoff", "/velocity_threshold/tendon",
+                             "/velocity_threshold/joint", "/contact/threshold/0", "/joints/0/cover/stiffness",
+                             "/joints/0/friction/viscous", "/tendons/0/moment_arms/1"}) {
+    EXPECT_EQ(read(with(number, 0)).message, "") << number;
+  }
+  EXPECT_EQ(read(with("/joints/0/friction/static", 0.006)).message, "") << "that of coulomb";
+  const json law = {{"static", 0.03}, {"coulomb", 0.02}, {"stribeck_velocity", 0.005}};
+  Described finger(with("/tendons/1/edge_friction", {{{"angles", {0.2}}, {"laws", {law}}}}));
+  EXPECT_EQ(finger["tendons[2].edge_friction[1].laws[1].static"], 0.03) << "one working point";
 }
 
 TEST(Description, NullMayStandBesideTheOtherFormOfALaw) {
@@ -165,47 +179,6 @@ TEST(Description, ShortFrictionListsAreFilledWithNull) {
   full["tendons"][1]["edge_friction"] = json::array();
   full["tendons"][1]["pulley_friction"] = {nullptr, nullptr};
   EXPECT_EQ(read(brief).image, read(full).image);
-}
-
-TEST(Description, BidirectionalFalseIsTheDefault) {
-  EXPECT_EQ(read(without("/tendons/0/bidirectional")).image, read(small_finger()).image);
-  EXPECT_NE(read(with("/tendons/0/bidirectional", true)).image, read(small_finger()).image);
-}
-
-TEST(Description, NamesLeaveTheImageAlone) {
-  EXPECT_EQ(read(with("/name", "Zeigefinger – 人差し指 \"100 %\"")).image, read(small_finger()).image);
-  EXPECT_EQ(read(with("/joints/1/name", "tip")).image, read(small_finger()).image);
-}
-
-TEST(Description, IntegersAreNumbers) {
-  EXPECT_EQ(Described(with("/tendons/0/stiffness", 4000)).image(),
-            Described(with("/tendons/0/stiffness", 4000.0)).image());
-  EXPECT_EQ(Described(with("/extensions/0/joint", 2)).image(), Described(with("/extensions/0/joint", 2.0)).image());
-}
-
-TEST(Description, OrderOfKeysAndWhiteSpaceDoNotMatter) {
-  const std::string text = small_finger().dump(7);
-  EXPECT_EQ(read("\r\n\t" + text + "\n").image, read(small_finger()).image);
-}
-
-TEST(Description, MagnitudesMayBeZeroWhereTheContractSaysSo) {
-  for (const char* number : {"/bias/drift_variance", "/bias/initial_variance", "/bias/forget_rate", "/bias/noise_std",
-                             "/bias/noise_std_per_force", "/velocity_filter_cutoff", "/velocity_threshold/tendon",
-                             "/velocity_threshold/joint", "/contact/threshold/0", "/joints/0/cover/stiffness",
-                             "/joints/0/friction/viscous", "/tendons/0/moment_arms/1"}) {
-    const Reading reading = read(with(number, 0));
-    EXPECT_EQ(reading.status, TENDONFMU_OK) << number << ": " << reading.message;
-  }
-}
-
-TEST(Description, StaticMayEqualCoulomb) {
-  EXPECT_EQ(read(with("/joints/0/friction/static", 0.006)).status, TENDONFMU_OK);
-}
-
-TEST(Description, OneWorkingPointIsAllowed) {
-  const json law = {{"static", 0.03}, {"coulomb", 0.02}, {"stribeck_velocity", 0.005}};
-  Described finger(with("/tendons/1/edge_friction", {{{"angles", {0.2}}, {"laws", {law}}}}));
-  EXPECT_EQ(finger["tendons[2].edge_friction[1].laws[1].static"], 0.03);
 }
 
 TEST(Description, WorkingPointsMayMixSymmetricAndAsymmetricLaws) {
@@ -238,20 +211,82 @@ TEST(Description, SixteenJointsAndSixtyFourTendonsAreAllowed) {
   EXPECT_EQ(finger["tendons[64].edge_friction[16].static"], 0.03);
 }
 
-TEST(Description, ExampleFingersAreValid) {
-  std::ifstream file(TENDONFMU_FINGERS "/index_finger.json");
-  ASSERT_TRUE(file.good());
-  std::stringstream text;
-  text << file.rdbuf();
-  const Reading reading = read(text.str());
-  ASSERT_EQ(reading.status, TENDONFMU_OK) << reading.message;
-  test_finger::Finger finger(reading.image);
-  EXPECT_EQ(tendonfmu_joint_count(finger), 4u);
-  EXPECT_EQ(tendonfmu_tendon_count(finger), 8u);
+// All eighteen, as the rows of a model image: id, joint, tendon.
+TEST(Extensions, EachEffectIsARowOfTheImage) {
+  nlohmann::json finger = small_finger();
+  finger["extensions"] = nlohmann::json::parse(R"([
+    {"effect": "cover_hardening", "joint": 2, "stiffness": 0.3},
+    {"effect": "gravity", "joint": 2, "cosine": 0.01},
+    {"effect": "inertia", "joint": 1, "inertia": 1e-5},
+    {"effect": "inertia_variation", "joint": 1, "cosine": 2e-5},
+    {"effect": "joint_coupling", "joint": 1, "stiffness": 0.01},
+    {"effect": "preload_friction", "tendon": 2, "coulomb": 0.1},
+    {"effect": "preload_friction", "joint": 2, "tendon": 1, "coulomb": 0.1},
+    {"effect": "load_friction", "joint": 2, "tendon": 1, "coulomb": 1e-4},
+    {"effect": "force_gain", "tendon": 2, "correction": -0.1},
+    {"effect": "force_offset", "tendon": 1, "correction": 0.2},
+    {"effect": "moment_arm", "joint": 1, "tendon": 2, "correction": 1e-4},
+    {"effect": "moment_arm_variation", "joint": 2, "tendon": 2, "slope": 1e-4},
+    {"effect": "pulley_eccentricity", "joint": 2, "tendon": 1},
+    {"effect": "presliding", "joint": 1, "displacement": 0.01},
+    {"effect": "presliding", "joint": null, "tendon": 1, "displacement": 1e-4},
+    {"effect": "presliding", "displacement": 0.02},
+    {"effect": "friction_drift", "amplitude": 0.2, "time_constant": 60},
+    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
+    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
+    {"effect": "tendon_nonlinearity", "tendon": 2, "hardening": 1e5},
+    {"effect": "backlash", "tendon": 2, "width": 1e-4},
+    {"effect": "backlash", "joint": 2, "width": 1e-3},
+    {"effect": "stribeck", "tendon": 2, "amplitude": -0.5, "stribeck_velocity": 0.01},
+    {"effect": "time_delay", "delay": -0.001}])");
+  const Reading reading = read(finger);
+  ASSERT_EQ(reading.message, "");
+  const Model model(reading.image);
+  ASSERT_TRUE(model.accepted) << model.message;
+  const std::vector<std::array<std::uint32_t, 3>> expected = {
+      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {12, 1, 0}, {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},
+      {7, 0, 2},  {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {20, 0, 0},
+      {21, 0, 0}, {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
+  ASSERT_EQ(model.shape.extension_count, expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
+    EXPECT_EQ((std::array<std::uint32_t, 3>{row[0], row[1], row[2]}), expected[k]) << "extension " << k + 1;
+    EXPECT_EQ(row[3], 0u);
+  }
+  // what is left out
+  const std::size_t last = model.values.size();
+  const std::vector<double> numbers(model.values.end() - 35, model.values.end());
+  EXPECT_EQ(numbers.front(), 0.3);
+  EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
+  EXPECT_EQ(numbers[2], 0.01);  // its cosine
+  EXPECT_EQ(numbers[7], 1.0);   // joint_coupling's reaction
+  EXPECT_EQ(numbers[9], 1.0);   // preload_friction's beyond
+  EXPECT_EQ(model.values[last - 1], -0.001);
 }
 
-TEST(Description, FreeingNothingIsAllowed) {
-  tendonfmu_free_image(nullptr);
+TEST(Extensions, PreslidingEverywhereMultipliesThresholds) {
+  for (const char* key : {"tendon", "joint"}) {
+    nlohmann::json finger = small_finger();
+    finger["extensions"] = nlohmann::json::parse(R"([{"effect": "presliding", "joint": 1, "displacement": 0.01}])");
+    finger["velocity_threshold"][key] = 0;
+    EXPECT_EQ(read(finger).message, "");
+    finger["extensions"].push_back({{"effect", "presliding"}, {"displacement", 0.02}});
+    const std::string unit = std::string(key) == "tendon" ? "m/s" : "rad/s";
+    EXPECT_EQ(read(finger).message, std::string("velocity_threshold.") + key + " = 0: expected above 0 " + unit +
+                                        ", since extensions[2], presliding without joint or tendon, multiplies it");
+  }
+}
+
+TEST(Extensions, HasRoomForAThousandExtensions) {
+  nlohmann::json finger = small_finger();
+  const nlohmann::json one = finger["extensions"][0];
+  finger["extensions"] = nlohmann::json::array();
+  for (int k = 0; k < 1024; ++k) {
+    finger["extensions"].push_back(one);
+  }
+  EXPECT_EQ(read(finger).message, "");
+  finger["extensions"].push_back(one);
+  EXPECT_EQ(read(finger).message, "extensions has 1025 elements: expected a list of at most 1024 extensions");
 }
 
 }  // namespace

@@ -32,21 +32,6 @@ TEST(Dual, KnowsTheRulesOfDerivatives) {
   EXPECT_EQ(value_of(x), 1.5);
 }
 
-TEST(Dual, AddsInPlace) {
-  Two sum = along(1.0, 0);
-  sum += along(2.0, 1);
-  sum -= Two(0.5);
-  expect(sum, 2.5, 1.0, 1.0);
-  sum += sum;  // also to itself
-  expect(sum, 5.0, 2.0, 2.0);
-}
-
-TEST(Dual, SineAndCosineTurnIntoEachOther) {
-  const auto [s, c] = sine_cosine(3.0 * along(0.4, 1));
-  expect(s, sine(1.2), 0.0, 3.0 * cosine(1.2));
-  expect(c, cosine(1.2), 0.0, -3.0 * sine(1.2));
-}
-
 // f = √(x² + sin(x y))/y against central differences
 TEST(Dual, FollowsALongFormula) {
   const auto f = [](auto x, auto y) { return square_root(x * x + sine_cosine(x * y).sine) / y; };

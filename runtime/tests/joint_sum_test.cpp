@@ -170,22 +170,6 @@ TEST(JointSum, SegmentsJoinToTheWhole) {
   EXPECT_LT((held - expected_held).norm() / held.norm(), 1e-12);
 }
 
-TEST(JointSum, BlocksWithoutAUsedSampleKeepTheJumps) {
-  constexpr std::size_t columns = 8;
-  std::vector<Sample> samples = made_samples(700, columns, 0, 4);
-  for (std::size_t k = 100; k < 600; ++k) { /* held out over several blocks */
-    samples[k].row.setZero();
-    samples[k].gain = samples[k].weight = 0.0;
-  }
-  VectorXd held = VectorXd::Zero(columns);
-  const MatrixXd expected = recursive(samples, &held);
-  joint_sum joint(columns);
-  MatrixXd sum = MatrixXd::Zero(columns, columns);
-  const joint_segment end = summed(samples, 0, samples.size(), 64, &joint, &sum);
-  EXPECT_LT(difference(full(sum), expected), 1e-12);
-  EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12);
-}
-
 /* a pass that is stopped leaves a block and a segment unfinished; the next one must not see them */
 TEST(JointSum, ASegmentBegunAnewForgetsWhatWasLeftUnfinished) {
   constexpr std::size_t columns = 8;

@@ -31,10 +31,6 @@ TEST(JsonSyntax, ErrorsNameLineAndColumn) {
   expect_start("{\"a\": 01}", "JSON, line 1, column 8: ");
 }
 
-TEST(JsonSyntax, ErrorsSayWhatIsWrong) {
-  EXPECT_NE(refusal("{\"a\": 1,}").find("unexpected '}'"), std::string::npos) << refusal("{\"a\": 1,}");
-}
-
 TEST(JsonSyntax, EveryBeginningOfADescriptionIsRefused) {
   const std::string text = small_finger().dump();
   for (std::size_t size = 0; size < text.size(); ++size) {
@@ -95,10 +91,6 @@ TEST(JsonSyntax, DeepNestingIsRefusedWhateverItsDepth) {
 TEST(JsonSyntax, HugeFilesAreRefusedUnread) {
   const std::string text((std::size_t{64} << 20) + 1, ' ');
   expect_start(text, "JSON of 67108865 bytes: expected at most 67108864");
-}
-
-TEST(JsonSyntax, AByteOrderMarkIsSkipped) {
-  EXPECT_EQ(read("\xef\xbb\xbf" + small_finger().dump()).image, read(small_finger()).image);
 }
 
 TEST(JsonSyntax, OtherValuesThanAnObjectAreRefused) {

@@ -118,24 +118,6 @@ TEST(LocalModel, ErrorFallsWithTheFourthPowerOfAStepInARate) {
   EXPECT_GE(judged, 5u);
 }
 
-/* a rate and the drop in front of it, together; where the fourth power nearly vanishes, the fifth is seen */
-TEST(LocalModel, ErrorFallsSoAlsoWhereTheDropChangesWithTheRate) {
-  const Case c;
-  std::size_t judged = 0;
-  for (std::size_t side = 0; side < c.problem().unknowns.rates().size(); ++side) {
-    const auto [rate, drop] = c.problem().unknowns.rates()[side];
-    const auto error = [&, rate = rate, drop = drop](double length) {
-      return c.error(along(c, rate, length) + along(c, drop, 0.5));
-    };
-    const double whole = error(0.2), half = error(0.1);
-    if (half > 1e-10 * c.at.cost) {
-      EXPECT_GT(whole / half, 12.0) << c.problem().unknowns[static_cast<std::size_t>(rate)].path;
-      ++judged;
-    }
-  }
-  EXPECT_GE(judged, 5u);
-}
-
 /* laws of both joints with one rate; and a drop that is fixed */
 TEST(LocalModel, ErrorFallsSoWhereLawsShareARateOrTheirDropIsFixed) {
   const Case all;

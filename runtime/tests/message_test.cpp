@@ -51,29 +51,6 @@ TEST(Message, StaysOnOneLineWhateverItIsGiven) {
   EXPECT_STREQ(text, "a?b?c????d\u00fc");
 }
 
-TEST(Message, MayHaveNoRoomAtAll) {
-  const message_line nowhere = {nullptr, 0};
-  message_start(nowhere, "abc");
-  message_number(nowhere, 1.0);
-  message_count(nowhere, 1);
-  message_element(nowhere, "a", 1);
-}
-
-TEST(MessageNumber, ReadsBackAsTheSameNumber) {
-  const double values[] = {
-      0.0,   1.0,  0.1,     -0.1,      1.0 / 3.0, 1e-300, 1.7976931348623157e308, 123456789.0, 4000.0,
-      1e-06, 2e22, 6.02e23, 0.1 + 0.2, -1e9,      5e-324, 0.30000000000000004};
-  for (const double value : values) {
-    EXPECT_EQ(std::strtod(number(value).c_str(), nullptr), value) << number(value);
-  }
-}
-
-TEST(MessageNumber, IsShortWhereItCanBe) {
-  EXPECT_EQ(number(0.1), "0.1");
-  EXPECT_EQ(number(-4000.0), "-4000");
-  EXPECT_EQ(number(1e9), "1e+09");
-}
-
 // The C library's %g, at the first of 6, 15 and 17 digits that reads back.
 TEST(MessageNumber, IsWhatPrintfMakesOfIt) {
   std::mt19937_64 random(3);

@@ -43,17 +43,6 @@ TEST(Knots, AreConstantOutside) {
   }
 }
 
-// A polynomial of degree 5 is its own interpolation.
-TEST(Knots, AreExactForDegreeFive) {
-  const auto p = [](double t) { return 1.0 + t * (2.0 + t * (-1.0 + t * (0.5 + t * (-0.3 + t * 0.1)))); };
-  const auto v = [](double t) { return 2.0 + t * (-2.0 + t * (1.5 + t * (-1.2 + t * 0.5))); };
-  const auto a = [](double t) { return -2.0 + t * (3.0 + t * (-3.6 + t * 2.0)); };
-  const knots two = {{0.2, 1.7}, {p(0.2), p(1.7)}, {v(0.2), v(1.7)}, {a(0.2), a(1.7)}};
-  for (double t = 0.2; t < 1.7; t += 0.1) {
-    EXPECT_NEAR(at_time(two, t), p(t), 1e-14) << t;
-  }
-}
-
 TEST(MomentArm, IsTheSlopeOfThePath) {
   const moment_arm arm = {0.01, 2e-3, 1e-3, 0.7};
   const double h = 1e-5;
@@ -77,18 +66,6 @@ TEST(Elongation, IsTheSpringLawTurnedRound) {
   }
 }
 
-TEST(HoldCommand, IsTheScheduledCommandAtTheStart) {
-  const rig small = test_plant::read(test_plant::small());
-  double hold[max_tendons], scheduled[max_tendons], more[max_tendons];
-  hold_command(small, hold);
-  scheduled_command(small, 0.0, 0.0, scheduled);
-  scheduled_command(small, 0.0, 1.0, more);
-  for (std::size_t i = 0; i < small.tendon_count(); ++i) {
-    EXPECT_EQ(hold[i], scheduled[i]);
-    EXPECT_GT(more[i], scheduled[i]);
-  }
-}
-
 // Before time 0 the finger comes from aside, inside its limits, and rests for the last 40 % of the time to settle.
 TEST(DesiredAngles, ComeToTheStartFromAside) {
   const rig small = test_plant::read(test_plant::small());
@@ -102,18 +79,6 @@ TEST(DesiredAngles, ComeToTheStartFromAside) {
     EXPECT_GE(angle[j], small.links[j].lower);
     EXPECT_LE(angle[j], small.links[j].upper);
   }
-}
-
-TEST(Push, RisesHoldsAndFalls) {
-  push one;
-  one.start = 1.0, one.rise = 0.2, one.hold = 0.5, one.fall = 0.4, one.force = 3.0;
-  const std::pair<double, double> profile[] = {{0.0, 0.0}, {1.0, 0.0}, {1.1, 1.5}, {1.2, 3.0}, {1.5, 3.0},
-                                               {1.7, 3.0}, {1.9, 1.5}, {2.1, 0.0}, {9.0, 0.0}};
-  for (const auto& [time, force] : profile) {
-    EXPECT_NEAR(push_strength(one, time), force, 1e-9) << time;
-  }
-  one.hold = 0.0;
-  EXPECT_NEAR(push_strength(one, 1.2), 3.0, 1e-9);
 }
 
 TEST(Obstacle, PushesOutwardsAndNeverPulls) {

@@ -113,71 +113,6 @@ TEST(PositionFilter, IsQuietAtRest) {
   EXPECT_LT(travel / 76.0, 0.01);  // rad/s
 }
 
-TEST(PositionFilter, HoldsTheAngleWithinTwoStandardDeviations) {
-  Filtered one;
-  double held = 0.0, time = 0.0;
-  int open = 0, inside = 0, pushed = 0;
-  std::mt19937 random(7);
-  std::normal_distribution<double> noise(0.0, 0.001);
-  for (int k = 0; k < 4000; ++k, time += 0.004) {
-    const double speed = one.step(time, 0.1 * std::sin(0.5 * time) * std::sin(0.5 * time) + noise(random)).speed;
-    const double x = one.row(FILTER_ANGLE), z = one.row(FILTER_HELD_ANGLE);
-    const double width = 2.0 * std::sqrt(one.row(FILTER_P00));
-    if (k == 0) {
-      EXPECT_EQ(z, x);
-    } else if (std::fabs(speed) > 2.0 * std::sqrt(one.row(FILTER_P11))) {
-      EXPECT_EQ(z, x);
-      EXPECT_EQ(one.row(FILTER_CARRIES), 1.0);
-      ++open;
-    } else {
-      EXPECT_EQ(z, std::fmin(std::fmax(held, x - width), x + width));
-      EXPECT_EQ(one.row(FILTER_CARRIES), z == held ? 0.0 : 1.0);
-      (z == held ? inside : pushed) += 1;
-    }
-    held = z;
-  }
-  EXPECT_GT(open, 500);
-  EXPECT_GT(inside, 500);
-  EXPECT_GT(pushed, 20);
-}
-
-// friction builds up with the held angle: ζ by hand
-TEST(PositionFilter, GivesPreslidingItsTravel) {
-  Filtered one(std::string(R"(, "bias": {"initial_torque": [0], "noise_std": 1e6, "drift_variance": 0,
-    "initial_variance": 0})") +
-               filter);
-  double share = 0.0, held = 0.0, time = 0.0;
-  for (int k = 0; k < 800; ++k, time += k % 3 == 0 ? 0.002 : 0.005) {
-    const double torque = one.step(time, 0.05 * std::sin(2.0 * time)).torque, z = one.row(FILTER_HELD_ANGLE);
-    const double travel = k ? z - held : 0.0, side = travel < 0.0 ? -1.0 : 1.0;
-    share = side - (side - share) * std::exp(-std::fabs(travel) / 0.001);
-    EXPECT_NEAR(torque, 0.02 * share, 1e-15);
-    held = z;
-  }
-}
-
-TEST(PositionFilter, LeavesGivenVelocitiesAlone) {
-  Finger with(test_finger::image(one_joint(filter))), without(test_finger::image(one_joint("")));
-  for (Finger* finger : {&with, &without}) {
-    tendonfmu_set_kinematics_source(*finger, TENDONFMU_JOINT_VELOCITIES);
-  }
-  for (int k = 0; k < 200; ++k) {
-    const double force = 20.0, angle = 0.1 * std::sin(0.03 * k), speed = 3.0 * std::cos(0.03 * k);
-    const tendonfmu_inputs inputs = {&force, nullptr, &angle, &speed};
-    Said found[2];
-    for (int f = 0; f < 2; ++f) {
-      tendonfmu_finger* finger = f ? without : with;
-      const tendonfmu_status status = tendonfmu_is_initialised(finger)
-                                          ? tendonfmu_step(finger, 0.01 * k, &inputs)
-                                          : tendonfmu_initialise(finger, 0.01 * k, &inputs);
-      ASSERT_EQ(status, TENDONFMU_OK);
-      found[f] = said(finger);
-    }
-    EXPECT_EQ(found[0].speed, found[1].speed);
-    EXPECT_EQ(found[0].torque, found[1].torque);
-  }
-}
-
 TEST(PositionFilter, BeginsAnewAfterAGap) {
   Filtered one(std::string(R"(, "bias": {"initial_torque": [0], "noise_std": 1e6, "drift_variance": 0,
     "initial_variance": 0})") +
@@ -212,27 +147,6 @@ TEST(PositionFilter, TakesAnySteps) {
       for (const filter_row_kind kind : {FILTER_P00, FILTER_P11, FILTER_P22}) {
         EXPECT_GE(one.row(kind), 0.0);
       }
-    }
-  }
-}
-
-// a sample that is refused is forgotten, and a saved state goes on to the last bit, that of the sample after a gap too
-TEST(PositionFilter, IsPartOfTheState) {
-  for (const double gap : {0.0, 2.0}) {
-    SCOPED_TRACE(gap);
-    Filtered one, other;
-    const double wrong = std::numeric_limits<double>::quiet_NaN();
-    const auto time = [gap](int k) { return 0.004 * k + (k < 59 ? 0.0 : gap); };
-    for (int k = 0; k < 60; ++k) {
-      one.step(time(k), 0.1 * std::sin(0.1 * k));
-    }
-    EXPECT_EQ(take(one.finger(), time(60), wrong), TENDONFMU_BAD_SAMPLE);
-    const auto state = one.finger().saved();
-    ASSERT_EQ(tendonfmu_restore_state(other.finger(), state.data(), state.size()), TENDONFMU_OK);
-    for (int k = 60; k < 120; ++k) {
-      const Said a = one.step(time(k), 0.1 * std::sin(0.1 * k)), b = other.step(time(k), 0.1 * std::sin(0.1 * k));
-      EXPECT_EQ(a.speed, b.speed);
-      EXPECT_EQ(a.torque, b.torque);
     }
   }
 }

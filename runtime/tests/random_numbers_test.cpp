@@ -64,21 +64,4 @@ TEST(NormalNumber, DiffersInSeedChannelAndSample) {
   }
 }
 
-// Neighbours in samples, channels and seeds know nothing of each other.
-TEST(NormalNumber, IsNotCorrelatedWithItsNeighbours) {
-  const int count = 100000;
-  double next = 0.0, channel = 0.0, seed = 0.0;
-  for (int k = 0; k < count; ++k) {
-    const auto sample = static_cast<std::uint64_t>(k);
-    const double x = normal_number(5, 0, sample);
-    next += x * normal_number(5, 0, sample + 1);
-    channel += x * normal_number(5, 1, sample);
-    seed += x * normal_number(6, 0, sample);
-  }
-  const double allowed = 4 * std::sqrt(static_cast<double>(count));
-  EXPECT_LT(std::fabs(next), allowed);
-  EXPECT_LT(std::fabs(channel), allowed);
-  EXPECT_LT(std::fabs(seed), allowed);
-}
-
 }  // namespace

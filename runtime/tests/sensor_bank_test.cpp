@@ -30,11 +30,6 @@ std::vector<double> shown(const rig& rig, const std::vector<double>& truth) {
   return found;
 }
 
-TEST(SensorBank, ShowsTheTruthWithoutErrors) {
-  const std::vector<double> truth = {0.1, -0.2, 1e-12, 3.0};
-  EXPECT_EQ(shown(with_sensors({{"rate", 1000}}), truth), truth);
-}
-
 TEST(SensorBank, DelaysByWholeAndPartSamples) {
   const std::vector<double> truth = {1, 2, 4, 8, 16, 32, 64};
   const auto delayed = [&](double delay) {
@@ -53,19 +48,6 @@ TEST(SensorBank, BacklashFollowsOnceTheGapIsTakenUp) {
   const rig play = with_sensors({{"tendon_position", {{"backlash", 0.5}}}});
   EXPECT_EQ(shown(play, {10, 10.125, 10.5, 11.25, 11, 10.75, 10.25, 9.75, 9.875, 10.5}),
             (std::vector<double>{10, 10, 10.25, 11, 11, 11, 10.5, 10, 10, 10.25}));
-}
-
-TEST(SensorBank, AppliesGainOffsetAndResolutionInThisOrder) {
-  const rig one = with_sensors({{"tendon_position", {{"gain", {2.0, 1.0}}, {"offset", 0.3}, {"resolution", 0.5}}}});
-  EXPECT_EQ(shown(one, {0.0, 0.1, 1.0, -1.0}), (std::vector<double>{0.5, 0.5, 2.5, -1.5}));
-}
-
-TEST(SensorBank, NoiseIsThatOfSeedChannelAndSample) {
-  const rig one = with_sensors({{"tendon_position", {{"noise", 0.5}}}});
-  const std::vector<double> found = shown(one, {1.0, 1.0});
-  for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_DOUBLE_EQ(found[k], 1.0 + 0.5 * normal_number(5, 256, k));
-  }
 }
 
 TEST(SensorBank, ContinuesFromWhatItRemembered) {

@@ -150,17 +150,6 @@ TEST(Unknowns, BoundsAreWithinWhatTheCoreTakes) {
   }
 }
 
-TEST(Unknowns, StribeckVelocitiesStayAboveAShareOfTheThreshold) {
-  const Described d(small_finger());
-  const unknown_list all(d.finger(), nullptr, nullptr);
-  const unknown_item& tendon = all[column_of(all, unknown_role::rate, d.at(number(pulley, "stribeck_velocity")))];
-  const unknown_item& joint = all[column_of(all, unknown_role::rate, d.at("joints[1].friction.stribeck_velocity"))];
-  EXPECT_DOUBLE_EQ(tendon.upper, 1.0 / (0.2 * 0.0004));
-  EXPECT_DOUBLE_EQ(joint.upper, 1.0 / (0.2 * 0.02));
-  EXPECT_DOUBLE_EQ(tendon.lower, 1e-3 / 0.004);
-  EXPECT_DOUBLE_EQ(tendon.start, 1.0 / 0.004);
-}
-
 TEST(Unknowns, SharedNumbersHaveOneColumn) {
   const Described d(made::learnable_finger());
   Groups group = d.fixed();
@@ -198,40 +187,6 @@ TEST(Unknowns, StaticFrictionFollowsWhereItSharesWithCoulomb) {
   EXPECT_EQ(numbers[first + 2], 1.0 / 200.0);
   ASSERT_EQ(tied.rates().size(), 1u);
   EXPECT_EQ(tied.fixed_drop(0), 0.0) << "no Stribeck effect is left, whatever the description starts with";
-}
-
-TEST(Unknowns, AFixedNumberOfALawBoundsOrMovesTheOther) {
-  const Described d(made::learnable_finger());
-  const std::size_t first = d.at(number(edge, "static"));
-  Groups group = d.fixed();
-  group[first + 1] = 0;
-  const unknown_list below(d.finger(), group.data(), nullptr);
-  EXPECT_EQ(below[0].upper, d.start()[first]);
-  group = d.fixed();
-  group[first] = 0;
-  const unknown_list drop(d.finger(), group.data(), nullptr);
-  EXPECT_EQ(drop[0].role, unknown_role::drop);
-  const double z = 0.5;
-  EXPECT_DOUBLE_EQ(drop.write(&z)[first], d.start()[first + 1] + 0.5);
-  EXPECT_EQ(drop.write(&z)[first + 1], d.start()[first + 1]);
-}
-
-TEST(Unknowns, ScalesAreGivenOrTheStarts) {
-  const Described d(made::learnable_finger());
-  const std::size_t first = d.at(number(pulley, "static"));
-  Groups group = d.fixed();
-  Numbers scale = d.no_scale();
-  for (std::int32_t k = 0; k < 4; ++k) {
-    group[first + static_cast<std::size_t>(k)] = k;
-  }
-  scale[first] = 0.5;
-  scale[first + 1] = 0.4;
-  scale[first + 2] = 0.01;
-  const unknown_list given(d.finger(), group.data(), scale.data());
-  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::drop, first)].scale, 0.1);
-  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::coulomb, first + 1)].scale, 0.4);
-  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::rate, first + 2)].scale, 100.0);
-  EXPECT_DOUBLE_EQ(given[column_of(given, unknown_role::viscous, first + 3)].scale, 0.1);
 }
 
 TEST(Unknowns, RefusalsNameTheNumber) {
