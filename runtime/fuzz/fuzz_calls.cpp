@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 
-#include "../tests/test_finger.h"
 #include "promises.h"
 
 extern "C" {
@@ -38,7 +37,7 @@ class call_session {
     rows_taken_ = 0;
     const tendonfmu_status status = one_call();
     if (status != TENDONFMU_OK) {
-      promises::failure_has_a_reason(finger_);
+      promises::is_one_line(tendonfmu_last_error(finger_));
       PROMISE(rows_taken_ > 0 || promises::saved(finger_) == before);
     }
     if (tendonfmu_is_initialised(finger_)) {
@@ -132,11 +131,7 @@ class call_session {
       indices[i] = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
       values[i] = number();
     }
-    const tendonfmu_status status = tendonfmu_set_parameters(finger_, count, indices.data(), values.data());
-    if (status == TENDONFMU_OK) {
-      promises::parameters_are_sound(finger_);
-    }
-    return status;
+    return with_sound_parameters(tendonfmu_set_parameters(finger_, count, indices.data(), values.data()));
   }
 
   tendonfmu_status write_one_parameter() {
@@ -163,7 +158,10 @@ class call_session {
     if (data_.ConsumeBool()) {
       store_u64(&bytes[24], hash_bytes(&bytes[32], bytes.size() - 32, 0));
     }
-    const tendonfmu_status status = tendonfmu_restore_state(finger_, bytes.data(), bytes.size());
+    return with_sound_parameters(tendonfmu_restore_state(finger_, bytes.data(), bytes.size()));
+  }
+
+  tendonfmu_status with_sound_parameters(tendonfmu_status status) {
     if (status == TENDONFMU_OK) {
       promises::parameters_are_sound(finger_);
     }
@@ -192,11 +190,10 @@ class call_session {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static const byte_list images[] = {test_finger::image(), test_finger::image(one_joint),
-                                     test_finger::image(test_finger::every_key()),
-                                     test_finger::image(test_finger::every_effect())};
+  static const byte_list image_of_one_joint = test_finger::image(one_joint);
   FuzzedDataProvider data(bytes, size);
-  call_session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
+  const int which = data.ConsumeIntegralInRange<int>(0, test_finger::kinds);
+  call_session session(data, which < test_finger::kinds ? test_finger::image_of(which) : image_of_one_joint);
   while (data.remaining_bytes() > 0) {
     session.call();
   }

@@ -144,6 +144,20 @@ TEST(Description, MayBeWrittenInSeveralWays) {
   EXPECT_EQ(read("\xef\xbb\xbf" + small_finger().dump()).image, image); /* a byte order mark */
 }
 
+// null beside the other form of a law, short lists of laws, forms that are mixed
+TEST(Description, LawsMayBeWrittenInSeveralWays) {
+  json finger = small_finger(), padded = small_finger();
+  json& edges = padded["tendons"][0]["edge_friction"];
+  edges[0]["static"] = edges[0]["angles"] = edges[1]["positive"] = edges[1]["laws"][0]["negative"] = nullptr;
+  padded["tendons"][1]["edge_friction"] = json::array();
+  padded["tendons"][1]["pulley_friction"] = {nullptr, nullptr};
+  EXPECT_EQ(read(padded).image, read(finger).image);
+  padded["tendons"][0]["pulley_friction"].erase(1);
+  EXPECT_EQ(read(padded).image, read(finger).image);
+  finger["tendons"][0]["edge_friction"][1]["laws"][1] = finger["tendons"][0]["edge_friction"][0];
+  EXPECT_EQ(Described(finger)["tendons[1].edge_friction[2].laws[2].negative.static"], 0.04);
+}
+
 TEST(Description, TakesNumbersAtTheEndsOfTheirRanges) {
   for (const char* number : {"/bias/drift_variance", "/bias/initial_variance", "/bias/forget_rate", "/bias/noise_std",
                              "/bias/noise_std_per_force", "/velocity_filter_cutoff", "/velocity_threshold/tendon",
@@ -155,38 +169,6 @@ TEST(Description, TakesNumbersAtTheEndsOfTheirRanges) {
   const json law = {{"static", 0.03}, {"coulomb", 0.02}, {"stribeck_velocity", 0.005}};
   Described finger(with("/tendons/1/edge_friction", {{{"angles", {0.2}}, {"laws", {law}}}}));
   EXPECT_EQ(finger["tendons[2].edge_friction[1].laws[1].static"], 0.03) << "one working point";
-}
-
-TEST(Description, NullMayStandBesideTheOtherFormOfALaw) {
-  const Reading plain = read(small_finger());
-  json finger = small_finger();
-  json& edges = finger["tendons"][0]["edge_friction"];
-  edges[0]["static"] = nullptr;
-  edges[0]["angles"] = nullptr;
-  edges[1]["positive"] = nullptr;
-  edges[1]["laws"][0]["negative"] = nullptr;
-  const Reading padded = read(finger);
-  EXPECT_EQ(padded.status, TENDONFMU_OK) << padded.message;
-  EXPECT_EQ(padded.image, plain.image);
-}
-
-TEST(Description, ShortFrictionListsAreFilledWithNull) {
-  json full = small_finger(), brief = small_finger();
-  full["tendons"][0]["edge_friction"][1] = nullptr;
-  brief["tendons"][0]["edge_friction"].erase(1);
-  brief["tendons"][0]["pulley_friction"].erase(1);
-  EXPECT_EQ(read(brief).image, read(full).image);
-  full["tendons"][1]["edge_friction"] = json::array();
-  full["tendons"][1]["pulley_friction"] = {nullptr, nullptr};
-  EXPECT_EQ(read(brief).image, read(full).image);
-}
-
-TEST(Description, WorkingPointsMayMixSymmetricAndAsymmetricLaws) {
-  json finger = small_finger();
-  finger["tendons"][0]["edge_friction"][1]["laws"][1] = finger["tendons"][0]["edge_friction"][0];
-  Described described(finger);
-  EXPECT_EQ(described["tendons[1].edge_friction[2].laws[2].negative.static"], 0.04);
-  EXPECT_EQ(described["tendons[1].edge_friction[2].laws[1].static"], 0.03);
 }
 
 json largest_finger() {
@@ -209,59 +191,6 @@ TEST(Description, SixteenJointsAndSixtyFourTendonsAreAllowed) {
   EXPECT_EQ(tendonfmu_joint_count(finger.handle()), 16u);
   EXPECT_EQ(tendonfmu_tendon_count(finger.handle()), 64u);
   EXPECT_EQ(finger["tendons[64].edge_friction[16].static"], 0.03);
-}
-
-// All eighteen, as the rows of a model image: id, joint, tendon.
-TEST(Extensions, EachEffectIsARowOfTheImage) {
-  nlohmann::json finger = small_finger();
-  finger["extensions"] = nlohmann::json::parse(R"([
-    {"effect": "cover_hardening", "joint": 2, "stiffness": 0.3},
-    {"effect": "gravity", "joint": 2, "cosine": 0.01},
-    {"effect": "inertia", "joint": 1, "inertia": 1e-5},
-    {"effect": "inertia_variation", "joint": 1, "cosine": 2e-5},
-    {"effect": "joint_coupling", "joint": 1, "stiffness": 0.01},
-    {"effect": "preload_friction", "tendon": 2, "coulomb": 0.1},
-    {"effect": "preload_friction", "joint": 2, "tendon": 1, "coulomb": 0.1},
-    {"effect": "load_friction", "joint": 2, "tendon": 1, "coulomb": 1e-4},
-    {"effect": "force_gain", "tendon": 2, "correction": -0.1},
-    {"effect": "force_offset", "tendon": 1, "correction": 0.2},
-    {"effect": "moment_arm", "joint": 1, "tendon": 2, "correction": 1e-4},
-    {"effect": "moment_arm_variation", "joint": 2, "tendon": 2, "slope": 1e-4},
-    {"effect": "pulley_eccentricity", "joint": 2, "tendon": 1},
-    {"effect": "presliding", "joint": 1, "displacement": 0.01},
-    {"effect": "presliding", "joint": null, "tendon": 1, "displacement": 1e-4},
-    {"effect": "presliding", "displacement": 0.02},
-    {"effect": "friction_drift", "amplitude": 0.2, "time_constant": 60},
-    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
-    {"effect": "friction_drift", "tendon": 2, "amplitude": 0.2, "time_constant": 60},
-    {"effect": "tendon_nonlinearity", "tendon": 2, "hardening": 1e5},
-    {"effect": "backlash", "tendon": 2, "width": 1e-4},
-    {"effect": "backlash", "joint": 2, "width": 1e-3},
-    {"effect": "stribeck", "tendon": 2, "amplitude": -0.5, "stribeck_velocity": 0.01},
-    {"effect": "time_delay", "delay": -0.001}])");
-  const Reading reading = read(finger);
-  ASSERT_EQ(reading.message, "");
-  const Model model(reading.image);
-  ASSERT_TRUE(model.accepted) << model.message;
-  const std::vector<std::array<std::uint32_t, 3>> expected = {
-      {1, 2, 0},  {2, 2, 0},  {3, 1, 0},  {12, 1, 0}, {4, 1, 0},  {5, 0, 2},  {5, 2, 1},  {6, 2, 1},
-      {7, 0, 2},  {8, 0, 1},  {9, 1, 2},  {10, 2, 2}, {11, 2, 1}, {20, 1, 0}, {20, 0, 1}, {20, 0, 0},
-      {21, 0, 0}, {21, 0, 2}, {21, 0, 2}, {22, 0, 2}, {23, 0, 2}, {23, 2, 0}, {25, 0, 2}, {24, 0, 0}};
-  ASSERT_EQ(model.shape.extension_count, expected.size());
-  for (std::size_t k = 0; k < expected.size(); ++k) {
-    const std::uint32_t* row = model.shape.extensions + k * MODEL_EXTENSION_WORDS;
-    EXPECT_EQ((std::array<std::uint32_t, 3>{row[0], row[1], row[2]}), expected[k]) << "extension " << k + 1;
-    EXPECT_EQ(row[3], 0u);
-  }
-  // what is left out
-  const std::size_t last = model.values.size();
-  const std::vector<double> numbers(model.values.end() - 35, model.values.end());
-  EXPECT_EQ(numbers.front(), 0.3);
-  EXPECT_EQ(numbers[1], 0.0);   // gravity's sine
-  EXPECT_EQ(numbers[2], 0.01);  // its cosine
-  EXPECT_EQ(numbers[7], 1.0);   // joint_coupling's reaction
-  EXPECT_EQ(numbers[9], 1.0);   // preload_friction's beyond
-  EXPECT_EQ(model.values[last - 1], -0.001);
 }
 
 TEST(Extensions, PreslidingEverywhereMultipliesThresholds) {

@@ -142,54 +142,6 @@ std::vector<Effect> all_torques() {
 
 // --- torques --------------------------------------------------------------------------------------------------------
 
-// Work of both joints over time is the gain of the kinetic energy.
-TEST(Torque, OfAVaryingInertiaIsThatOfAnEnergy) {
-  Effect varying("inertia_variation", 1, 0, {3e-3, 2e-3});
-  Sample s;
-  s.step = 1e-5;
-  double work = 0.0, start = 0.0, end = 0.0;
-  for (int k = 0; k < 20000; ++k) {
-    const double t = s.step * k;
-    s.first = k == 0;
-    s.velocity = {std::sin(9.0 * t) + 0.4, 2.0 * std::cos(5.0 * t), 0.0};
-    s.angle[1] = 0.4 * std::sin(5.0 * t);
-    const PerJoint torque = varying.accept(s);
-    work += k ? (torque[0] * s.velocity[0] + torque[1] * s.velocity[1]) * s.step : 0.0;
-    end = 0.5 * (3e-3 * std::sin(2.0 * s.angle[1]) + 2e-3 * std::cos(2.0 * s.angle[1])) * s.velocity[0] * s.velocity[0];
-    start = k ? start : end;
-  }
-  EXPECT_GT(std::abs(end - start), 1e-4);
-  EXPECT_NEAR(work, end - start, 1e-3 * std::abs(end - start));
-}
-
-TEST(Memory, SideStaysAtRestAndIsNoneBeforeTheFirstMotion) {
-  Sample still, there, back;
-  still.velocity = {0.005, 0.0, 0.0};  // below 0.01 rad/s; 5e-5 m/s
-  back.velocity = {-0.5, 0.0, 0.0};
-  Effect load("load_friction", 1, 1, {1e-3}), preload("preload_friction", 1, 1, {0.1, 1.0});
-  Sample first = still;
-  first.first = 1;
-  for (Effect* effect : {&load, &preload}) {
-    expect_near(effect->accept(first), {0, 0, 0});
-    expect_near(effect->accept(still), {0, 0, 0});
-    const PerJoint moving = effect->accept(there);
-    EXPECT_GT(moving[0], 0.0);
-    EXPECT_EQ(effect->accept(still), moving);
-    const PerJoint other = effect->accept(back);
-    EXPECT_NEAR(other[0], -moving[0], 1e-15);
-    EXPECT_EQ(effect->accept(still), other);
-    expect_near(effect->accept(first), {0, 0, 0});  // what was before the first sample does not count
-  }
-}
-
-TEST(Memory, OfPreloadFrictionIsASideForEachJointItIsBefore) {
-  const Effect everywhere("preload_friction", 0, 1, {0.4, 1.0}), one("preload_friction", 2, 1, {0.4, 1.0});
-  EXPECT_EQ(everywhere.memory.size(), joints);
-  EXPECT_EQ(one.memory.size(), 1u);
-  EXPECT_EQ(everywhere.advanced(Sample{}), (std::vector<double>{1, 1, 1}));
-  EXPECT_EQ(Effect("preload_friction", 0, 2, {0.4, 1.0}).advanced(Sample{}), (std::vector<double>{-1, 1, 0}));
-}
-
 // The sample, moved along a direction.
 Sample moved(Sample sample, const Sample& direction, double length) {
   for (std::size_t j = 0; j < joints; ++j) {
@@ -236,74 +188,6 @@ TEST(Slope, IsTheCentralDifferenceWithTheMemoryHeld) {
   }
 }
 
-// of the sample after the first one, which reads what that has left
-TEST(Slope, OfInertiaFollowsAllThatItReadBefore) {
-  for (const Effect& inertia : {Effect("inertia", 2, 0, {2e-3}), Effect("inertia_variation", 1, 0, {3e-3, 2e-3})}) {
-    SCOPED_TRACE(inertia.type->name);
-    Sample first;
-    first.first = 1;
-    first.velocity = {0.2, 0.5, 0.0};
-    const double h = 1e-6;
-    PerJoint difference{};
-    for (const double side : {1.0, -1.0}) {
-      Effect shifted = inertia;
-      shifted.accept(moved(first, direction, side * h));
-      const PerJoint torque = shifted.accept(moved(Sample{}, direction, side * h));
-      for (std::size_t j = 0; j < joints; ++j) {
-        difference[j] += side * torque[j] / (2.0 * h);
-      }
-    }
-    Effect middle = inertia;
-    const effect_direction along = Effect::along_of(direction);
-    std::vector<double> slopes(middle.memory.size(), 0.0), next = slopes;
-    for (const Sample& sample : {first, Sample{}}) {
-      Effect::see(sample, [&](auto* seen) {
-        middle.type->advance_slope(middle.place, middle.numbers.data(), seen, middle.memory.data(), &along,
-                                   slopes.data(), next.data());
-      });
-      middle.accept(sample);
-      slopes = next;
-    }
-    expect_near(middle.torque(Sample{}, middle.numbers, slopes), difference, 1e-9);
-  }
-}
-
-TEST(Slope, WithoutADirectionIsZero) {
-  for (Effect& effect : all_torques()) {
-    PerJoint slope{};
-    const effect_direction nowhere{};
-    effect.accept(Sample{});
-    Effect::see(Sample{}, [&](auto* seen) {
-      effect.type->slope(effect.place, effect.numbers.data(), seen, effect.memory.data(), &nowhere, slope.data());
-    });
-    expect_near(slope, {0, 0, 0}, 0.0);
-  }
-}
-
-TEST(Torque, IsLinearInItsNumbers) {
-  Sample before;
-  before.first = 1;
-  before.velocity = {0.1, 0.4, -0.3};
-  for (Effect& effect : all_torques()) {
-    if (effect.type->by_parameter) {
-      continue;
-    }
-    effect.accept(before);
-    const std::vector<double> after = effect.advanced(Sample{});
-    PerJoint sum{};
-    for (std::size_t p = 0; p < effect.numbers.size(); ++p) {
-      std::vector<double> unit(effect.numbers.size(), 0.0);
-      unit[p] = 1.0;
-      const PerJoint column = effect.torque(Sample{}, unit, after);
-      EXPECT_NE(column, PerJoint{});
-      for (std::size_t j = 0; j < joints; ++j) {
-        sum[j] += effect.numbers[p] * column[j];
-      }
-    }
-    expect_near(effect.torque(Sample{}, effect.numbers, after), sum, 1e-14);
-  }
-}
-
 TEST(Torque, ThatIsNotLinearSaysItsDerivatives) {
   const double h = 1e-6;
   std::set<std::string> checked;
@@ -342,53 +226,6 @@ effect_grip grip_after(Effect effect, const Sample& second, std::size_t member) 
   effect.memory = effect.advanced(first);
   effect.memory = effect.advanced(second);
   return grip_of(effect, member);
-}
-
-TEST(Friction, SaysItsDerivatives) {
-  const std::size_t at_joint_2 = joints * tendons + 1;
-  const std::pair<Effect, std::size_t> cases[] = {{{"friction_drift", 0, 0, {0.4, 5.0}}, 0},
-                                                  {{"stribeck", 2, 0, {-0.5, 0.1}}, 0},
-                                                  {{"presliding", 2, 0, {0.01}}, 0},
-                                                  {{"presliding", 0, 0, {0.1}}, at_joint_2}};
-  const double h = 1e-6;
-  for (const auto& [effect, member] : cases) {
-    SCOPED_TRACE(effect.type->name);
-    const effect_grip here = grip_after(effect, Sample{}, member);
-    EXPECT_NE(here.value, 0.0);
-    for (std::size_t k = 0; k < effect.numbers.size(); ++k) {
-      Effect more = effect, less = effect;
-      more.numbers[k] += h;
-      less.numbers[k] -= h;
-      const double difference = grip_after(more, Sample{}, member).value - grip_after(less, Sample{}, member).value;
-      EXPECT_NEAR(here.by_parameter[k], difference / (2.0 * h), 1e-6 * (1.0 + std::fabs(here.by_parameter[k])));
-    }
-    Sample faster, slower;
-    faster.velocity[1] += h;
-    slower.velocity[1] -= h;
-    const double difference = grip_after(effect, faster, member).value - grip_after(effect, slower, member).value;
-    EXPECT_NEAR(here.by_velocity + here.by_motion, difference / (2.0 * h), 1e-6 * (1.0 + std::fabs(difference / h)));
-  }
-}
-
-TEST(Friction, DriftsAtOnceWithTheShortestTimeConstant) {
-  const effect_grip grip = grip_after(Effect("friction_drift", 0, 0, {0.4, 1e-300}), Sample{}, 0);
-  EXPECT_EQ(grip.value, 1.4);
-  EXPECT_EQ(grip.by_parameter[1], 0.0);
-}
-
-TEST(Friction, BuildsUpOverADistanceAndBack) {
-  Effect presliding("presliding", 1, 0, {0.01});
-  Sample first, later;
-  first.first = 1;
-  presliding.memory = presliding.advanced(first);
-  EXPECT_EQ(grip_of(presliding).value, 0.0);
-  EXPECT_EQ(grip_of(presliding).slides, 1);
-  presliding.memory = presliding.advanced(later);  // 0.005 rad
-  const double before = grip_of(presliding).value;
-  EXPECT_NEAR(before, 1.0 - std::exp(-0.5), 1e-15);
-  later.velocity[0] = -1.0;  // 0.01 rad back
-  presliding.memory = presliding.advanced(later);
-  EXPECT_NEAR(grip_of(presliding).value, -1.0 + (1.0 + before) * std::exp(-1.0), 1e-15);
 }
 
 // --- the table ------------------------------------------------------------------------------------------------------

@@ -104,63 +104,6 @@ Json with_initial_torque() {
 /* --- what the calls give --------------------------------------------------------------------------------------------
  */
 
-/* cost and information from the innovations, and the gradient from differences of the cost; with a bias that starts
- * late, one that is given, samples held out, and two recordings of several segments */
-TEST(Estimator, CostGradientAndInformationAreThoseOfTheInnovations) {
-  for (const Json& description : {made::learnable_finger(), with_initial_torque()}) {
-    Case c(21, 2300, description);
-    std::fill_n(c.recording.use.begin(), 40, 0);
-    std::fill_n(c.recording.use.begin() + 900, 300, 0);
-    Estimator e(c.guess);
-    ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
-    const Numbers z = e.start();
-    const std::size_t u = z.size(), n = 2, samples = c.recording.samples;
-    Numbers gradient, information, s(samples);
-    const double cost = e.cost(z, &gradient, &information);
-    const auto innovations = [&](const Numbers& at) {
-      Numbers scaled(samples * n);
-      EXPECT_EQ(tendonfmu_estimator_innovations(e.get(), 0, at.data(), scaled.data(), s.data(), nullptr), TENDONFMU_OK);
-      for (std::size_t k = 0; k < scaled.size(); ++k) {
-        scaled[k] = std::isnan(s[k / n]) ? 0.0 : scaled[k] / std::sqrt(s[k / n]);
-      }
-      return scaled;
-    };
-    const Numbers here = innovations(z);
-    double sum = 0.0;
-    for (const double e2 : here) {
-      sum += 0.5 * e2 * e2;
-    }
-    EXPECT_NEAR(cost, sum, 1e-10 * sum);
-    std::vector<Numbers> slope(u);
-    for (std::size_t k = 0; k < u; ++k) {
-      Numbers low = z, high = z;
-      const double step = 1e-4 * e.unknown(k).scale;
-      low[k] -= step;
-      high[k] += step;
-      slope[k] = innovations(high);
-      const Numbers below = innovations(low);
-      for (std::size_t at = 0; at < below.size(); ++at) {
-        slope[k][at] = (slope[k][at] - below[at]) / (2.0 * step);
-      }
-    }
-    for (std::size_t a = 0; a < u; ++a) {
-      double by = 0.0;
-      for (std::size_t at = 0; at < here.size(); ++at) {
-        by += slope[a][at] * here[at];
-      }
-      const double size = std::sqrt(information[a * u + a]);
-      EXPECT_NEAR(gradient[a], by, 1e-5 * size * std::sqrt(2.0 * cost)) << e.unknown(a).path;
-      for (std::size_t b = 0; b < u; ++b) {
-        double product = 0.0;
-        for (std::size_t at = 0; at < here.size(); ++at) {
-          product += slope[a][at] * slope[b][at];
-        }
-        EXPECT_NEAR(information[a * u + b], product, 1e-5 * size * std::sqrt(information[b * u + b]));
-      }
-    }
-  }
-}
-
 TEST(Estimator, EvaluationHasTheSameBitsWithAnyNumberOfThreads) {
   const Case c(22, 5000), d(23, 2100);
   Estimator e(c.guess);
@@ -231,32 +174,6 @@ TEST(Estimator, WeightsScaleWhatEachJointAddsToTheSums) {
   }
 }
 
-/* a prior of one scale, said as information */
-TEST(Estimator, WhatIsKnownBeforeCountsAsThePriorDoes) {
-  const Case c(33, 3000);
-  const Estimator e(c.guess), told(c.guess);
-  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
-  ASSERT_EQ(told.add(c.recording), TENDONFMU_OK) << told.error();
-  const std::size_t u = e.unknowns();
-  Numbers known(u * u, 0.0);
-  for (std::size_t k = 0; k < u; ++k) {
-    known[k * (u + 1)] = 1.0 / (0.01 * e.unknown(k).scale * e.unknown(k).scale);
-  }
-  ASSERT_EQ(tendonfmu_estimator_set_known(told.get(), known.data()), TENDONFMU_OK) << told.error();
-  tendonfmu_fit_options options = tendonfmu_default_fit_options();
-  options.tolerance = 1e-4;
-  options.prior_std = 0.1;
-  const Fit plain(e, options);
-  options.prior_std = std::numeric_limits<double>::infinity();
-  const Fit fit(told, options);
-  EXPECT_NEAR(fit.result.prior_cost, plain.result.prior_cost, 1e-6 * plain.result.cost);
-  for (std::size_t k = 0; k < u; ++k) {
-    const double error = std::sqrt(plain.covariance[k * (u + 1)]);
-    EXPECT_NEAR(fit.z[k], plain.z[k], 1e-3 * error) << e.unknown(k).path;
-    EXPECT_NEAR(std::sqrt(fit.covariance[k * (u + 1)]), error, 1e-3 * error) << e.unknown(k).path;
-  }
-}
-
 TEST(Estimator, AStoppedFitGivesTheBestSoFar) {
   const Case c(27, 4200);
   const Estimator e(c.guess);
@@ -264,13 +181,14 @@ TEST(Estimator, AStoppedFitGivesTheBestSoFar) {
   const auto stop_at_zero = [](void* left, const tendonfmu_fit_progress*) {
     return (*static_cast<int*>(left))-- > 0 ? 1 : 0;
   };
-  for (int asked = 0; asked < 4; ++asked) {
+  for (int asked = 0; asked < 2; ++asked) {
     int left = asked;
     const Fit some(e, tendonfmu_default_fit_options(), nullptr, stop_at_zero, &left);
     ASSERT_EQ(some.status, TENDONFMU_OK);
     EXPECT_TRUE(some.result.stopped);
     EXPECT_FALSE(some.result.converged);
-    if (some.result.passes > 0) {
+    EXPECT_EQ(some.result.passes, static_cast<std::size_t>(asked));
+    if (asked) {
       EXPECT_TRUE(std::isfinite(some.result.cost + some.gradient[0] + some.information[0] + some.covariance[0]));
     } else {
       EXPECT_EQ(some.z, e.start());
@@ -280,25 +198,6 @@ TEST(Estimator, AStoppedFitGivesTheBestSoFar) {
 
 /* --- what they refuse -----------------------------------------------------------------------------------------------
  */
-
-TEST(Estimator, NothingToEstimateIsRefusedByTheFitAlone) {
-  const Case c(28, 300);
-  const Estimator counted(c.truth);
-  const Groups fixed(counted.parameters(), -1);
-  Estimator e(c.truth, &fixed);
-  EXPECT_EQ(e.unknowns(), 0u);
-  ASSERT_EQ(e.add(c.recording), TENDONFMU_OK) << e.error();
-  const Numbers z(1, nan); /* nothing of it is read */
-  EXPECT_GT(e.cost(z), 0.0);
-  Numbers torque(600);
-  EXPECT_EQ(tendonfmu_estimator_jacobian(e.get(), 0, z.data(), 0, 300, torque.data(), nullptr, nullptr, nullptr),
-            TENDONFMU_OK);
-  double nothing = nan;
-  tendonfmu_fit_result result = {&nothing, nullptr, nullptr, nullptr, 0.0, 0.0, 0, 0, 0, 0};
-  const tendonfmu_fit_options options = tendonfmu_default_fit_options();
-  EXPECT_EQ(tendonfmu_estimator_fit(e.get(), nullptr, &options, nullptr, nullptr, &result), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(e.error(), "nothing to estimate: expected at least one number that is not fixed");
-}
 
 TEST(Estimator, RefusesRecordingsItCannotWeigh) {
   const Case c(29, 50);

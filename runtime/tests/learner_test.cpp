@@ -33,14 +33,6 @@ Numbers normalised(const Learner& learner, const Numbers& expected) {
   return errors;
 }
 
-double root_mean_square(const Numbers& numbers) {
-  double sum = 0.0;
-  for (const double x : numbers) {
-    sum += x * x;
-  }
-  return std::sqrt(sum / static_cast<double>(numbers.size()));
-}
-
 double largest(const Numbers& numbers) {
   double most = 0.0;
   for (const double x : numbers) {
@@ -137,22 +129,6 @@ TEST(Learner, LearnsNothingFromSamplesThatAreNotUsed) {
   EXPECT_NEAR(spoilt.innovation[2 * 310], clean.innovation[2 * 310] - 7.0, 1e-12);
   const Numbers errors = normalised(clean, made::truth_of(c.truth));
   EXPECT_LT(largest(errors), 4.0);
-}
-
-TEST(Learner, KeepsUnknownsFromOneRecordingToTheNext) {
-  const Case c(10, 4000);
-  const Recording second = made::made(c.truth, 4000, 0.001, 77);
-  Learner both(c.description), one(c.description);
-  one.run(c.recording);
-  both.run(c.recording);
-  both.run(second);
-  EXPECT_TRUE(std::isnan(both.innovation[0]));
-  const Numbers before = one.covariance(), after = both.covariance();
-  for (std::size_t i = 0; i < one.unknowns(); ++i) {
-    const std::size_t at = i * one.unknowns() + i;
-    EXPECT_LE(after[at], before[at] * (1.0 + 1e-12));
-  }
-  EXPECT_LT(largest(normalised(both, made::truth_of(c.truth))), 4.0);
 }
 
 TEST(Learner, ARefusedSampleChangesNothing) {

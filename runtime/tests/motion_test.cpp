@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "contact_force.h"
 #include "test_plant.h"
 
 namespace {
@@ -43,16 +42,6 @@ TEST(Knots, AreConstantOutside) {
   }
 }
 
-TEST(MomentArm, IsTheSlopeOfThePath) {
-  const moment_arm arm = {0.01, 2e-3, 1e-3, 0.7};
-  const double h = 1e-5;
-  EXPECT_EQ(path_of(arm, 0.0), 0.0);
-  for (double q = -2.0; q < 2.0; q += 0.25) {
-    EXPECT_NEAR(arm_at(arm, q), (path_of(arm, q + h) - path_of(arm, q - h)) / (2 * h), 1e-12);
-    EXPECT_NEAR(arm_slope_at(arm, q), (arm_at(arm, q + h) - arm_at(arm, q - h)) / (2 * h), 1e-12);
-  }
-}
-
 TEST(Elongation, IsTheSpringLawTurnedRound) {
   for (const double hardening : {0.0, 1e3, 1e6, 1e12}) {
     tendon spring;
@@ -63,40 +52,6 @@ TEST(Elongation, IsTheSpringLawTurnedRound) {
       EXPECT_NEAR(e * (spring.stiffness + hardening * e), force, 1e-14 * force + 1e-300);
     }
     EXPECT_LT(elongation_of(spring, -1.0), 0.0);
-  }
-}
-
-// Before time 0 the finger comes from aside, inside its limits, and rests for the last 40 % of the time to settle.
-TEST(DesiredAngles, ComeToTheStartFromAside) {
-  const rig small = test_plant::read(test_plant::small());
-  double start[max_joints], angle[max_joints];
-  desired_angles(small, 0.0, start);
-  desired_angles(small, -0.39 * small.settle, angle);
-  EXPECT_TRUE(std::equal(start, start + small.joint_count(), angle));
-  desired_angles(small, -small.settle, angle);
-  for (std::size_t j = 0; j < small.joint_count(); ++j) {
-    EXPECT_NEAR(std::fabs(angle[j] - start[j]), 0.15, 1e-12);
-    EXPECT_GE(angle[j], small.links[j].lower);
-    EXPECT_LE(angle[j], small.links[j].upper);
-  }
-}
-
-TEST(Obstacle, PushesOutwardsAndNeverPulls) {
-  rig plain = test_plant::read(test_plant::changed(
-      {{"/physics/obstacle", {{"centre", {0.09, 0, 0}}, {"radius", 0.02}, {"stiffness", 500}, {"damping", 5.0}}}}));
-  plain.pushes.clear();
-  double q[max_joints] = {}, speed[max_joints] = {};
-  for (const double rate : {-50.0, 0.0, 50.0}) {
-    speed[2] = rate;
-    chain_motion<double> motion;
-    move_chain(plain, q, speed, &motion);
-    const auto found = penetrate(plain.obstacle, motion);
-    ASSERT_GT(found.depth, 0.0);
-    const auto contact = contact_torques(plain, motion, 0.0, false, free_push(), true);
-    const double pressing = dot(contact.force, found.normal);
-    EXPECT_GE(pressing, 0.0);
-    EXPECT_NEAR(pressing, std::max(0.0, 500 * found.depth * (1 + 5.0 * found.growth)), 1e-12);
-    EXPECT_NEAR(contact.obstacle_loss, (pressing - 500 * found.depth) * found.growth, 1e-12);
   }
 }
 

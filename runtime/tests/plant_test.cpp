@@ -285,10 +285,7 @@ TEST_P(PlantOf, RunIsAdvanceAndGetSignals) {
     advance(other, time[k]);
     ASSERT_EQ(tendonfmu_plant_get_signals(other, &row.view), TENDONFMU_PLANT_OK);
     for (std::size_t a = 0; a < row.real.size(); ++a) {
-      const std::size_t size = row.real[a].size();
-      for (std::size_t i = 0; i < size; ++i) {
-        EXPECT_EQ(table.real[a][k * size + i], row.real[a][i]) << a;
-      }
+      EXPECT_TRUE(std::equal(row.real[a].begin(), row.real[a].end(), &table.real[a][k * row.real[a].size()])) << a;
     }
     EXPECT_EQ(table.contact[k], row.contact[0]);
   }
@@ -297,25 +294,20 @@ TEST_P(PlantOf, RunIsAdvanceAndGetSignals) {
   ASSERT_EQ(tendonfmu_plant_run(one, 3, back, &table.view, &done), TENDONFMU_PLANT_WRONG_ORDER);
   EXPECT_EQ(done, 1u);
   EXPECT_EQ(one.time(), 0.03);
-  ASSERT_EQ(tendonfmu_plant_run(one, 0, back, &table.view, &done), TENDONFMU_PLANT_OK);
-  EXPECT_EQ(done, 0u);
 }
 
 TEST_P(PlantOf, TimesNextToEachOtherAreTimes) {
   Plant one;
   start(one);
-  double time = 0.0;
   for (const double next : {5e-324, 1e-310, 1e-12, 0.001, 0.0011, 0.1}) {
+    const double later = std::nextafter(next, 1.0), last = std::nextafter(later, 1.0);
     advance(one, next);
-    time = std::nextafter(next, 1.0);
-    advance(one, time);
+    advance(one, later);
     push(one, 0.001 * (1 + next));  // begins anew
-    time = std::nextafter(time, 1.0);
-    advance(one, time);
-    EXPECT_EQ(one.time(), time);
-    for (const double x : one.state()) {
-      ASSERT_TRUE(std::isfinite(x)) << next;
-    }
+    advance(one, last);
+    EXPECT_EQ(one.time(), last);
+    const std::vector<double> state = one.state();
+    ASSERT_TRUE(std::all_of(state.begin(), state.end(), [](double x) { return std::isfinite(x); })) << next;
   }
 }
 

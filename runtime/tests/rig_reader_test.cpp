@@ -24,15 +24,6 @@ std::string refusal(const Json& rig) {
   return refusal_of(rig.dump());
 }
 
-TEST(RigReader, AcceptsTheSmallRig) {
-  const auto rig = test_plant::read(test_plant::small());
-  EXPECT_EQ(rig.joint_count(), 3u);
-  EXPECT_EQ(rig.tendon_count(), 6u);
-  EXPECT_EQ(rig.seed, 7u);
-  EXPECT_TRUE(rig.obstacle.present);
-  EXPECT_EQ(rig.pushes.size(), 2u);
-}
-
 TEST(RigReader, NamesThePlaceOfAFaultWhereverItIs) {
   const Json rig = test_plant::small();
   std::vector<std::string> places;
@@ -123,17 +114,6 @@ TEST(RigReader, RefusesTextsThatAreNoRig) {
   for (const char* text : {"", "{", "null", "[]", "1", "\"x\"", "{}", "{\"format\": 1}", "{\"finger\": 1e999}"}) {
     EXPECT_TRUE(document_faults::is_plain(refusal_of(text))) << text;
   }
-}
-
-TEST(RigReader, TakesTheShortestOfRigs) {
-  EXPECT_EQ(refusal(test_plant::plain(1, 2)), "");
-  Json rig = test_plant::plain(1, 2);
-  rig["physics"]["joint_coupling"] = Json::array();
-  rig["physics"]["tendons"] = Json::array();
-  rig["physics"]["friction"] = Json::object();
-  rig["sensors"] = nullptr;
-  rig["pushes"] = Json::array();
-  EXPECT_EQ(refusal(rig), "");
 }
 
 TEST(RigReader, TakesTheLargestOfFingers) {

@@ -94,26 +94,4 @@ TEST_F(RigidBody, PowerOfTheTorquesIsTheGrowthOfEnergy) {
   }
 }
 
-// A force does work on a point as its torques do on the joints.
-TEST_F(RigidBody, ForceAtAPointTurnsTheJointsByTheJacobian) {
-  const three point = {0.02, -0.01, 0.005};
-  const vector3<double> force = {0.7, -1.1, 0.4};
-  for (int trial = 0; trial < 50; ++trial) {
-    draw();
-    const chain_motion<double> motion = moved();
-    for (std::size_t link = 0; link < n; ++link) {
-      const point_motion<double> at = move_point(motion.links[link], point);
-      double torque[max_joints] = {}, power = 0.0;
-      add_torque_of_force(motion, link, at.place, force, torque);
-      for (std::size_t j = 0; j < n; ++j) {
-        power += torque[j] * speed[j];
-      }
-      EXPECT_NEAR(power, dot(force, at.velocity), 1e-14);
-      for (std::size_t j = link + 1; j < n; ++j) {
-        EXPECT_EQ(torque[j], 0.0);
-      }
-    }
-  }
-}
-
 }  // namespace

@@ -1,9 +1,8 @@
-// Sensors of the simulated finger, one effect at a time, and their memory.
+// The memory of the simulated finger's sensors; what they show: python_tests/simulate/test_plant_sensors.py.
 #include "sensor_bank.h"
 
 #include <gtest/gtest.h>
 
-#include "random_numbers.h"
 #include "test_plant.h"
 
 namespace {
@@ -15,39 +14,6 @@ rig with_sensors(const Json& sensors) {
   Json text = test_plant::plain(1, 2);
   text["sensors"] = sensors;
   return test_plant::read(text);
-}
-
-/* What tendon_position[1] shows for a series of true values. */
-std::vector<double> shown(const rig& rig, const std::vector<double>& truth) {
-  sensor_bank bank(rig);
-  std::vector<double> found;
-  readings exact(1, 2);
-  for (std::size_t k = 0; k < truth.size(); ++k) {
-    exact.tendon_position[0] = truth[k];
-    bank.sample(k, 5, exact);
-    found.push_back(bank.newest().tendon_position[0]);
-  }
-  return found;
-}
-
-TEST(SensorBank, DelaysByWholeAndPartSamples) {
-  const std::vector<double> truth = {1, 2, 4, 8, 16, 32, 64};
-  const auto delayed = [&](double delay) {
-    return shown(with_sensors({{"rate", 100}, {"tendon_position", {{"delay", delay}}}}), truth);
-  };
-  EXPECT_EQ(delayed(0.02), (std::vector<double>{1, 1, 1, 2, 4, 8, 16}));
-  const std::vector<double> between = delayed(0.025), expected = {1, 1, 1, 1.5, 3, 6, 12};
-  for (std::size_t k = 0; k < truth.size(); ++k) {
-    EXPECT_NEAR(between[k], expected[k], 1e-12) << k;
-  }
-  const std::vector<double> little = delayed(0.001);
-  EXPECT_NEAR(little[1], 1.9, 1e-12);
-}
-
-TEST(SensorBank, BacklashFollowsOnceTheGapIsTakenUp) {
-  const rig play = with_sensors({{"tendon_position", {{"backlash", 0.5}}}});
-  EXPECT_EQ(shown(play, {10, 10.125, 10.5, 11.25, 11, 10.75, 10.25, 9.75, 9.875, 10.5}),
-            (std::vector<double>{10, 10, 10.25, 11, 11, 11, 10.5, 10, 10, 10.25}));
 }
 
 TEST(SensorBank, ContinuesFromWhatItRemembered) {
