@@ -124,24 +124,20 @@ class call_session {
   }
 
   tendonfmu_status write_parameters() {
-    const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 4);
-    std::vector<std::size_t> indices(count);
-    std::vector<double> values(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      indices[i] = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
-      values[i] = number();
+    std::vector<std::size_t> indices(data_.ConsumeIntegralInRange<std::size_t>(0, 4));
+    for (std::size_t& index : indices) {
+      index = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
     }
-    return with_sound_parameters(tendonfmu_set_parameters(finger_, count, indices.data(), values.data()));
+    const std::vector<double> values = row(indices.size(), 1.0);
+    return with_sound_parameters(tendonfmu_set_parameters(finger_, indices.size(), indices.data(), values.data()));
   }
 
   tendonfmu_status write_one_parameter() {
     char path[80] = "";
     const std::size_t index = data_.ConsumeIntegralInRange<std::size_t>(0, 2 * tendonfmu_parameter_count(finger_));
-    if (tendonfmu_get_parameter_path(finger_, index, path, sizeof path) != TENDONFMU_OK) {
-      const std::string any = data_.ConsumeRandomLengthString(100);
-      return tendonfmu_set_parameter(finger_, any.c_str(), number());
-    }
-    return tendonfmu_set_parameter(finger_, path, number());
+    const bool known = tendonfmu_get_parameter_path(finger_, index, path, sizeof path) == TENDONFMU_OK;
+    const std::string any = known ? path : data_.ConsumeRandomLengthString(100);
+    return with_sound_parameters(tendonfmu_set_parameter(finger_, any.c_str(), number()));
   }
 
   // a saved state with some bytes changed, half the time under a checksum that fits

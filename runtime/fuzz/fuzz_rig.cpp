@@ -106,41 +106,34 @@ json_tree* anywhere(json_tree* value, std::mt19937& random) {
   return value;
 }
 
-void change_number(json_tree* value, std::mt19937& random) {
+double other_number(double x, std::mt19937& random) {
   const double special[] = {0.0,  -0.0, 1.0, -1.0, 1e-320, 5e-324, 1e-300, 1e-12, 1e-6, 0.05,
                             10.0, 1e3,  1e6, 1e9,  1e15,   1e300,  -1e300, 2.0,   3.0,  9007199254740993.0};
-  const double x = value->get<double>();
-  switch (random() % 5) {
-    case 0: *value = special[random() % std::size(special)]; break;
-    case 1: *value = -x; break;
-    case 2: *value = x * (random() % 2 ? 10.0 : 0.1); break;
-    case 3: *value = x * std::pow(10.0, static_cast<double>(random() % 24) - 12.0); break;
-    default: *value = x + 1.0;
+  switch (random() % 4) {
+    case 0: return special[random() % std::size(special)];
+    case 1: return -x;
+    case 2: return x * std::pow(10.0, static_cast<double>(random() % 24) - 12.0);
+    default: return x + 1.0;
   }
 }
 
+/* Another number, an element less or twice, or any other value. */
 void change(json_tree* value, std::mt19937& random) {
+  static const json_tree others = json_tree::parse(
+      R"([null, true, 0, 1, -1.5, "", "sine", "link", "capstan", "fixed_step", [], {}, [0, 0, 0], [1, 2]])");
   if (value->is_number() && random() % 8) {
-    return change_number(value, random);
-  }
-  if (value->is_object() && !value->empty() && random() % 2) {
+    *value = other_number(value->get<double>(), random);
+  } else if (value->is_structured() && !value->empty() && random() % 4) {
     auto item = value->begin();
     std::advance(item, static_cast<std::ptrdiff_t>(random() % value->size()));
-    value->erase(item);
-    return;
-  }
-  if (value->is_array() && !value->empty() && random() % 4) {
-    const std::size_t k = random() % value->size();
-    if (random() % 2) {
-      value->push_back(json_tree((*value)[k]));
+    if (value->is_array() && random() % 2) {
+      value->push_back(json_tree(*item));
     } else {
-      value->erase(k);
+      value->erase(item);
     }
-    return;
+  } else {
+    *value = others[random() % others.size()];
   }
-  static const json_tree other = json_tree::parse(
-      R"([null, true, 0, 1, -1.5, "", "sine", "link", "capstan", "fixed_step", [], {}, [0, 0, 0], [1, 2]])");
-  *value = other[random() % other.size()];
 }
 
 }  // namespace

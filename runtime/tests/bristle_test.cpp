@@ -28,7 +28,10 @@ struct Response {
       rate_by_velocity, rate_by_angle;
 };
 
-Response respond_once(const law_columns& laws, const response_settings& with, double w) {
+Response respond_once(const law& one, double v, int exponent, const response_settings& with, double w) {
+  law_columns laws(1);
+  laws.inverse_length[0] = 1.0 / length;
+  set_law(one, v, exponent, 0, &laws);
   const double bristles[2] = {w, 0.123};
   response_columns r(1);
   respond(laws, with, bristles, &r);
@@ -42,13 +45,6 @@ Response respond_once(const law_columns& laws, const response_settings& with, do
           r.rate_by_bristle[0],
           r.rate_by_velocity[0],
           r.rate_by_angle[0]};
-}
-
-Response respond_once(const law& one, double v, int exponent, const response_settings& with, double w) {
-  law_columns laws(1);
-  laws.inverse_length[0] = 1.0 / length;
-  set_law(one, v, exponent, 0, &laws);
-  return respond_once(laws, with, w);
 }
 
 /* Stribeck's curve, eq. (1) with exponent δ, without the viscous part. */

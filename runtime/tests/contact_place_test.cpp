@@ -34,12 +34,6 @@ struct Placed {
     }
   }
   link_geometry view() { return {axis.data(), offset.data(), tip.data()}; }
-  std::vector<double> levers(const std::vector<double>& angle) {
-    std::vector<double> lever(3 * joints);
-    const link_geometry geometry = view();
-    find_tip_levers(&geometry, joints, angle.data(), lever.data());
-    return lever;
-  }
   std::vector<int> least() {
     std::vector<int> link(joints);
     const link_geometry geometry = view();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "described_finger.h"
+#include "document_faults.h"
 #include "model_inside.h"
 
 using nlohmann::json;
@@ -44,9 +45,7 @@ json without(const char* pointer) {
 }
 
 json with(const char* pointer, const json& value) {
-  json finger = small_finger();
-  finger[json::json_pointer(pointer)] = value;
-  return finger;
+  return document_faults::changed(small_finger(), pointer, value);
 }
 
 TEST(Description, EveryNumberArrivesUnderItsPath) {

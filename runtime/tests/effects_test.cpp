@@ -1,5 +1,5 @@
-// Torques and friction beyond the paper, each by itself: memory, derivatives by differences, the table. Their values
-// are compared with the oracle's (python_tests/model/test_random_extensions.py).
+// Torques beyond the paper, each by itself: derivatives by differences; and the table of all effects. Their values are
+// compared with the oracle's (python_tests/model/test_random_extensions.py).
 #include <gtest/gtest.h>
 
 #include <array>
@@ -210,22 +210,6 @@ TEST(Torque, ThatIsNotLinearSaysItsDerivatives) {
     }
   }
   EXPECT_EQ(checked, (std::set<std::string>{"joint_coupling", "preload_friction", "pulley_eccentricity"}));
-}
-
-// --- friction -------------------------------------------------------------------------------------------------------
-
-effect_grip grip_of(const Effect& effect, std::size_t member = 0) {
-  return effect.type->grip(effect.place, effect.numbers.data(), effect.memory.data(), member);
-}
-
-// What the effect makes of a place's friction at a second sample.
-effect_grip grip_after(Effect effect, const Sample& second, std::size_t member) {
-  Sample first;
-  first.first = 1;
-  first.time = -2.0;
-  effect.memory = effect.advanced(first);
-  effect.memory = effect.advanced(second);
-  return grip_of(effect, member);
 }
 
 // --- the table ------------------------------------------------------------------------------------------------------

@@ -8,18 +8,16 @@ namespace {
 
 using made::Json;
 using made::Numbers;
-using Groups = std::vector<std::int32_t>;
 
 const double nan = std::numeric_limits<double>::quiet_NaN();
 
 /* An estimator, destroyed with it. */
 class Estimator {
  public:
-  explicit Estimator(const Json& description, const Groups* group = nullptr) {
+  explicit Estimator(const Json& description) {
     const std::vector<unsigned char> image = made::image_of(description);
     char message[400] = "";
-    handle_ = tendonfmu_estimator_create(image.data(), image.size(), group ? group->data() : nullptr, nullptr, message,
-                                         sizeof message);
+    handle_ = tendonfmu_estimator_create(image.data(), image.size(), nullptr, nullptr, message, sizeof message);
     EXPECT_NE(handle_, nullptr) << message;
   }
   ~Estimator() { tendonfmu_estimator_destroy(handle_); }
@@ -94,12 +92,6 @@ struct Case {
   Json truth, guess;
   made::Recording recording;
 };
-
-Json with_initial_torque() {
-  Json finger = made::learnable_finger();
-  finger["bias"]["initial_torque"] = {0.1, -0.2};
-  return finger;
-}
 
 /* --- what the calls give --------------------------------------------------------------------------------------------
  */

@@ -29,14 +29,11 @@ struct alignas(32) Four {
 // Arguments over the whole range: uniform, logarithmic, around the ends of the argument reduction.
 std::vector<Four> arguments(int count) {
   std::mt19937_64 random(20240607);
-  std::vector<double> x = {0.0,           -0.0,
-                           5e-324,        1e-308,
-                           1e-17,         1e-16,
-                           1.0,           707.999,
-                           708.0,         std::nextafter(708.0, 709.0),
-                           709.0,         745.0,
-                           1e300,         HUGE_VAL,
-                           std::log(2.0), 0.5 * std::log(2.0)};
+  std::vector<double> x;
+  for (const double edge : {0.0, -0.0, 5e-324, 1e-308, 1e-17, 1e-16, 1.0, 707.999, 708.0, std::nextafter(708.0, 709.0),
+                            709.0, 745.0, 1e300, HUGE_VAL, std::log(2.0), 0.5 * std::log(2.0)}) {
+    x.push_back(edge);
+  }
   for (int i = 0; i < count; ++i) {
     x.push_back(std::uniform_real_distribution<>(0.0, 2.0)(random));
   }

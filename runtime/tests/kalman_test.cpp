@@ -122,33 +122,6 @@ TEST(Kalman, FindsTheMostLikelyStateOnABound) {
   }
 }
 
-TEST(Kalman, LearnsNothingFromSamplesThatAreNotUsed) {
-  const kalman_settings s = some_settings(8, 2, 8);
-  Model model(s, 26);
-  model.next();
-  kalman_filter filter(s, s.scale, 1.0);
-  const Numbers zero(16, 0.0);
-  filter.start_bias(zero.data(), zero.data(), 0.01);
-  const Numbers before(filter.z(), filter.z() + 8);
-  double elapsed = 0.0;
-  for (std::size_t k = 0; k < 8; ++k) {
-    model.next();
-    kalman_sample sample = model.at(filter.z());
-    sample.use = false;
-    sample.jump = nullptr;
-    elapsed += sample.step;
-    filter.add(sample);
-  }
-  ASSERT_TRUE(filter.update());
-  EXPECT_EQ(Numbers(filter.z(), filter.z() + 8), before);
-  EXPECT_EQ(filter.bias()[0], 0.0);
-  for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_DOUBLE_EQ(filter.covariance(i, i), s.scale[i] * s.scale[i]);
-  }
-  EXPECT_DOUBLE_EQ(filter.bias_variance(1), 0.01 + s.drift_variance * elapsed);
-  EXPECT_NE(filter.innovation()[3], 0.0); /* what is left is told all the same */
-}
-
 // Twenty samples were enough for P − K H P to lose nine digits.
 TEST(Kalman, CovarianceStaysPositiveDefiniteOverTenThousandSamples) {
   kalman_settings s = some_settings(60, 4, 8);

@@ -207,21 +207,23 @@ TEST(Learner, StopsWhenTheWatchSaysSo) {
 
 TEST(Learner, TakesNoLearner) {
   tendonfmu_learner_destroy(nullptr);
-  EXPECT_EQ(tendonfmu_learner_unknown_count(nullptr), 0u);
-  EXPECT_EQ(tendonfmu_learner_slack_samples(nullptr), 0u);
+  EXPECT_EQ(tendonfmu_learner_unknown_count(nullptr) + tendonfmu_learner_slack_samples(nullptr), 0u);
   EXPECT_STREQ(tendonfmu_learner_last_error(nullptr), "no learner: NULL");
   EXPECT_EQ(tendonfmu_learner_create(nullptr, 0, nullptr, nullptr, nullptr, nullptr, 0), nullptr);
-  EXPECT_EQ(tendonfmu_learner_initialise(nullptr, 0.0, nullptr, 1, nullptr, 1), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_step(nullptr, 0.0, nullptr, nullptr, 1), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_finish(nullptr), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_get_values(nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_get_unknowns(nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_get_bias(nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_learner_get_innovations(nullptr, nullptr, nullptr, nullptr), TENDONFMU_BAD_ARGUMENT);
+  for (const tendonfmu_status status :
+       {tendonfmu_learner_initialise(nullptr, 0.0, nullptr, 1, nullptr, 1),
+        tendonfmu_learner_step(nullptr, 0.0, nullptr, nullptr, 1), tendonfmu_learner_finish(nullptr),
+        tendonfmu_learner_get_values(nullptr, nullptr, nullptr),
+        tendonfmu_learner_get_unknowns(nullptr, nullptr, nullptr),
+        tendonfmu_learner_get_bias(nullptr, nullptr, nullptr),
+        tendonfmu_learner_get_innovations(nullptr, nullptr, nullptr, nullptr)}) {
+    EXPECT_EQ(status, TENDONFMU_BAD_ARGUMENT);
+  }
 }
 
 TEST(Learner, StepAllocatesNothing) {
 #if defined(COUNTS_ALLOCATIONS)
+  ASSERT_TRUE(allocations_count());
   const Case c(16, 2000);
   Learner learner(c.description);
   tendonfmu_learner* l = learner.get();

@@ -24,7 +24,6 @@ using tendonfmu::estimation::fit_problem;
 using tendonfmu::estimation::local_model;
 using tendonfmu::estimation::scaled_box;
 using tendonfmu::estimation::unknown_role;
-using Groups = std::vector<std::int32_t>;
 
 /* --- the model of the cost ------------------------------------------------------------------------------------------
  */
@@ -32,10 +31,10 @@ using Groups = std::vector<std::int32_t>;
 /* A finger that expects other numbers than those that made its recording, and its cost around x. */
 class Case {
  public:
-  explicit Case(const Groups* group = nullptr, double prior = 0.0)
+  explicit Case(double prior = 0.0)
       : truth_(made::learnable_finger()),
         image_(made::image_of(guess())),
-        problem_(image_.data(), image_.size(), group ? group->data() : nullptr, nullptr),
+        problem_(image_.data(), image_.size(), nullptr, nullptr),
         box_(problem_.unknowns),
         prior_(prior) {
     made::Recording r = made::made(truth_, 2500, 0.004, 7);
@@ -88,7 +87,7 @@ VectorXd along(const Case& c, Index unknown, double length) {
 
 /* e is linear in the friction of a place, and that in all numbers of its law but the rate */
 TEST(LocalModel, IsExactInWhatEntersLinearly) {
-  const Case c(nullptr, 0.7);
+  const Case c(0.7);
   for (const unknown_role role :
        {unknown_role::coulomb, unknown_role::drop, unknown_role::viscous, unknown_role::value}) {
     for (const Index k : c.with(role)) {

