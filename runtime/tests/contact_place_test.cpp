@@ -34,6 +34,12 @@ struct Placed {
     }
   }
   link_geometry view() { return {axis.data(), offset.data(), tip.data()}; }
+  std::vector<double> levers(const std::vector<double>& angle) {
+    std::vector<double> lever(3 * joints);
+    const link_geometry geometry = view();
+    find_tip_levers(&geometry, joints, angle.data(), lever.data());
+    return lever;
+  }
   std::vector<int> least() {
     std::vector<int> link(joints);
     const link_geometry geometry = view();
@@ -63,6 +69,26 @@ TEST(LinkGeometry, LinksWithoutLengthAreNotTouched) {
   turning_on_itself.tip = {0, 0, 0};
   turning_on_itself.offset[1] = {0, 1e-12, 0};
   EXPECT_EQ(Placed(turning_on_itself).least(), (std::vector<int>{2, 2}));
+}
+
+// by hand; what is in the plane is found, nothing is made up across it
+TEST(TipForce, OfAPlanarFingerIsThatInItsPlane) {
+  const double first = 0.3, both = 0.3 + 0.9;
+  const std::vector<double> lever = Placed(planar()).levers({0.3, 0.9});
+  const double x = -0.03 * std::sin(both), z = -0.03 * std::cos(both);
+  const double expected[] = {x - 0.05 * std::sin(first), 0.0, z - 0.05 * std::cos(first), x, 0.0, z};
+  const Three force = {0.4, 0.7, -1.1};
+  std::vector<double> torque(2, 0.0);
+  for (std::size_t k = 0; k < 6; ++k) {
+    EXPECT_NEAR(lever[k], expected[k], 1e-15) << k;
+    torque[k / 3] -= expected[k] * force[k % 3];
+  }
+  const tip_force found = find_tip_force(2, lever.data(), torque.data(), nullptr);
+  EXPECT_FALSE(found.observable);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(found.force[k], k == 1 ? 0.0 : force[k], 1e-12) << k;
+    EXPECT_EQ(found.deviation[k], 0.0) << "not known";
+  }
 }
 
 TEST(TipForce, StaysFiniteAtTheEdgesOfDoubles) {

@@ -201,13 +201,6 @@ TEST(Motion, MovesRestsTouchesReversesAndLetsEveryKeyAct) {
 
 // --- one finger alone -----------------------------------------------------------------------------------------------
 
-TEST(Finger, UnknownKernelIsRefused) {
-  Finger finger;
-  const std::string before = tendonfmu_get_kernel(finger);
-  EXPECT_EQ(tendonfmu_set_kernel(finger, "quantum"), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_get_kernel(finger), before);
-}
-
 TEST(Finger, StatesBringTheirParametersAndFitTheirFingerAlone) {
   Finger tuned, plain;
   set(tuned, "joints[1].friction.coulomb", 0.001);
@@ -219,16 +212,6 @@ TEST(Finger, StatesBringTheirParametersAndFitTheirFingerAlone) {
   std::string text = test_finger::json;
   text.replace(text.find("0.008, 0.006"), 12, "0.009, 0.006");
   EXPECT_EQ(restore(plain, Finger(test_finger::image(text)).saved()), TENDONFMU_BAD_STATE);
-}
-
-TEST(Finger, ShortestStepDoesNotPoisonTheState) {
-  Finger finger;
-  ASSERT_EQ(finger.take(0.0, motion().row(0)), TENDONFMU_OK);
-  const auto before = finger.saved();
-  if (finger.take(5e-324, motion().row(1500)) != TENDONFMU_OK) {
-    EXPECT_EQ(finger.saved(), before);
-  }
-  EXPECT_EQ(finger.take(1e12, motion().row(1500)), TENDONFMU_OK) << tendonfmu_last_error(finger);
 }
 
 TEST(Finger, RefusedRowOfABatchIsNamedAndRowsBeforeItAreWritten) {

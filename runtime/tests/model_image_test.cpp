@@ -84,18 +84,6 @@ TEST(ModelImage, WrittenAgainIsTheSameBytes) {
   EXPECT_EQ(model.written(), image);
 }
 
-TEST(ModelImage, IsReadAtAnyAlignment) {
-  const std::vector<unsigned char> image = test_finger::image();
-  for (std::size_t shift = 1; shift < 8; ++shift) {
-    std::vector<unsigned char> moved(image.size() + shift);
-    std::memcpy(moved.data() + shift, image.data(), image.size());
-    tendonfmu_finger* finger = tendonfmu_create(moved.data() + shift, image.size(), nullptr, 0);
-    ASSERT_NE(finger, nullptr);
-    EXPECT_EQ(tendonfmu_joint_count(finger), 2u);
-    tendonfmu_destroy(finger);
-  }
-}
-
 TEST(DamagedImage, EveryFlippedBitIsRefusedOrMeansTheSame) {
   const std::vector<unsigned char> image = test_finger::image();
   const Model original(image);

@@ -56,25 +56,6 @@ TEST_F(RigidBody, KineticEnergyIsHalfOfSpeedMassSpeed) {
   }
 }
 
-// Torques of unit accelerations, less those of none, are the columns of the mass matrix.
-TEST_F(RigidBody, InverseDynamicsHasTheMassMatrix) {
-  for (int trial = 0; trial < 50; ++trial) {
-    draw();
-    const chain_motion<double> motion = moved();
-    double mass[max_joints * max_joints], rest[max_joints] = {}, without[max_joints];
-    mass_matrix(small, motion, mass);
-    inverse_dynamics(small, motion, speed, rest, without);
-    for (std::size_t k = 0; k < n; ++k) {
-      double unit[max_joints] = {}, with[max_joints];
-      unit[k] = 1.0;
-      inverse_dynamics(small, motion, speed, unit, with);
-      for (std::size_t j = 0; j < n; ++j) {
-        EXPECT_NEAR(with[j] - without[j], mass[j * n + k], 1e-15);
-      }
-    }
-  }
-}
-
 // dT/dt + dV/dt = torque · q̇ for any acceleration: holds for velocity terms and gravity together.
 TEST_F(RigidBody, PowerOfTheTorquesIsTheGrowthOfEnergy) {
   std::uniform_real_distribution<double> any(-50.0, 50.0);
