@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 
-#include "../tests/test_finger.h"
 #include "promises.h"
 
 extern "C" {
@@ -38,7 +37,7 @@ class call_session {
     rows_taken_ = 0;
     const tendonfmu_status status = one_call();
     if (status != TENDONFMU_OK) {
-      promises::failure_has_a_reason(finger_);
+      promises::is_one_line(tendonfmu_last_error(finger_));
       PROMISE(rows_taken_ > 0 || promises::saved(finger_) == before);
     }
     if (tendonfmu_is_initialised(finger_)) {
@@ -125,28 +124,20 @@ class call_session {
   }
 
   tendonfmu_status write_parameters() {
-    const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 4);
-    std::vector<std::size_t> indices(count);
-    std::vector<double> values(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      indices[i] = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
-      values[i] = number();
+    std::vector<std::size_t> indices(data_.ConsumeIntegralInRange<std::size_t>(0, 4));
+    for (std::size_t& index : indices) {
+      index = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
     }
-    const tendonfmu_status status = tendonfmu_set_parameters(finger_, count, indices.data(), values.data());
-    if (status == TENDONFMU_OK) {
-      promises::parameters_are_sound(finger_);
-    }
-    return status;
+    const std::vector<double> values = row(indices.size(), 1.0);
+    return with_sound_parameters(tendonfmu_set_parameters(finger_, indices.size(), indices.data(), values.data()));
   }
 
   tendonfmu_status write_one_parameter() {
     char path[80] = "";
     const std::size_t index = data_.ConsumeIntegralInRange<std::size_t>(0, 2 * tendonfmu_parameter_count(finger_));
-    if (tendonfmu_get_parameter_path(finger_, index, path, sizeof path) != TENDONFMU_OK) {
-      const std::string any = data_.ConsumeRandomLengthString(100);
-      return tendonfmu_set_parameter(finger_, any.c_str(), number());
-    }
-    return tendonfmu_set_parameter(finger_, path, number());
+    const bool known = tendonfmu_get_parameter_path(finger_, index, path, sizeof path) == TENDONFMU_OK;
+    const std::string any = known ? path : data_.ConsumeRandomLengthString(100);
+    return with_sound_parameters(tendonfmu_set_parameter(finger_, any.c_str(), number()));
   }
 
   // a saved state with some bytes changed, half the time under a checksum that fits
@@ -163,7 +154,10 @@ class call_session {
     if (data_.ConsumeBool()) {
       store_u64(&bytes[24], hash_bytes(&bytes[32], bytes.size() - 32, 0));
     }
-    const tendonfmu_status status = tendonfmu_restore_state(finger_, bytes.data(), bytes.size());
+    return with_sound_parameters(tendonfmu_restore_state(finger_, bytes.data(), bytes.size()));
+  }
+
+  tendonfmu_status with_sound_parameters(tendonfmu_status status) {
     if (status == TENDONFMU_OK) {
       promises::parameters_are_sound(finger_);
     }
@@ -192,11 +186,10 @@ class call_session {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static const byte_list images[] = {test_finger::image(), test_finger::image(one_joint),
-                                     test_finger::image(test_finger::every_key()),
-                                     test_finger::image(test_finger::every_effect())};
+  static const byte_list image_of_one_joint = test_finger::image(one_joint);
   FuzzedDataProvider data(bytes, size);
-  call_session session(data, data.PickValueInArray({&images[0], &images[1], &images[2], &images[3]})[0]);
+  const int which = data.ConsumeIntegralInRange<int>(0, test_finger::kinds);
+  call_session session(data, which < test_finger::kinds ? test_finger::image_of(which) : image_of_one_joint);
   while (data.remaining_bytes() > 0) {
     session.call();
   }

@@ -24,12 +24,12 @@ void change_a_word(std::uint8_t* data, std::size_t size, std::mt19937& random) {
     store_u32(data + 40, load_u32(data + 40) ^ 1u << random() % 18);
   } else if (random() % 2) {
     std::uint8_t* word = data + 32 + 4 * (random() % ((size - 32) / 4));
-    const std::uint32_t odd = odd_words[random() % (sizeof odd_words / sizeof *odd_words)];
+    const std::uint32_t odd = odd_words[random() % std::size(odd_words)];
     store_u32(word, random() % 2 ? odd : load_u32(word) + (random() % 2 ? 1 : 0xffffffffu));
   } else {
     std::uint8_t* number = data + 8 * (4 + random() % (size / 8 - 4));
     const double factor = std::ldexp(1.0, static_cast<int>(random() % 80) - 40);
-    const double odd = odd_numbers[random() % (sizeof odd_numbers / sizeof *odd_numbers)];
+    const double odd = odd_numbers[random() % std::size(odd_numbers)];
     store_f64(number, random() % 2 ? odd : load_f64(number) * factor);
   }
 }
@@ -57,11 +57,11 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const promises::byte_list image(data, data + size);
-  char message[400] = "";
-  const std::size_t memory = tendonfmu_memory_size(image.data(), size);
   if (size == 0) {
     return 0;
   }
+  char message[400] = "";
+  const std::size_t memory = tendonfmu_memory_size(image.data(), size);
   const tendonfmu_status status = tendonfmu_check_image(image.data(), size, message, sizeof message);
   PROMISE((status == TENDONFMU_OK) == (memory > 0));
   PROMISE((status == TENDONFMU_OK) == (std::strlen(message) == 0));

@@ -14,6 +14,13 @@ long counted_allocations() {
   return allocations;
 }
 
+bool allocations_count() {
+  count_allocations_anew();
+  void* volatile block = malloc(1);
+  free(block);
+  return allocations == 2;
+}
+
 extern "C" {
 // NOLINTBEGIN(readability-identifier-naming): names of glibc
 void* __libc_malloc(size_t);

@@ -18,4 +18,6 @@
 void count_allocations_anew();
 // calls of malloc, calloc, realloc, aligned_alloc and free since then
 long counted_allocations();
+// whether one of malloc and one of free are counted
+bool allocations_count();
 #endif

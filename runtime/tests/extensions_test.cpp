@@ -1,54 +1,39 @@
-// Fingers with extensions as a whole: what they remember, what a refused sample leaves, in which order rows act, and
-// derivatives of the sample as it was taken.
+// Fingers with extensions as a whole: what they remember, what a refused sample leaves, in which order rows act, places
+// that slide at all times, and derivatives of the sample as it was taken.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
-#include "core_inside.h"
-#include "test_finger.h"
+#include "model_inside.h"
+#include "presliding_step.h"
 
 namespace {
 
 using test_finger::Finger;
 using test_finger::Motion;
+using test_finger::Outputs;
 
-// the test finger with these rows instead of its own
-std::string with_extensions(const std::string& rows) {
+// the test finger with these rows instead of its own, and more keys
+std::vector<unsigned char> image_with(const std::string& rows, const std::string& keys = "") {
   std::string text = test_finger::json;
   const std::string list = "\"extensions\": [";
   text.erase(text.find(list));
-  return text + list + rows + "]}";
+  test_finger::put(text, test_finger::name, keys);
+  return test_finger::image(text + list + rows + "]}");
 }
 
-tendonfmu_status take(tendonfmu_finger* finger, double time, const tendonfmu_inputs& inputs) {
-  return tendonfmu_is_initialised(finger) ? tendonfmu_step(finger, time, &inputs)
-                                          : tendonfmu_initialise(finger, time, &inputs);
-}
-
-void run(tendonfmu_finger* finger, const Motion& motion, std::size_t first, std::size_t last) {
-  for (std::size_t k = first; k < last; ++k) {
-    const tendonfmu_inputs inputs = motion.row(k);
-    ASSERT_EQ(take(finger, motion.time[k], inputs), TENDONFMU_OK)
-        << "row " << k << ": " << tendonfmu_last_error(finger);
-  }
-}
-
-const char* const kernels[] = {"plain", "sse2", "avx2"};
-
-// one that runs here
-bool choose(tendonfmu_finger* finger, const char* kernel) {
-  return tendonfmu_set_kernel(finger, kernel) == TENDONFMU_OK;
+Outputs outputs_of(const std::string& rows, const Motion& motion) {
+  return Finger(image_with(rows)).run(motion);
 }
 
 void set(tendonfmu_finger* finger, const char* path, double value) {
-  const std::size_t index = tendonfmu_find_parameter(finger, path);
-  ASSERT_EQ(tendonfmu_set_parameters(finger, 1, &index, &value), TENDONFMU_OK) << tendonfmu_last_error(finger);
+  ASSERT_EQ(tendonfmu_set_parameter(finger, path, value), TENDONFMU_OK) << tendonfmu_last_error(finger);
 }
 
 std::array<double, 2> derivative(tendonfmu_finger* finger, const tendonfmu_inputs& direction) {
@@ -59,118 +44,33 @@ std::array<double, 2> derivative(tendonfmu_finger* finger, const tendonfmu_input
   return slope;
 }
 
-// --- memory ----------------------------------------------------------------------------------------------------------
+// --- memory and refused samples -------------------------------------------------------------------------------------
 
-// a finger that has gone elsewhere takes up what another one has left, with the same bits in every kernel
-TEST(Memory, SavedMidRunGoesOnWithTheSameBits) {
-  const auto image = test_finger::image(test_finger::every_effect());
-  const Motion motion(1800);
-  for (int source = 1; source <= 3; ++source) {
-    std::vector<unsigned char> expected;
-    for (const char* kernel : kernels) {
-      SCOPED_TRACE(std::string(kernel) + ", source " + std::to_string(source));
-      Finger whole(image), other(image);
-      if (!choose(whole, kernel) || !choose(other, kernel)) {
-        continue;
-      }
-      tendonfmu_set_kinematics_source(whole, source);
-      tendonfmu_set_kinematics_source(other, source % 3 + 1);
-      run(other, motion, 0, 300);
-      run(whole, motion, 0, 7);  // before the 64 samples of a delay are full, while it moves, at rest, in contact
-      for (const std::size_t at : {std::size_t{7}, std::size_t{700}, std::size_t{1250}, std::size_t{1790}}) {
-        const std::size_t until = std::min<std::size_t>(at + 90, 1800);
-        const auto state = whole.saved();
-        ASSERT_EQ(tendonfmu_restore_state(other, state.data(), state.size()), TENDONFMU_OK);
-        run(whole, motion, at, until);
-        run(other, motion, at, until);
-        EXPECT_EQ(whole.saved(), other.saved()) << "from sample " << at;
-        run(whole, motion, until, at == 7 ? 700 : at == 700 ? 1250 : at == 1250 ? 1790 : until);
-      }
-      expected = expected.empty() ? whole.saved() : expected;
-      EXPECT_EQ(whole.saved(), expected);
-    }
-  }
-}
-
-// what effects on tendon positions have left with source 1 is not carried into a run without them
-TEST(Memory, OfAnotherSourceEndsWithAReset) {
-  const auto image = test_finger::image(test_finger::every_effect());
-  const Motion motion(200);
-  Finger used(image), fresh(image);
-  run(used, motion, 0, 200);
-  ASSERT_EQ(tendonfmu_reset(used), TENDONFMU_OK);
-  for (tendonfmu_finger* finger : {used.handle, fresh.handle}) {
-    tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_POSITIONS);
-    run(finger, motion, 0, 50);
-  }
-  EXPECT_EQ(used.saved(), fresh.saved());
-}
-
-// rings with indices, counts and times that none can have: a sample is refused, or taken with finite outputs
-TEST(Memory, FromOutsideMayHoldAnyFiniteNumber) {
-  const double odd[] = {1e308, -1e308, 1e19, 4294967296.0, 64.0, 63.5, -1.0, 5e-324};
-  const auto image = test_finger::image(
-      with_extensions(R"({"effect": "time_delay", "delay": 0.004}, {"effect": "backlash", "tendon": 1, "width": 1e-4},
-    {"effect": "presliding", "tendon": 1, "displacement": 1e-4}, {"effect": "gravity", "joint": 2, "sine": 0.1})"));
-  const Motion motion(120);
-  Finger finger(image);
-  run(finger, motion, 0, 100);
-  const auto good = finger.saved();
-  std::size_t refused = 0, taken = 0;
-  for (std::size_t at = good.size() - 8 * finger.handle->shape.extension_memory; at < good.size(); at += 8) {
-    for (const double value : odd) {
-      auto state = good;
-      store_f64(state.data() + at, value);
-      store_u64(state.data() + 24, hash_bytes(state.data() + 32, state.size() - 32, 0));
-      ASSERT_EQ(tendonfmu_restore_state(finger, state.data(), state.size()), TENDONFMU_OK);
-      const tendonfmu_inputs inputs = motion.row(100);
-      if (take(finger, motion.time[100], inputs) != TENDONFMU_OK) {
-        EXPECT_EQ(finger.saved(), state);
-        ++refused;
-        continue;
-      }
-      ++taken;
-      std::array<double, 2> torque{};
-      tendonfmu_outputs outputs = {};
-      outputs.compensated_torque = torque.data();
-      ASSERT_EQ(tendonfmu_get_outputs(finger, &outputs), TENDONFMU_OK);
-      EXPECT_TRUE(std::isfinite(torque[0]) && std::isfinite(torque[1]));
-    }
-  }
-  EXPECT_GT(refused, 0u);
-  EXPECT_GT(taken, refused);
-}
-
-// --- samples ---------------------------------------------------------------------------------------------------------
-
-// out of range, and so soon that an acceleration overflows; the run goes on as if they had not been
-TEST(RefusedSample, LeavesEverything) {
-  const auto image = test_finger::image(test_finger::every_effect());
+// so soon that an acceleration overflows; the run goes on as if it had not been
+TEST(RefusedSample, ThatOverflowsLeavesEverything) {
   Motion motion(700);
   for (double& t : motion.time) {
     t -= motion.time[400];  // sample 400 at time 0
   }
   for (int source = 1; source <= 3; ++source) {
     SCOPED_TRACE(source);
-    Finger disturbed(image), quiet(image);
-    for (tendonfmu_finger* finger : {disturbed.handle, quiet.handle}) {
-      tendonfmu_set_kinematics_source(finger, source);
-      set(finger, "extensions[22].delay", source == 1 ? 0.0033 : -0.0033);  // late joints would not have moved by then
-      run(finger, motion, 0, 401);
+    Finger disturbed(test_finger::image_of(test_finger::extended)), quiet(test_finger::image_of(test_finger::extended));
+    for (const Finger* finger : {&disturbed, &quiet}) {
+      tendonfmu_set_kinematics_source(*finger, source);
+      // late joints would not have moved by then
+      set(*finger, "extensions[22].delay", source == 1 ? 0.0033 : -0.0033);
+      finger->run(motion, 0, 401);
     }
-    const auto state = disturbed.saved();
-    Motion bad = motion;
-    bad.force[401 * test_finger::tendons + 1] = NAN;
-    EXPECT_EQ(take(disturbed, motion.time[401], bad.row(401)), TENDONFMU_BAD_SAMPLE);
-    EXPECT_EQ(disturbed.saved(), state);
-    EXPECT_EQ(take(disturbed, 1e-306, motion.row(410)), TENDONFMU_BAD_SAMPLE);
+    EXPECT_EQ(disturbed.take(1e-306, motion.row(410)), TENDONFMU_BAD_SAMPLE);
     EXPECT_NE(std::strstr(tendonfmu_last_error(disturbed), "overflows"), nullptr) << tendonfmu_last_error(disturbed);
-    EXPECT_EQ(disturbed.saved(), state);
-    run(disturbed, motion, 401, 700);
-    run(quiet, motion, 401, 700);
+    EXPECT_EQ(disturbed.saved(), quiet.saved());
+    disturbed.run(motion, 401, 700);
+    quiet.run(motion, 401, 700);
     EXPECT_EQ(disturbed.saved(), quiet.saved());
   }
 }
+
+// --- rows -----------------------------------------------------------------------------------------------------------
 
 TEST(Rows, OfSignalsActInTheirOwnOrder) {
   const std::string delay = R"({"effect": "time_delay", "delay": 0.0033})",
@@ -178,54 +78,37 @@ TEST(Rows, OfSignalsActInTheirOwnOrder) {
                     joint_play = R"({"effect": "backlash", "joint": 2, "width": 0.02})",
                     spring = R"({"effect": "tendon_nonlinearity", "tendon": 1, "hardening": 1e6})";
   const Motion motion(900);
-  const auto outputs_of = [&](const std::string& rows) {
-    Finger finger(test_finger::image(with_extensions(rows)));
-    test_finger::Outputs outputs(900);
-    const tendonfmu_inputs inputs = motion.all();
-    const tendonfmu_outputs view = outputs.view();
-    EXPECT_EQ(tendonfmu_run(finger, 900, motion.time.data(), &inputs, &view, nullptr), TENDONFMU_OK);
-    return outputs;
-  };
-  const auto expected = outputs_of(delay + "," + play + "," + spring + "," + joint_play);
-  EXPECT_TRUE(outputs_of(spring + "," + joint_play + "," + play + "," + delay) == expected);
-  EXPECT_TRUE(outputs_of(play + "," + delay + "," + joint_play + "," + spring) == expected);
-  EXPECT_FALSE(outputs_of(play + "," + joint_play + "," + spring).torque == expected.torque &&
-               outputs_of(play + "," + joint_play + "," + spring) == expected);  // each of them does something
-  EXPECT_FALSE(outputs_of(delay + "," + joint_play + "," + spring) == expected);
-  EXPECT_FALSE(outputs_of(delay + "," + play + "," + spring) == expected);
-  EXPECT_FALSE(outputs_of(delay + "," + play + "," + joint_play) == expected);
+  const Outputs expected = outputs_of(delay + "," + play + "," + spring + "," + joint_play, motion);
+  EXPECT_TRUE(outputs_of(spring + "," + joint_play + "," + play + "," + delay, motion) == expected);
+  EXPECT_TRUE(outputs_of(play + "," + delay + "," + joint_play + "," + spring, motion) == expected);
+  for (const std::string& without : {play + "," + joint_play + "," + spring, delay + "," + joint_play + "," + spring,
+                                     delay + "," + play + "," + spring, delay + "," + play + "," + joint_play}) {
+    EXPECT_FALSE(outputs_of(without, motion) == expected);  // each of them does something
+  }
 }
 
 // however short its displacement: friction that is fully there at once
 TEST(Presliding, OfTheShortestDisplacementsTakesEverySample) {
   const Motion motion(1300);
-  std::vector<test_finger::Outputs> found;
-  for (const char* displacement : {"1e-160", "1e-250", "1e-308", "5e-324"}) {
-    SCOPED_TRACE(displacement);
-    Finger finger(test_finger::image(
-        with_extensions(std::string(R"({"effect": "presliding", "joint": 1, "displacement": )") + displacement +
-                        R"(}, {"effect": "presliding", "tendon": 1, "displacement": )" + displacement +
-                        R"(}, {"effect": "time_delay", "delay": 0.0033})")));
-    found.emplace_back(1300);
-    const tendonfmu_inputs inputs = motion.all();
-    const tendonfmu_outputs view = found.back().view();
-    ASSERT_EQ(tendonfmu_run(finger, 1300, motion.time.data(), &inputs, &view, nullptr), TENDONFMU_OK)
-        << tendonfmu_last_error(finger);
-    EXPECT_TRUE(found.back() == found.front());
+  const auto by_place = [](const std::string& displacement) {
+    return R"({"effect": "presliding", "joint": 1, "displacement": )" + displacement +
+           R"(}, {"effect": "presliding", "tendon": 1, "displacement": )" + displacement +
+           R"(}, {"effect": "time_delay", "delay": 0.0033})";
+  };
+  const Outputs expected = outputs_of(by_place("1e-160"), motion);
+  for (const char* displacement : {"1e-250", "1e-308", "5e-324"}) {
+    EXPECT_TRUE(outputs_of(by_place(displacement), motion) == expected) << displacement;
+  }
+  for (const char* displacement : {"1e-160", "5e-324"}) {
+    outputs_of(std::string(R"({"effect": "presliding", "displacement": )") + displacement +
+                   R"(}, {"effect": "time_delay", "delay": 0.0033})",
+               motion);
   }
 }
 
 // T without a place is the distance T·v_min at each place; a row that names the place is there instead
 TEST(Presliding, EverywhereIsThatOfEveryPlaceByItsThreshold) {
   const Motion motion(1300);
-  const auto outputs_of = [&motion](const std::string& rows) {
-    Finger finger(test_finger::image(with_extensions(rows)));
-    test_finger::Outputs found(1300);
-    const tendonfmu_inputs inputs = motion.all();
-    const tendonfmu_outputs view = found.view();
-    EXPECT_EQ(tendonfmu_run(finger, 1300, motion.time.data(), &inputs, &view, nullptr), TENDONFMU_OK);
-    return found;
-  };
   const auto row = [](const char* place, const char* displacement) {
     return std::string(R"({"effect": "presliding", )") + place + R"("displacement": )" + displacement + "}";
   };
@@ -234,44 +117,14 @@ TEST(Presliding, EverywhereIsThatOfEveryPlaceByItsThreshold) {
   const std::string tendons = row(R"("tendon": 1, )", "0.000125") + ", " + row(R"("tendon": 2, )", "0.000125");
   const std::string tendon3 = row(R"("tendon": 3, )", "0.000125"), other = row(R"("tendon": 3, )", "0.002");
   const std::string other_joint = row(R"("joint": 2, )", "0.3"), everywhere = row("", "0.25");
-  const auto all = outputs_of(joint1 + ", " + joint2 + ", " + tendons + ", " + tendon3);
-  EXPECT_TRUE(outputs_of(everywhere) == all);
-  EXPECT_FALSE(outputs_of(tendons + ", " + tendon3) == all);
-  const auto finer = outputs_of(other + ", " + joint1 + ", " + tendons + ", " + other_joint);
-  EXPECT_TRUE(outputs_of(other + ", " + everywhere + ", " + other_joint) == finer);
-  EXPECT_TRUE(outputs_of(everywhere + ", " + other_joint + ", " + other) == finer);
+  const Outputs all = outputs_of(joint1 + ", " + joint2 + ", " + tendons + ", " + tendon3, motion);
+  EXPECT_TRUE(outputs_of(everywhere, motion) == all);
+  EXPECT_FALSE(outputs_of(tendons + ", " + tendon3, motion) == all);
+  const Outputs finer = outputs_of(other + ", " + joint1 + ", " + tendons + ", " + other_joint, motion);
+  EXPECT_TRUE(outputs_of(other + ", " + everywhere + ", " + other_joint, motion) == finer);
+  EXPECT_TRUE(outputs_of(everywhere + ", " + other_joint + ", " + other, motion) == finer);
   EXPECT_FALSE(finer == all);
 }
-
-TEST(Presliding, EverywhereOfTheShortestTimeTakesEverySample) {
-  const Motion motion(300);
-  for (const char* displacement : {"1e-160", "5e-324"}) {
-    SCOPED_TRACE(displacement);
-    Finger finger(
-        test_finger::image(with_extensions(std::string(R"({"effect": "presliding", "displacement": )") + displacement +
-                                           R"(}, {"effect": "time_delay", "delay": 0.0033})")));
-    run(finger, motion, 0, 300);
-  }
-}
-
-TEST(Presliding, EverywhereNeedsThresholds) {
-  Finger finger(test_finger::image(with_extensions(R"({"effect": "presliding", "displacement": 0.1})")));
-  for (const char* path : {"velocity_threshold.tendon", "velocity_threshold.joint"}) {
-    EXPECT_EQ(tendonfmu_set_parameter(finger, path, 0.0), TENDONFMU_BAD_PARAMETER);
-    EXPECT_EQ(std::string(tendonfmu_last_error(finger)).find(path), 0u) << tendonfmu_last_error(finger);
-    EXPECT_EQ(tendonfmu_set_parameter(finger, path, 0.003), TENDONFMU_OK);
-  }
-  const tendonfmu_parameter_info info = [&finger] {
-    tendonfmu_parameter_info found{};
-    tendonfmu_get_parameter_info(finger, tendonfmu_find_parameter(finger, "extensions[1].displacement"), &found);
-    return found;
-  }();
-  EXPECT_STREQ(info.unit, "s");
-  Finger free(test_finger::image(with_extensions(R"({"effect": "presliding", "joint": 1, "displacement": 0.1})")));
-  EXPECT_EQ(tendonfmu_set_parameter(free, "velocity_threshold.joint", 0.0), TENDONFMU_OK);
-}
-
-// --- places ----------------------------------------------------------------------------------------------------------
 
 TEST(Places, OfARowAreTheSlotsThatItActsOn) {
   Finger finger(test_finger::image());
@@ -297,16 +150,86 @@ TEST(Places, OfARowAreTheSlotsThatItActsOn) {
   }
 }
 
-// --- derivatives -----------------------------------------------------------------------------------------------------
+// --- places that slide at all times ---------------------------------------------------------------------------------
+
+std::vector<const extension_row*> sliding_rows(const tendonfmu_finger* finger) {
+  std::vector<const extension_row*> rows;
+  for (std::size_t r = 0; r < finger->extensions.friction; ++r) {
+    const extension_row* row = finger->extensions.row + finger->extensions.signals + r;
+    if (row->effect->slides) {
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+// What the kernels make of them four at a time, every row remembers as its own advance() says, to the bit.
+void expect_own_memory(const Finger& finger) {
+  const auto rows = sliding_rows(finger);
+  ASSERT_FALSE(rows.empty());
+  const Motion motion(400);
+  bool slid = false;
+  for (std::size_t k = 0; k < 400; ++k) {
+    std::vector<std::vector<double>> before;
+    for (const extension_row* row : rows) {
+      before.emplace_back(row->memory, row->memory + row->memory_count);
+    }
+    ASSERT_EQ(finger.take(motion.time[k], motion.row(k)), TENDONFMU_OK);
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      std::vector<double> after(before[r].size());
+      rows[r]->effect->advance(rows[r]->place, rows[r]->parameters, &finger.handle->scratch.sample, before[r].data(),
+                               after.data());
+      ASSERT_EQ(std::memcmp(after.data(), rows[r]->memory, after.size() * sizeof(double)), 0)
+          << "sample " << k << ", row " << r;
+      slid |= after[0] != 0.0;
+    }
+    for (std::size_t slot = 0; slot < finger.handle->slots && finger.handle->extensions.only_slides; ++slot) {
+      if (finger.handle->scratch.slides[slot] == 0.0) {
+        ASSERT_EQ(finger.handle->scratch.grip[slot], 1.0) << "sample " << k << ", beside what slides: slot " << slot;
+      }
+    }
+  }
+  EXPECT_TRUE(slid);
+}
+
+void expect_own_memory_everywhere(const std::vector<unsigned char>& image) {
+  for (const char* kernel : test_finger::kernels()) {
+    for (int source = 1; source <= 3; ++source) {
+      SCOPED_TRACE(std::string(kernel) + ", source " + std::to_string(source));
+      Finger finger(image);
+      tendonfmu_set_kernel(finger, kernel);
+      tendonfmu_set_kinematics_source(finger, source);
+      expect_own_memory(finger);
+    }
+  }
+}
+
+TEST(SlidingPlaces, AreThoseOfTheirRows) {
+  const std::string everywhere = R"({"effect": "presliding", "displacement": 0.05})";
+  const std::string named = R"({"effect": "presliding", "joint": 2, "displacement": 0.02},
+    {"effect": "gravity", "joint": 1, "sine": 0.02}, {"effect": "inertia", "joint": 1, "inertia": 1e-5},
+    {"effect": "presliding", "tendon": 1, "displacement": 1e-4})";
+  // the row everywhere goes on remembering the places that it leaves to the other one
+  const std::string both = R"({"effect": "presliding", "tendon": 2, "displacement": 3e-4},
+    {"effect": "friction_drift", "amplitude": 0.3, "time_constant": 2}, )" +
+                           everywhere + R"(, {"effect": "presliding", "joint": 1, "displacement": 0.02})";
+  for (const std::string& rows : {everywhere, named, both}) {
+    expect_own_memory_everywhere(image_with(rows));
+  }
+  expect_own_memory_everywhere(
+      image_with(everywhere, R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)"));
+}
+
+// --- derivatives ----------------------------------------------------------------------------------------------------
 
 // numbers that change afterwards do not change what the sample was
 TEST(Derivative, IsOfTheSignalsAsTheyWereTaken) {
-  Finger finger(test_finger::image(
-      with_extensions(R"({"effect": "time_delay", "delay": 0.0033}, {"effect": "backlash", "joint": 2, "width": 0})")));
+  Finger finger(
+      image_with(R"({"effect": "time_delay", "delay": 0.0033}, {"effect": "backlash", "joint": 2, "width": 0})"));
   const Motion motion(90);
   const std::vector<double> zeros(3, 0.0), force{1.0, -2.0, 0.5}, position{1e-3, 2e-3, -1e-3};
   const tendonfmu_inputs direction = {force.data(), position.data(), zeros.data(), zeros.data()};
-  run(finger, motion, 0, 90);
+  finger.run(motion);
   const auto before = derivative(finger, direction);
   EXPECT_NE(before[0], 0.0);
   set(finger, "extensions[1].delay", -0.002);
@@ -326,8 +249,7 @@ TEST(Derivative, OfWhatNeverSticksIsThatOfItsLaw) {
   tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_VELOCITIES);
   const double force = 20.0, angle = 0.1;
   const auto torque_at = [&](double time, double speed) {
-    const tendonfmu_inputs inputs = {&force, nullptr, &angle, &speed};
-    EXPECT_EQ(take(finger, time, inputs), TENDONFMU_OK) << tendonfmu_last_error(finger);
+    EXPECT_EQ(finger.take(time, {&force, nullptr, &angle, &speed}), TENDONFMU_OK) << tendonfmu_last_error(finger);
     double torque = 0.0;
     tendonfmu_outputs outputs = {};
     outputs.compensated_torque = &torque;
@@ -353,9 +275,9 @@ TEST(Derivative, OfWhatNeverSticksIsThatOfItsLaw) {
 // Forces that come early bend a hardening spring behind a play: within the play the position stays, its spring does
 // not.
 TEST(Derivative, OfADelayPassesAPlayAndASpring) {
-  const auto image = test_finger::image(with_extensions(
+  const auto image = image_with(
       R"({"effect": "time_delay", "delay": -0.0033}, {"effect": "backlash", "tendon": 1, "width": 3e-3},
-         {"effect": "tendon_nonlinearity", "tendon": 1, "hardening": 1e6})"));
+         {"effect": "tendon_nonlinearity", "tendon": 1, "hardening": 1e6})");
   const Motion motion(1000);
   const double change = 1e-6;
   Finger middle(image), more(image), less(image);
@@ -363,8 +285,8 @@ TEST(Derivative, OfADelayPassesAPlayAndASpring) {
   set(less, "extensions[1].delay", -0.0033 - change);
   double largest = 0.0;
   for (std::size_t k = 0; k < 1000; ++k) {
-    for (tendonfmu_finger* finger : {middle.handle, more.handle, less.handle}) {
-      run(finger, motion, k, k + 1);
+    for (const Finger* finger : {&middle, &more, &less}) {
+      finger->run(motion, k, k + 1);
     }
     const double* slopes = signal_slopes(middle, signal_row(middle, 0), 0);
     for (std::size_t j = 0; k >= 64 && j < test_finger::joints; ++j) {
@@ -374,6 +296,37 @@ TEST(Derivative, OfADelayPassesAPlayAndASpring) {
     }
   }
   EXPECT_GT(largest, 1e-2);
+}
+
+// --- position filter ------------------------------------------------------------------------------------------------
+
+// no time step and no angle makes it refuse what the core takes, or leaves its variances below 0
+TEST(PositionFilter, TakesAnySteps) {
+  for (const char* numbers :
+       {R"("noise": [1e-6, 1e-6], "jerk_density": 1e-9)", R"("noise": [1e-6, 1e-6], "jerk_density": 1e9)",
+        R"("noise": [1000, 1000], "jerk_density": 1e9)"}) {
+    SCOPED_TRACE(numbers);
+    Finger finger(image_with(R"({"effect": "presliding", "joint": 1, "displacement": 0.001})",
+                             std::string(R"("position_filter": {)") + numbers + "},"));
+    tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_POSITIONS);
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> exponent(-14.0, 9.0), angle(-1.0, 1.0);
+    const double force[] = {20.0, 20.0, 5.0};
+    double time = 0.0;
+    for (int k = 0; k < 5000; ++k) {
+      time += std::pow(10.0, k % 500 < 250 ? exponent(random) : -3.0);
+      const double angles[] = {(k % 100 == 7 ? 1e12 : 1.0) * angle(random), angle(random)};
+      ASSERT_EQ(finger.take(time, {force, nullptr, angles, nullptr}), TENDONFMU_OK) << tendonfmu_last_error(finger);
+      double speed[2] = {};
+      tendonfmu_outputs outputs = {};
+      outputs.joint_speed = speed;
+      tendonfmu_get_outputs(finger, &outputs);
+      EXPECT_TRUE(std::isfinite(speed[0]) && std::isfinite(speed[1]));
+      for (const filter_row_kind kind : {FILTER_P00, FILTER_P11, FILTER_P22}) {
+        EXPECT_GE(filter_memory(finger.handle, finger.handle->remembered.filter, kind)[0], 0.0);
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -53,27 +53,22 @@ struct FailingAllocation : testing::Test {
   char message[200] = "";
 };
 
-TEST_F(FailingAllocation, MakesNoEstimatorAndSaysWhy) {
+TEST_F(FailingAllocation, MakesNothingAndSaysWhy) {
+  const auto create = [&](auto call, auto* made, auto... options) {
+    bool said = true;
+    const long failed = failures([&] {
+      *made = call(image.data(), image.size(), nullptr, nullptr, options..., message, sizeof message);
+      said = said && (*made || std::string_view(message) == "out of memory");
+      return *made != nullptr;
+    });
+    EXPECT_GT(failed, 5);
+    EXPECT_TRUE(said) << message;
+  };
   tendonfmu_estimator* estimator = nullptr;
-  bool said = true;
-  const long failed = failures([&] {
-    estimator = tendonfmu_estimator_create(image.data(), image.size(), nullptr, nullptr, message, sizeof message);
-    said = said && (estimator || std::string_view(message) == "out of memory");
-    return estimator != nullptr;
-  });
-  EXPECT_GT(failed, 5);
-  EXPECT_TRUE(said);
+  create(tendonfmu_estimator_create, &estimator);
   tendonfmu_estimator_destroy(estimator);
-}
-
-TEST_F(FailingAllocation, MakesNoLearnerAndSaysWhy) {
   tendonfmu_learner* learner = nullptr;
-  const long failed = failures([&] {
-    learner = tendonfmu_learner_create(image.data(), image.size(), nullptr, nullptr, nullptr, message, sizeof message);
-    return learner || std::string_view(message) != "out of memory";
-  });
-  EXPECT_GT(failed, 5);
-  ASSERT_TRUE(learner) << message;
+  create(tendonfmu_learner_create, &learner, static_cast<const tendonfmu_learner_options*>(nullptr));
   tendonfmu_learner_destroy(learner);
 }
 

@@ -1,14 +1,18 @@
-// The public interface as a control loop and a simulator use it.
+// The public interface as a control loop and a simulator use it: promises that every finger keeps, and refusals.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
-#include "test_finger.h"
+#include "model_inside.h"
 
 using test_finger::Finger;
+using test_finger::image_of;
 using test_finger::joints;
 using test_finger::Motion;
 using test_finger::Outputs;
@@ -17,203 +21,202 @@ using test_finger::tendons;
 namespace {
 
 constexpr std::size_t samples = 4000;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
 
 const Motion& motion() {
   static const Motion m(samples);
   return m;
 }
 
-Outputs run(Finger& finger, std::size_t from = 0, std::size_t to = samples) {
-  Outputs outputs(to - from);
-  const tendonfmu_outputs view = outputs.view();
-  const tendonfmu_inputs inputs = motion().row(from);
-  std::size_t done = 0;
-  EXPECT_EQ(tendonfmu_run(finger, to - from, &motion().time[from], &inputs, &view, &done), TENDONFMU_OK)
-      << tendonfmu_last_error(finger);
-  EXPECT_EQ(done, to - from);
-  return outputs;
+// the force of tendon 2 fails now and then
+const Motion& failing() {
+  static const Motion m = [] {
+    Motion made(samples);
+    made.let_force_fail(1);
+    return made;
+  }();
+  return m;
 }
 
-TEST(Finger, MotionOfTheTestsMovesRestsTouchesAndReverses) {
-  Finger finger;
-  const Outputs o = run(finger);
-  std::size_t contacts = 0, rests = 0, forwards = 0, backwards = 0;
-  for (std::size_t k = 0; k < samples; ++k) {
-    contacts += o.contact[k];
-    forwards += o.speed[k * joints] > 0.5;
-    backwards += o.speed[k * joints] < -0.5;
-    rests += std::abs(o.speed[k * joints]) < 0.02;
+void set(tendonfmu_finger* finger, const char* path, double value) {
+  ASSERT_EQ(tendonfmu_set_parameter(finger, path, value), TENDONFMU_OK) << tendonfmu_last_error(finger);
+}
+
+tendonfmu_status restore(tendonfmu_finger* finger, const std::vector<unsigned char>& bytes) {
+  return tendonfmu_restore_state(finger, bytes.data(), bytes.size());
+}
+
+template <class Number>
+std::size_t count(const std::vector<Number>& row, int value) {
+  return static_cast<std::size_t>(std::count(row.begin(), row.end(), value));
+}
+
+// --- promises of every finger, by every source of kinematics ---------------------------------------------------------
+
+class EveryFinger : public testing::TestWithParam<std::tuple<int, int>> {
+ protected:
+  const std::vector<unsigned char>& image() const { return image_of(std::get<0>(GetParam())); }
+  int source() const { return std::get<1>(GetParam()); }
+  const Motion& motion() const { return std::get<0>(GetParam()) == test_finger::watching ? failing() : ::motion(); }
+};
+INSTANTIATE_TEST_SUITE_P(Kinds, EveryFinger,
+                         testing::Combine(testing::Range<int>(0, test_finger::kinds), testing::Values(1, 2, 3)));
+
+TEST_P(EveryFinger, GivesTheSameBitsWithAllKernels) {
+  Finger plain(image());
+  ASSERT_EQ(tendonfmu_set_kernel(plain, "plain"), TENDONFMU_OK);
+  tendonfmu_set_kinematics_source(plain, source());
+  const Outputs expected = plain.run(motion());
+  Finger automatic(image());
+  ASSERT_EQ(tendonfmu_set_kernel(automatic, "auto"), TENDONFMU_OK);
+  EXPECT_EQ(tendonfmu_get_kernel(automatic), std::string(test_finger::kernels().back()));
+  for (const char* kernel : test_finger::kernels()) {
+    Finger other(image());
+    tendonfmu_set_kernel(other, kernel);
+    tendonfmu_set_kinematics_source(other, source());
+    EXPECT_TRUE(other.run(motion()) == expected) << kernel;
+    EXPECT_EQ(other.saved(), plain.saved()) << kernel;
   }
-  EXPECT_GT(contacts, samples / 50);
-  EXPECT_LT(contacts, samples / 2);
-  EXPECT_GT(rests, samples / 20);
-  EXPECT_GT(forwards, samples / 10);
-  EXPECT_GT(backwards, samples / 10);
 }
 
-TEST(Finger, AllKernelsGiveTheSameBits) {
-  for (int source = 1; source <= 3; ++source) {
-    Finger plain;
-    ASSERT_EQ(tendonfmu_set_kernel(plain, "plain"), TENDONFMU_OK);
-    tendonfmu_set_kinematics_source(plain, source);
-    const Outputs expected = run(plain);
-    int compared = 0;
-    for (const char* name : {"sse2", "avx2", "auto"}) {
-      Finger other;
-      if (tendonfmu_set_kernel(other, name) != TENDONFMU_OK) {
-        continue;
-      }
-      tendonfmu_set_kinematics_source(other, source);
-      EXPECT_TRUE(run(other) == expected) << name << ", source " << source;
-      EXPECT_EQ(other.saved(), plain.saved()) << name;
-      ++compared;
-    }
-    EXPECT_GE(compared, 1);
+TEST_P(EveryFinger, TakesSamplesOneByOneAsARunDoes) {
+  Finger batch(image()), single(image());
+  for (const Finger* finger : {&batch, &single}) {
+    tendonfmu_set_kinematics_source(*finger, source());
   }
-}
-
-TEST(Finger, UnknownKernelIsRefused) {
-  Finger finger;
-  const std::string before = tendonfmu_get_kernel(finger);
-  EXPECT_EQ(tendonfmu_set_kernel(finger, "quantum"), TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_get_kernel(finger), before);
-}
-
-TEST(Finger, BatchEqualsSingleSteps) {
-  Finger batch, single;
-  const Outputs expected = run(batch);
+  const Outputs expected = batch.run(motion());
   Outputs one(1);
   const tendonfmu_outputs view = one.view();
   for (std::size_t k = 0; k < samples; ++k) {
-    const tendonfmu_inputs inputs = motion().row(k);
-    const auto call = k == 0 ? tendonfmu_initialise : tendonfmu_step;
-    ASSERT_EQ(call(single, motion().time[k], &inputs), TENDONFMU_OK);
+    ASSERT_EQ(single.take(motion().time[k], motion().row(k)), TENDONFMU_OK);
     ASSERT_EQ(tendonfmu_get_outputs(single, &view), TENDONFMU_OK);
-    for (std::size_t j = 0; j < joints; ++j) {
-      ASSERT_EQ(one.compensated[j], expected.compensated[k * joints + j]);
-      ASSERT_EQ(one.bias[j], expected.bias[k * joints + j]);
+    for (const auto& [name, row] : one.real) {
+      ASSERT_TRUE(std::equal(row.begin(), row.end(), &expected.real.at(name)[k * row.size()])) << name << " " << k;
     }
-    ASSERT_EQ(one.contact[0], expected.contact[k]);
+    ASSERT_EQ(one.flag.at("contact")[0], expected.flag.at("contact")[k]);
+  }
+  EXPECT_EQ(single.saved(), batch.saved());
+}
+
+// A finger that has gone elsewhere takes up what another one has left: just begun, in motion, with a sensor that fails,
+// at rest, in contact, in the hold after it, at the end.
+TEST_P(EveryFinger, GoesOnFromASavedStateWithTheSameBits) {
+  Finger whole(image()), other(image());
+  tendonfmu_set_kinematics_source(whole, source());
+  tendonfmu_set_kinematics_source(other, source() % 3 + 1);
+  other.run(motion(), 0, 2100);
+  const std::size_t cuts[] = {1, 7, 700, 1100, 1250, 1850, 1995, 2010, 2600, 3900, samples};
+  whole.run(motion(), 0, cuts[0]);
+  for (std::size_t i = 0; i + 1 < std::size(cuts); ++i) {
+    ASSERT_EQ(restore(other, whole.saved()), TENDONFMU_OK) << tendonfmu_last_error(other);
+    EXPECT_TRUE(whole.run(motion(), cuts[i], cuts[i + 1]) == other.run(motion(), cuts[i], cuts[i + 1])) << cuts[i];
+    EXPECT_EQ(whole.saved(), other.saved()) << cuts[i];
   }
 }
 
-TEST(Finger, RestoredStateContinuesBitForBit) {
-  Finger whole;
-  const Outputs expected = run(whole);
-  for (std::size_t cut : {std::size_t{1}, std::size_t{777}, std::size_t{1900}, std::size_t{3999}}) {
-    Finger first, second;
-    run(first, 0, cut);
-    const auto bytes = first.saved();
-    ASSERT_EQ(tendonfmu_restore_state(second, bytes.data(), bytes.size()), TENDONFMU_OK);
-    const Outputs rest = run(second, cut, samples);
-    for (std::size_t k = 0; k < rest.compensated.size(); ++k) {
-      ASSERT_EQ(rest.compensated[k], expected.compensated[cut * joints + k]);
-    }
+// what was remembered, for another source too, and parameters
+TEST_P(EveryFinger, IsThatOfTheImageAfterAReset) {
+  Finger fresh(image()), used(image());
+  tendonfmu_set_kinematics_source(used, source());
+  used.run(motion(), 0, 1900);
+  set(used, "contact.threshold[1]", 9.0);
+  ASSERT_EQ(tendonfmu_reset(used), TENDONFMU_OK);
+  for (const Finger* finger : {&fresh, &used}) {
+    tendonfmu_set_kinematics_source(*finger, source() % 3 + 1);
   }
+  EXPECT_EQ(used.saved(), fresh.saved());
+  EXPECT_TRUE(used.run(motion()) == fresh.run(motion()));
 }
 
-TEST(Finger, RestoredStateBringsItsParameters) {
-  Finger tuned, plain;
-  ASSERT_EQ(tendonfmu_set_parameter(tuned, "joints[1].friction.coulomb", 0.001), TENDONFMU_OK);
-  const auto bytes = tuned.saved();
-  ASSERT_EQ(tendonfmu_restore_state(plain, bytes.data(), bytes.size()), TENDONFMU_OK);
-  double value = 0.0;
-  ASSERT_EQ(tendonfmu_get_parameter(plain, "joints[1].friction.coulomb", &value), TENDONFMU_OK);
-  EXPECT_EQ(value, 0.001);
-  EXPECT_TRUE(run(plain) == run(tuned));
-}
-
-TEST(Finger, DamagedStateIsRefusedAndChangesNothing) {
-  Finger finger;
-  run(finger, 0, 500);
+TEST_P(EveryFinger, RefusesADamagedStateAndChangesNothing) {
+  Finger finger(image());
+  tendonfmu_set_kinematics_source(finger, source());
+  finger.run(motion(), 0, 500);
   const auto good = finger.saved();
-  run(finger, 500, 600);
+  finger.run(motion(), 500, 600);
   const auto before = finger.saved();
   for (std::size_t at = 0; at < good.size(); at += 13) {
     auto bad = good;
     bad[at] ^= 0x20;
-    EXPECT_EQ(tendonfmu_restore_state(finger, bad.data(), bad.size()), TENDONFMU_BAD_STATE) << at;
-    EXPECT_NE(std::string(tendonfmu_last_error(finger)), "");
+    EXPECT_EQ(restore(finger, bad), TENDONFMU_BAD_STATE) << at;
+    EXPECT_STRNE(tendonfmu_last_error(finger), "");
   }
   EXPECT_EQ(tendonfmu_restore_state(finger, good.data(), good.size() - 1), TENDONFMU_BAD_STATE);
   EXPECT_EQ(finger.saved(), before);
 }
 
-TEST(Finger, StateOfAnotherFingerIsRefused) {
+TEST_P(EveryFinger, RefusesBadSamplesByNameAndGoesOnAsIfTheyHadNotBeen) {
+  Finger finger(image()), quiet(image());
+  for (const Finger* each : {&finger, &quiet}) {
+    tendonfmu_set_kinematics_source(*each, source());
+    each->run(motion(), 0, 100);
+  }
+  const auto before = finger.saved();
+  const auto refused = [&](double time, const tendonfmu_inputs& inputs, const std::string& name) {
+    EXPECT_EQ(finger.take(time, inputs), TENDONFMU_BAD_SAMPLE);
+    EXPECT_EQ(std::string(tendonfmu_last_error(finger)).find(name), 0u) << tendonfmu_last_error(finger);
+    EXPECT_EQ(finger.saved(), before);
+  };
+  for (const double bad : {nan, inf, -inf, 1e13}) {
+    for (std::size_t i = 0; i < tendons; ++i) {
+      Motion broken = motion();
+      broken.force[100 * tendons + i] = bad;
+      refused(0.1, broken.row(100), "tendon_force[" + std::to_string(i + 1) + "]");
+    }
+    Motion broken = motion();
+    broken.position[100 * tendons + 2] = broken.angle[100 * joints + 1] = bad;
+    const bool by_tendons = source() == 1 || std::get<0>(GetParam()) == test_finger::watching;
+    refused(0.1, broken.row(100), by_tendons ? "tendon_position[3]" : "joint_position[2]");
+  }
+  for (const double time : {nan, inf, 0.0989, -1.0}) {
+    refused(time, motion().row(100), "time");
+  }
+  EXPECT_EQ(finger.take(motion().time[99], motion().row(1700)), TENDONFMU_OK) << "the same time again: nothing";
+  EXPECT_TRUE(finger.run(motion(), 100, 1000) == quiet.run(motion(), 100, 1000));
+}
+
+// --- the motion of the tests ----------------------------------------------------------------------------------------
+
+TEST(Motion, MovesRestsTouchesReversesAndLetsEveryKeyAct) {
+  const Outputs plain = Finger().run(motion()), o = Finger(image_of(test_finger::detecting)).run(motion());
+  const std::vector<double>& speed = plain.real.at("joint_speed");
+  const auto share = [&](auto is) { return 1.0 / samples * std::count_if(speed.begin(), speed.end(), is); };
+  EXPECT_GT(share([](double v) { return v > 0.5; }), 0.1);
+  EXPECT_GT(share([](double v) { return v < -0.5; }), 0.1);
+  EXPECT_GT(share([](double v) { return std::fabs(v) < 0.02; }), 0.1);
+  for (const Outputs* outputs : {&plain, &o}) {
+    EXPECT_GT(count(outputs->flag.at("contact"), 1), samples / 50);
+    EXPECT_LT(count(outputs->flag.at("contact"), 1), samples / 2);
+  }
+  for (const char* name : {"stuck_friction", "friction_jump", "innovation", "drift", "fingertip_force_std"}) {
+    EXPECT_GT(*std::max_element(o.real.at(name).begin(), o.real.at(name).end()), 1e-3) << name;
+  }
+  EXPECT_GT(count(o.whole.at("contact_link"), 0), 1000u);
+  EXPECT_LT(count(o.whole.at("contact_link"), 0), samples);
+  const Outputs watched = Finger(image_of(test_finger::watching)).run(failing());
+  EXPECT_EQ(watched.flag.at("sensor_fault")[1200 * tendons + 1], 1);
+  EXPECT_EQ(watched.flag.at("contact_observable")[1200], 0);
+  EXPECT_EQ(watched.flag.at("contact_observable")[1500], 1) << "it has recovered";
+}
+
+// --- one finger alone -----------------------------------------------------------------------------------------------
+
+TEST(Finger, StatesBringTheirParametersAndFitTheirFingerAlone) {
+  Finger tuned, plain;
+  set(tuned, "joints[1].friction.coulomb", 0.001);
+  ASSERT_EQ(restore(plain, tuned.saved()), TENDONFMU_OK);
+  double value = 0.0;
+  ASSERT_EQ(tendonfmu_get_parameter(plain, "joints[1].friction.coulomb", &value), TENDONFMU_OK);
+  EXPECT_EQ(value, 0.001);
+  EXPECT_TRUE(plain.run(motion()) == tuned.run(motion()));
   std::string text = test_finger::json;
   text.replace(text.find("0.008, 0.006"), 12, "0.009, 0.006");
-  Finger one, other(test_finger::image(text));
-  const auto bytes = other.saved();
-  EXPECT_EQ(tendonfmu_restore_state(one, bytes.data(), bytes.size()), TENDONFMU_BAD_STATE);
-}
-
-TEST(Finger, BadSamplesAreRefusedByNameAndChangeNothing) {
-  Finger finger;
-  run(finger, 0, 100);
-  const auto before = finger.saved();
-  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  for (double bad : {nan, inf, -inf, 1e13}) {
-    for (std::size_t i = 0; i < tendons; ++i) {
-      std::vector<double> force(tendons, 5.0), position(tendons, 0.01);
-      const tendonfmu_inputs inputs = {force.data(), position.data(), nullptr, nullptr};
-      force[i] = bad;
-      EXPECT_EQ(tendonfmu_step(finger, 0.1, &inputs), TENDONFMU_BAD_SAMPLE);
-      EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("tendon_force[" + std::to_string(i + 1) + "]"),
-                std::string::npos);
-      force[i] = 5.0;
-      position[i] = bad;
-      EXPECT_EQ(tendonfmu_step(finger, 0.1, &inputs), TENDONFMU_BAD_SAMPLE);
-      EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("tendon_position["), std::string::npos);
-    }
-  }
-  for (double time : {nan, inf, 0.0989, -1.0}) {
-    const tendonfmu_inputs inputs = motion().row(100);
-    EXPECT_EQ(tendonfmu_step(finger, time, &inputs), TENDONFMU_BAD_SAMPLE) << time;
-    EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("time"), std::string::npos);
-  }
-  EXPECT_EQ(finger.saved(), before);
-}
-
-TEST(Finger, OverflowIsRefusedAndChangesNothing) {
-  std::string text = test_finger::json;
-  text.replace(text.find("\"viscous\": 0.3"), 14, "\"viscous\": 1e9");
-  Finger finger(test_finger::image(text));
-  tendonfmu_set_kinematics_source(finger, 3);
-  const std::vector<double> force(tendons, 1e12), angle(joints, 0.0);
-  std::vector<double> velocity(joints, 0.0);
-  const tendonfmu_inputs inputs = {force.data(), nullptr, angle.data(), velocity.data()};
-  ASSERT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK);
-  const auto before = finger.saved();
-  velocity.assign(joints, -1e12);
-  const tendonfmu_status status = tendonfmu_step(finger, 1.0, &inputs);
-  if (status == TENDONFMU_OK) { /* large but finite is as good */
-    double torque[joints];
-    tendonfmu_outputs view = {};
-    view.friction_torque = torque;
-    tendonfmu_get_outputs(finger, &view);
-    EXPECT_TRUE(std::isfinite(torque[0]) && std::isfinite(torque[1]));
-  } else {
-    EXPECT_EQ(status, TENDONFMU_BAD_SAMPLE);
-    EXPECT_EQ(finger.saved(), before);
-  }
-}
-
-TEST(Finger, ShortestStepDoesNotPoisonTheState) {
-  Finger finger;
-  tendonfmu_inputs inputs = motion().row(0);
-  ASSERT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK);
-  const auto before = finger.saved();
-  inputs = motion().row(1500);
-  const tendonfmu_status status = tendonfmu_step(finger, std::numeric_limits<double>::denorm_min(), &inputs);
-  if (status != TENDONFMU_OK) {
-    EXPECT_EQ(finger.saved(), before);
-  }
-  EXPECT_EQ(tendonfmu_step(finger, 1e12, &inputs), TENDONFMU_OK) << tendonfmu_last_error(finger);
+  EXPECT_EQ(restore(plain, Finger(test_finger::image(text)).saved()), TENDONFMU_BAD_STATE);
 }
 
 TEST(Finger, RefusedRowOfABatchIsNamedAndRowsBeforeItAreWritten) {
   Motion broken(200);
-  broken.force[150 * tendons + 1] = NAN;
+  broken.force[150 * tendons + 1] = nan;
   Finger finger;
   Outputs outputs(200);
   const tendonfmu_outputs view = outputs.view();
@@ -221,94 +224,21 @@ TEST(Finger, RefusedRowOfABatchIsNamedAndRowsBeforeItAreWritten) {
   std::size_t done = 0;
   EXPECT_EQ(tendonfmu_run(finger, 200, broken.time.data(), &inputs, &view, &done), TENDONFMU_BAD_SAMPLE);
   EXPECT_EQ(done, 150u);
-  EXPECT_TRUE(std::isfinite(outputs.compensated[149 * joints]));
-  EXPECT_TRUE(std::isnan(outputs.compensated[150 * joints]));
+  EXPECT_TRUE(std::isfinite(view.compensated_torque[149 * joints]));
+  EXPECT_TRUE(std::isnan(view.compensated_torque[150 * joints]));
 }
 
-// the bias may learn from nothing before row 40, and a torque is known
-std::vector<double> run_guided(Finger& finger, tendonfmu_status expected = TENDONFMU_OK) {
-  std::vector<unsigned char> learns(300);
-  std::vector<double> known(300 * joints), variance(300 * joints);
-  for (std::size_t k = 0; k < 300; ++k) {
-    learns[k] = k > 40 && k % 50 > 10;
-    known[k * joints] = 1e-3 * static_cast<double>(k);
-  }
-  Outputs outputs(300);
-  const tendonfmu_outputs view = outputs.view();
-  const tendonfmu_inputs inputs = motion().row(0);
-  const tendonfmu_guide guide = {learns.data(), known.data(), variance.data()};
-  EXPECT_EQ(tendonfmu_run_guided(finger, 300, motion().time.data(), &inputs, &guide, &view, nullptr), expected);
-  outputs.bias.insert(outputs.bias.end(), variance.begin() + 60 * joints, variance.end());
-  return outputs.bias;
-}
-
-TEST(Finger, GuidedRunGivesTheSameBitsWithAllKernels) {
-  Finger plain;
-  ASSERT_EQ(tendonfmu_set_kernel(plain, "plain"), TENDONFMU_OK);
-  const std::vector<double> expected = run_guided(plain);
-  for (const char* kernel : {"sse2", "avx2"}) {
-    Finger other;
-    if (tendonfmu_set_kernel(other, kernel) == TENDONFMU_OK) {
-      EXPECT_EQ(run_guided(other), expected) << kernel;
-    }
-  }
-}
-
-TEST(Finger, GuidedRunBeginsAnewAndLeavesNoTrace) {
-  Finger finger, fresh;
-  run_guided(finger);
-  run_guided(finger, TENDONFMU_WRONG_ORDER);
-  ASSERT_EQ(tendonfmu_reset(finger), TENDONFMU_OK);
-  EXPECT_EQ(run(finger).bias, run(fresh).bias);
-  EXPECT_EQ(finger.saved(), fresh.saved());
-  Finger watching(test_finger::image(test_finger::watched_sensors()));
-  run_guided(watching, TENDONFMU_BAD_ARGUMENT);
-  EXPECT_EQ(tendonfmu_run_guided(fresh, 1, motion().time.data(), nullptr, nullptr, nullptr, nullptr),
-            TENDONFMU_BAD_ARGUMENT);
-}
-
-TEST(Finger, SameTimeAgainChangesNothing) {
-  Finger finger;
-  run(finger, 0, 300);
-  const auto before = finger.saved();
-  const tendonfmu_inputs other = motion().row(1700);
-  EXPECT_EQ(tendonfmu_step(finger, motion().time[299], &other), TENDONFMU_OK);
-  EXPECT_EQ(finger.saved(), before);
-}
-
-// Without a filter ∂v/∂q is 1/Δt, which overflows; the state must stay one that can be restored.
-TEST(Finger, ShortestStepAtRestLeavesAStateThatRestores) {
-  Finger finger;
-  ASSERT_EQ(tendonfmu_set_parameter(finger, "velocity_filter_cutoff", 0.0), TENDONFMU_OK);
-  const tendonfmu_inputs inputs = motion().row(0);
-  ASSERT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK);
-  ASSERT_EQ(tendonfmu_step(finger, std::numeric_limits<double>::denorm_min(), &inputs), TENDONFMU_OK);
-  const auto bytes = finger.saved();
-  EXPECT_EQ(tendonfmu_restore_state(finger, bytes.data(), bytes.size()), TENDONFMU_OK) << tendonfmu_last_error(finger);
-  double speed[joints];
-  const double still[tendons] = {};
-  const tendonfmu_inputs direction = {still, still, nullptr, nullptr};
-  tendonfmu_outputs view = {};
-  view.joint_speed = speed;
-  ASSERT_EQ(tendonfmu_get_directional_derivative(finger, &direction, &view), TENDONFMU_OK);
-  EXPECT_EQ(speed[0], 0.0);
-}
-
-TEST(Finger, SoftestSpringDoesNotPoisonTheAngles) {
-  std::string text = test_finger::json;
-  text.replace(text.find("\"stiffness\": 5000"), 17, "\"stiffness\": 1e-320");
-  Finger finger(test_finger::image(text));
-  const double force[tendons] = {5.0, 5.0, 0.0}, position[tendons] = {};
-  const tendonfmu_inputs inputs = {force, position, nullptr, nullptr};
-  EXPECT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_OK) << tendonfmu_last_error(finger);
-}
-
-TEST(Finger, MissingArgumentIsRefusedInWords) {
+TEST(Finger, MissingArgumentsAreRefusedInWords) {
   Finger finger;
   EXPECT_EQ(tendonfmu_initialise(finger, 0.0, nullptr), TENDONFMU_BAD_ARGUMENT);
   EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("missing"), std::string::npos);
   EXPECT_EQ(tendonfmu_set_parameter(finger, nullptr, 1.0), TENDONFMU_BAD_ARGUMENT);
   EXPECT_EQ(tendonfmu_step(nullptr, 0.0, nullptr), TENDONFMU_BAD_ARGUMENT);
+  tendonfmu_set_kinematics_source(finger, 2);
+  tendonfmu_inputs inputs = motion().row(0);
+  inputs.joint_position = nullptr;
+  EXPECT_EQ(finger.take(0.0, inputs), TENDONFMU_BAD_SAMPLE);
+  EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("joint_position is missing"), std::string::npos);
 }
 
 TEST(Finger, OrderOfCallsIsHeld) {
@@ -327,31 +257,14 @@ TEST(Finger, OrderOfCallsIsHeld) {
   EXPECT_EQ(tendonfmu_set_parameter(finger, "tendons[1].pulley_friction[1].coulomb", 0.01), TENDONFMU_OK);
 }
 
-TEST(Finger, MissingInputOfTheSourceIsNamed) {
-  Finger finger;
-  tendonfmu_set_kinematics_source(finger, 2);
-  tendonfmu_inputs inputs = motion().row(0);
-  inputs.joint_position = nullptr;
-  EXPECT_EQ(tendonfmu_initialise(finger, 0.0, &inputs), TENDONFMU_BAD_SAMPLE);
-  EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("joint_position is missing"), std::string::npos);
-}
-
-TEST(Finger, ResetGivesTheFingerOfTheImage) {
-  Finger fresh, used;
-  run(used, 0, 900);
-  tendonfmu_set_parameter(used, "contact.threshold[1]", 9.0);
-  ASSERT_EQ(tendonfmu_reset(used), TENDONFMU_OK);
-  EXPECT_EQ(used.saved(), fresh.saved());
-}
-
 TEST(Finger, PlacedAtAnyAddressItBehavesTheSame) {
   const auto bytes = test_finger::image();
   Finger created(bytes);
-  const Outputs expected = run(created);
+  const Outputs expected = created.run(motion());
   const std::size_t size = tendonfmu_memory_size(bytes.data(), bytes.size());
   std::vector<unsigned char> memory(size + 64);
-  for (std::size_t shift : {0, 1, 7, 33}) {
-    char message[200];
+  char message[200];
+  for (const std::size_t shift : {0, 1, 7, 33}) {
     tendonfmu_finger* placed =
         tendonfmu_place(memory.data() + shift, size, bytes.data(), bytes.size(), message, sizeof message);
     ASSERT_NE(placed, nullptr) << message;
@@ -361,7 +274,6 @@ TEST(Finger, PlacedAtAnyAddressItBehavesTheSame) {
     ASSERT_EQ(tendonfmu_run(placed, samples, motion().time.data(), &inputs, &view, nullptr), TENDONFMU_OK);
     EXPECT_TRUE(outputs == expected);
   }
-  char message[200];
   EXPECT_EQ(tendonfmu_place(memory.data(), size - 1, bytes.data(), bytes.size(), message, sizeof message), nullptr);
   EXPECT_NE(std::string(message).find("too little memory"), std::string::npos);
 }
@@ -376,96 +288,238 @@ TEST(Finger, ParametersAreWrittenAllOrNone) {
   EXPECT_EQ(tendonfmu_set_parameters(finger, 2, both, crossed), TENDONFMU_BAD_PARAMETER);
   EXPECT_NE(std::string(tendonfmu_last_error(finger)).find("at least coulomb"), std::string::npos);
   EXPECT_EQ(tendonfmu_set_parameters(finger, 2, both, negative), TENDONFMU_BAD_PARAMETER);
-  EXPECT_EQ(tendonfmu_set_parameter(finger, "joints[1].friction.static", NAN), TENDONFMU_BAD_PARAMETER);
+  EXPECT_EQ(tendonfmu_set_parameter(finger, "joints[1].friction.static", nan), TENDONFMU_BAD_PARAMETER);
   EXPECT_EQ(tendonfmu_set_parameter(finger, "joints[9].friction.static", 1.0), TENDONFMU_BAD_ARGUMENT);
   EXPECT_EQ(finger.saved(), before);
   EXPECT_EQ(tendonfmu_set_parameters(finger, 2, both, raised), TENDONFMU_OK);
   EXPECT_NE(finger.saved(), before);
 }
 
-TEST(Finger, EveryParameterHasAPathThatFindsIt) {
-  Finger finger;
-  const std::size_t count = tendonfmu_parameter_count(finger);
-  ASSERT_GT(count, 50u);
-  for (std::size_t i = 0; i < count; ++i) {
-    char path[80];
-    ASSERT_EQ(tendonfmu_get_parameter_path(finger, i, path, sizeof path), TENDONFMU_OK);
-    EXPECT_EQ(tendonfmu_find_parameter(finger, path), i) << path;
-    tendonfmu_parameter_info info;
-    ASSERT_EQ(tendonfmu_get_parameter_info(finger, i, &info), TENDONFMU_OK);
-    EXPECT_LE(info.minimum, info.start) << path;
-    EXPECT_GE(info.maximum, info.start) << path;
-    EXPECT_STRNE(info.unit, "") << path;
-  }
+// --- derivatives ----------------------------------------------------------------------------------------------------
+
+// A motion of one sample: sample k of the tests' moved by `step` along a direction of its own, or that direction.
+Motion sample_along(std::size_t k, double step, bool direction_alone = false) {
+  Motion one(1);
+  const auto move = [&](std::vector<double>& row, const std::vector<double>& from, double scale, double phase) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const double along = scale * std::sin(phase + static_cast<double>(i * 3 + k));
+      row[i] = direction_alone ? along : from[k * row.size() + i] + step * along;
+    }
+  };
+  move(one.force, motion().force, 1.0, 1.0);
+  move(one.position, motion().position, 1e-3, 2.0);
+  move(one.angle, motion().angle, 0.1, 3.0);
+  move(one.velocity, motion().velocity, 1.0, 4.0);
+  return one;
 }
 
 // Central differences on samples whose branches both neighbours share.
 TEST(Finger, DirectionalDerivativeMatchesCentralDifferences) {
+  const double h = 1e-6;
   for (int source = 1; source <= 3; ++source) {
     Finger finger;
     tendonfmu_set_kinematics_source(finger, source);
     std::size_t checked = 0;
     for (std::size_t k = 0; k < samples; ++k) {
+      const double time = motion().time[k];
+      if (k % 37 != 5) {
+        ASSERT_EQ(finger.take(time, motion().row(k)), TENDONFMU_OK);
+        continue;
+      }
       const auto before = finger.saved();
-      const tendonfmu_inputs at = motion().row(k);
-      const auto call = k == 0 ? tendonfmu_initialise : tendonfmu_step;
-      if (k % 37 == 5) {
-        double direction_force[tendons], direction_position[tendons], direction_angle[joints], direction_speed[joints];
-        for (std::size_t i = 0; i < tendons; ++i) {
-          direction_force[i] = std::sin(1.0 + static_cast<double>(i + k));
-          direction_position[i] = 1e-3 * std::cos(2.0 + static_cast<double>(i * 3 + k));
-        }
+      Outputs side[2] = {Outputs(1), Outputs(1)}, slope(1);
+      for (const int s : {0, 1}) {
+        ASSERT_EQ(finger.take(time, sample_along(k, s ? h : -h).all()), TENDONFMU_OK);
+        const tendonfmu_outputs view = side[s].view();
+        tendonfmu_get_outputs(finger, &view);
+        ASSERT_EQ(restore(finger, before), TENDONFMU_OK);
+      }
+      ASSERT_EQ(finger.take(time, motion().row(k)), TENDONFMU_OK);
+      const Motion along = sample_along(k, 0.0, true);
+      const tendonfmu_inputs direction = along.all();
+      const tendonfmu_outputs view = slope.view();
+      ASSERT_EQ(tendonfmu_get_directional_derivative(finger, &direction, &view), TENDONFMU_OK);
+      if (side[0].flag.at("contact") != side[1].flag.at("contact")) {
+        continue;
+      }
+      ++checked;
+      for (const char* name :
+           {"compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed"}) {
         for (std::size_t j = 0; j < joints; ++j) {
-          direction_angle[j] = 0.1 * std::sin(3.0 + static_cast<double>(j + k));
-          direction_speed[j] = std::cos(static_cast<double>(j + 2 * k));
+          const double numeric = (side[1].real.at(name)[j] - side[0].real.at(name)[j]) / (2.0 * h);
+          EXPECT_NEAR(slope.real.at(name)[j], numeric, 1e-6 + 2e-4 * std::abs(numeric))
+              << name << ", sample " << k << ", source " << source;
         }
-        const tendonfmu_inputs direction = {direction_force, direction_position, direction_angle, direction_speed};
-        const double h = 1e-6;
-        Outputs sides[2] = {Outputs(1), Outputs(1)};
-        for (int s = 0; s < 2; ++s) {
-          const double step = s == 0 ? -h : h;
-          std::vector<double> f(at.tendon_force, at.tendon_force + tendons),
-              x(at.tendon_position, at.tendon_position + tendons), q(at.joint_position, at.joint_position + joints),
-              v(at.joint_velocity, at.joint_velocity + joints);
-          for (std::size_t i = 0; i < tendons; ++i) {
-            f[i] += step * direction_force[i];
-            x[i] += step * direction_position[i];
-          }
-          for (std::size_t j = 0; j < joints; ++j) {
-            q[j] += step * direction_angle[j];
-            v[j] += step * direction_speed[j];
-          }
-          const tendonfmu_inputs moved = {f.data(), x.data(), q.data(), v.data()};
-          ASSERT_EQ(tendonfmu_restore_state(finger, before.data(), before.size()), TENDONFMU_OK);
-          ASSERT_EQ(call(finger, motion().time[k], &moved), TENDONFMU_OK);
-          const tendonfmu_outputs view = sides[s].view();
-          tendonfmu_get_outputs(finger, &view);
-        }
-        ASSERT_EQ(tendonfmu_restore_state(finger, before.data(), before.size()), TENDONFMU_OK);
-        ASSERT_EQ(call(finger, motion().time[k], &at), TENDONFMU_OK);
-        Outputs slope(1);
-        const tendonfmu_outputs view = slope.view();
-        ASSERT_EQ(tendonfmu_get_directional_derivative(finger, &direction, &view), TENDONFMU_OK);
-        const bool same_branch = sides[0].contact == sides[1].contact;
-        for (std::size_t j = 0; same_branch && j < joints; ++j) {
-          const auto check = [&](const std::vector<double>& low, const std::vector<double>& high, double derivative) {
-            const double numeric = (high[j] - low[j]) / (2.0 * h);
-            EXPECT_NEAR(derivative, numeric, 1e-6 + 2e-4 * std::abs(numeric)) << "sample " << k << " source " << source;
-          };
-          check(sides[0].compensated, sides[1].compensated, slope.compensated[j]);
-          check(sides[0].torque, sides[1].torque, slope.torque[j]);
-          check(sides[0].friction, sides[1].friction, slope.friction[j]);
-          check(sides[0].bias, sides[1].bias, slope.bias[j]);
-          check(sides[0].angle, sides[1].angle, slope.angle[j]);
-          check(sides[0].speed, sides[1].speed, slope.speed[j]);
-        }
-        checked += same_branch;
-      } else {
-        ASSERT_EQ(call(finger, motion().time[k], &at), TENDONFMU_OK);
       }
     }
     EXPECT_GT(checked, 90u);
   }
+}
+
+// --- which working points are in force at a joint angle -------------------------------------------------------------
+
+// edge before joint 2: tendon 1 has working points at −0.5, 0.1, 0.6 rad, tendon 2 has no friction there
+TEST(SlotSegment, CountsTheWorkingPointsAtOrBelowTheAngle) {
+  const Finger finger;
+  const auto segment = [&](std::size_t tendon, double angle) { return slot_segment(finger, 1, tendon, angle); };
+  EXPECT_EQ(segment(0, -0.6), 0u);
+  EXPECT_EQ(segment(0, -0.5), 1u); /* a working point begins its segment */
+  EXPECT_EQ(segment(0, 0.0999), 1u);
+  EXPECT_EQ(segment(0, 0.1), 2u);
+  EXPECT_EQ(segment(0, 0.6), 3u);
+  // a joint angle overflows before the sample is refused: no law beyond those of the edge may be read
+  EXPECT_EQ(segment(0, inf), 3u);
+  EXPECT_EQ(segment(0, -inf), 0u);
+  for (const double angle : {inf, -inf, nan}) {
+    EXPECT_EQ(segment(1, angle), 0u);
+  }
+}
+
+// --- detection ------------------------------------------------------------------------------------------------------
+
+TEST(Detection, ReleaseTimeWrittenInContactCountsFromItsBeginning) {
+  const Outputs whole = Finger(image_of(test_finger::detecting)).run(motion());
+  const std::vector<unsigned char>& contact = whole.flag.at("contact");
+  std::size_t start = 1;
+  while (start + 60 < samples && !(contact[start] && contact[start + 59] && !contact[start - 1])) {
+    ++start;
+  }
+  ASSERT_LT(start + 60, samples);
+  Finger finger(image_of(test_finger::detecting));
+  finger.run(motion(), 0, start + 40);
+  const auto bytes = finger.saved();
+  for (const bool released : {true, false}) {
+    ASSERT_EQ(restore(finger, bytes), TENDONFMU_OK);
+    set(finger, "contact.release_time", released ? 0.0395 : 0.0405);
+    Outputs next = finger.run(motion(), start + 40, start + 41);
+    // no update: T_eff is as it was
+    EXPECT_EQ(next.view().compensated_torque[0] != next.view().residual[0], released);
+  }
+}
+
+// --- saved states and images under a checksum that fits -------------------------------------------------------------
+
+struct Damage {
+  const char* what;
+  const double* number; /* of the finger whose state is damaged */
+  double value;
+};
+
+void expect_refused(const Finger& finger, const std::vector<Damage>& damages) {
+  const auto good = finger.saved();
+  const std::size_t state = 40 + 8 * tendonfmu_parameter_count(finger);
+  for (const Damage& damage : damages) {
+    auto bad = good;
+    store_f64(&bad[state + 8 * static_cast<std::size_t>(damage.number - finger.handle->state)], damage.value);
+    seal(bad);
+    EXPECT_EQ(restore(finger, bad), TENDONFMU_BAD_STATE) << damage.what;
+    EXPECT_EQ(finger.saved(), good) << damage.what;
+  }
+  EXPECT_EQ(restore(finger, good), TENDONFMU_OK);
+}
+
+TEST(SavedState, WithANumberThatCannotBeIsRefused) {
+  Finger finger(image_of(test_finger::detecting));
+  finger.run(motion(), 0, 1900);
+  const finger_state& s = finger.handle->remembered;
+  expect_refused(finger, {{"negative variance", s.variance, -1e-9},
+                          {"variance that overflows", s.variance + 1, 1e308},
+                          {"negative total variance", s.total_variance + 1, -1e-30},
+                          {"gain above 1", s.gain, 1.5},
+                          {"half a contact", s.joint_contact, 0.5},
+                          {"contact without a joint", s.joint_contact + joints, 1.0},
+                          {"residual without a joint", s.bias + joints, 1.0},
+                          {"negative H", s.stuck_friction, -1.0},
+                          {"negative J", s.friction_jump, -1.0},
+                          {"J that overflows", s.friction_jump, 1e200},
+                          {"negative evidence", s.evidence, -1e-3},
+                          {"exceeded in no time", s.exceeded_at, 1e16},
+                          {"contact since no time", s.scalar + STATE_CONTACT_SINCE, -1e300},
+                          {"negative absorption", s.scalar + STATE_ABSORBED, -1.0},
+                          {"more absorbed before", s.scalar + STATE_ABSORBED_BEFORE, s.scalar[STATE_ABSORBED] + 1.0},
+                          {"rest that begins after it ends", s.stuck_since, s.scalar[STATE_ABSORBED] + 1.0},
+                          {"third side", s.side, 2.0},
+                          {"side without a tendon", s.side + tendons, 1.0},
+                          {"half an open start", s.scalar + STATE_START_OPEN, 0.5},
+                          {"negative V", s.unlearned, -1e-3},
+                          {"more of the start than all", s.start_left, 1.5},
+                          {"drift that overflows", s.drift, 1e200},
+                          {"not a number", s.entry_pulley, nan},
+                          {"infinite part", s.part, inf}});
+}
+
+TEST(SavedState, OfWatchedSensorsWithANumberThatCannotBeIsRefused) {
+  Finger finger(image_of(test_finger::watching));
+  finger.run(failing());
+  const finger_state& s = finger.handle->remembered;
+  const std::size_t lanes = finger.handle->tendon_lanes;
+  expect_refused(finger, {{"third fault", s.sensor + SENSOR_FAULT * lanes, 3.0},
+                          {"fault without a tendon", s.sensor + SENSOR_FAULT * lanes + 3, 1.0},
+                          {"half known", s.sensor + SENSOR_KNOWN * lanes, 0.5},
+                          {"fault since no time", s.sensor + SENSOR_FAULT_SINCE * lanes, 1e16},
+                          {"not a number", s.sensor + SENSOR_TAUT_FORCE * lanes, nan},
+                          {"third watch", s.watch, 3.0},
+                          {"twice unwell", finger.handle->state + STATE_UNWELL, 2.0}});
+}
+
+std::vector<unsigned char> with_options(std::uint32_t bits) {
+  auto image = image_of(test_finger::detecting);
+  store_u32(&image[40], bits);
+  seal(image);
+  return image;
+}
+
+TEST(Options, ThatDoNotGoTogetherAreRefused) {
+  const std::uint32_t options = Model(image_of(test_finger::detecting)).shape.options;
+  ASSERT_EQ(options & MODEL_UNCERTAINTY_DIRECTIONS, 2u << 10);
+  const auto refused_with = [&](std::uint32_t bits) {
+    const auto image = with_options(bits);
+    tendonfmu_finger* made = tendonfmu_create(image.data(), image.size(), nullptr, 0);
+    tendonfmu_destroy(made);
+    return made == nullptr;
+  };
+  EXPECT_FALSE(refused_with(options));
+  EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_HAS_UNCERTAINTY}));
+  EXPECT_TRUE(refused_with(options | MODEL_UNCERTAINTY_DIRECTIONS)); /* seven directions */
+  EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_DETECTS_BY_INNOVATION}));
+  EXPECT_TRUE(refused_with(options | std::uint32_t{MODEL_HAS_REST_INNOVATION})); /* without rest */
+  EXPECT_TRUE(refused_with(options | (MODEL_OPTION_BITS + 1u)));
+  // every bit: refused where the numbers do not fit, or a finger that takes samples
+  for (unsigned bit = 0; bit < 32; ++bit) {
+    const bool only_a_word = bit == 4 || bit == 5 || bit == 22; /* forgetting, entry_load, stuck_presliding */
+    EXPECT_EQ(refused_with(options ^ 1u << bit), !only_a_word) << bit;
+    if (only_a_word) {
+      Finger(with_options(options ^ 1u << bit)).run(motion(), 0, 1500);
+    }
+  }
+}
+
+// --- sensors that fail ----------------------------------------------------------------------------------------------
+
+TEST(SensorFault, ARowLeavesAndComesBackExactly) {
+  Finger finger(image_of(test_finger::watching));
+  const std::vector<double> whole(finger.handle->derived.inverse_routing,
+                                  finger.handle->derived.inverse_routing + joints * finger.handle->tendon_lanes);
+  const double* inverse = finger.handle->scratch.inverse_routing;
+  double fault[4] = {0.0, FORCE_FAILS, 0.0, 0.0};
+  use_rows(finger.handle, fault);
+  EXPECT_EQ(finger.handle->scratch.angles_determined, 1);
+  for (std::size_t j = 0; j < joints; ++j) {
+    for (std::size_t k = 0; k < joints; ++k) { /* R⁺ R = 1 without that row */
+      double product = 0.0;
+      for (std::size_t i = 0; i < tendons; ++i) {
+        const std::size_t lanes = finger.handle->tendon_lanes;
+        product += inverse[j * lanes + i] * finger.handle->derived.moment_arm[k * lanes + i];
+      }
+      EXPECT_NEAR(product, j == k ? 1.0 : 0.0, 1e-12);
+    }
+    EXPECT_EQ(inverse[j * finger.handle->tendon_lanes + 1], 0.0);
+  }
+  fault[0] = POSITION_FAILS; /* both of a pair */
+  use_rows(finger.handle, fault);
+  EXPECT_EQ(finger.handle->scratch.angles_determined, 0);
+  recall_rows(finger.handle);
+  EXPECT_TRUE(std::equal(whole.begin(), whole.end(), inverse));
 }
 
 }  // namespace

@@ -30,39 +30,6 @@ TEST(FrictionLaw, IsEquationOne) {
   }
 }
 
-TEST(FrictionLaw, BreaksAwayAtStaticForceAndSlidesAtCoulombForce) {
-  const Side side(0.03, 0.02, 0.005, 0.0);
-  EXPECT_DOUBLE_EQ(side.at(0.0).value, 0.03);
-  EXPECT_DOUBLE_EQ(side.at(1.0).value, 0.02);
-  EXPECT_NEAR(side.at(0.005).value, 0.02 + 0.01 / std::exp(1.0), 1e-16);
-}
-
-TEST(FrictionLaw, GrowsLinearlyWithSpeedWhereViscous) {
-  const Side side(0.03, 0.02, 0.005, 0.3);
-  EXPECT_NEAR(side.at(3.0).value - side.at(2.0).value, 0.3, 1e-15);
-}
-
-TEST(FrictionLaw, FallsBetweenStaticAndCoulombWithoutViscousPart) {
-  const Side side(0.05, 0.01, 0.01, 0.0);
-  double before = side.at(0.0).value;
-  for (double v = 1e-4; v < 0.2; v += 1e-4) {
-    const double now = side.at(v).value;
-    EXPECT_LT(now, before);
-    EXPECT_GT(now, side.fc);
-    before = now;
-  }
-}
-
-TEST(FrictionLaw, NeverDrives) {
-  std::mt19937_64 random(2);
-  std::uniform_real_distribution<> unit(0.0, 1.0);
-  for (int i = 0; i < 10000; ++i) {
-    const double fc = unit(random);
-    const Side side(fc + unit(random), fc, std::exp2(-20.0 * unit(random)), unit(random));
-    EXPECT_GE(side.at(std::exp2(40.0 * unit(random) - 30.0)).value, 0.0);
-  }
-}
-
 TEST(FrictionLaw, WithoutStribeckEffectIsFreeOfTheExponential) {
   const Side side(0.02, 0.02, 1e-300, 0.1);
   for (const double v : {0.0, 1e-12, 1e-3, 10.0}) {

@@ -113,27 +113,6 @@ TEST(Cvode, FindsTheObstacle) {
   EXPECT_TRUE(touched);
 }
 
-// Times that follow each other by one unit of the last place, first ones of a fresh CVODE among them.
-TEST(Cvode, TakesTheSmallestOfSteps) {
-  Case one(test_plant::small()), other(test_plant::small());
-  const auto with = one.cvode(1e-6), straight = other.cvode(1e-6);
-  for (const double start : {0.0, 1e-320, 1e-300, 1e-12, 0.1}) {
-    with->advance(one.inputs, start, &one.now);
-    EXPECT_EQ(one.now.time, start);
-    double time = start;
-    for (int k = 0; k < 20; ++k) {
-      time = std::nextafter(time, 1.0);
-      if (k % 3 == 0) {
-        with->forget();
-      }
-      ASSERT_NO_THROW(with->advance(one.inputs, time, &one.now)) << time << " of " << start;
-      EXPECT_EQ(one.now.time, time);
-    }
-  }
-  straight->advance(other.inputs, one.now.time, &other.now);
-  EXPECT_LT(largest_difference(one.now.state, other.now.state, one.equations.layout().motor()), 1e-4);
-}
-
 TEST(Cvode, GivesUpInOneLineAndLeavesTheMomentAlone) {
   Case one(test_plant::small());
   const auto with = one.cvode();
@@ -160,19 +139,6 @@ TEST(Cvode, GivesUpInOneLineAndLeavesTheMomentAlone) {
   EXPECT_EQ(one.now.time, 0.02);
 }
 
-TEST(Cvode, ToleranceIsWhatItSays) {
-  std::vector<std::vector<double>> ends;
-  for (const double tolerance : {1e-10, 1e-8, 1e-6, 1e-4}) {
-    Case one(test_plant::small());
-    one.cvode(tolerance)->advance(one.inputs, 0.3, &one.now);
-    ends.push_back(one.now.state);
-  }
-  const std::size_t angles = 3;
-  EXPECT_LT(largest_difference(ends[0], ends[1], angles), 1e-6);
-  EXPECT_LT(largest_difference(ends[0], ends[2], angles), 1e-4);
-  EXPECT_LT(largest_difference(ends[0], ends[3], angles), 1e-2);
-}
-
 TEST(FixedSteps, AgreeWithCvodeTheBetterTheSmaller) {
   Case one(test_plant::small());
   one.cvode(1e-9)->advance(one.inputs, 0.3, &one.now);
@@ -195,55 +161,6 @@ TEST(FixedSteps, StayStableHoweverFastHeatFades) {
     with.advance(one.inputs, 0.2, &one.now);
     EXPECT_LT(std::fabs(one.now.state[one.equations.layout().heat()]), 1.0 + 1e-3);
   }
-}
-
-TEST(FixedSteps, DivideTheTimeEvenly) {
-  Case one(test_plant::plain(2, 4));
-  fixed_step_integrator with(&one.equations, 1e-3);
-  with.advance(one.inputs, 0.0105, &one.now);
-  EXPECT_EQ(with.work().steps, 11u);
-  with.advance(one.inputs, 0.0105, &one.now);  // no time, no step
-  EXPECT_EQ(with.work().steps, 11u);
-  with.advance(one.inputs, 0.0115, &one.now);
-  EXPECT_EQ(with.work().steps, 12u);  // 1 ms, but for rounding
-}
-
-TEST(FixedSteps, TakeTheSmallestOfSteps) {
-  Case one(test_plant::small());
-  fixed_step_integrator with(&one.equations, 5e-4);
-  for (const double start : {5e-324, 1e-320, 1e-300, 1e-12, 0.1}) {
-    with.advance(one.inputs, start, &one.now);
-    double time = start;
-    for (int k = 0; k < 5; ++k) {
-      time = std::nextafter(time, 1.0);
-      ASSERT_NO_THROW(with.advance(one.inputs, time, &one.now)) << time;
-      for (const double x : one.now.state) {
-        ASSERT_TRUE(std::isfinite(x)) << time;
-      }
-    }
-  }
-}
-
-TEST(FixedSteps, GiveUpInOneLineAndLeaveTheMomentAlone) {
-  Case one(test_plant::small());
-  fixed_step_integrator with(&one.equations, 5e-4);
-  with.advance(one.inputs, 0.01, &one.now);
-  const moment before = one.now;
-  one.inputs.push = {{1e300, 0, 1e300}, {0.02, 0, 0}, 2};
-  try {
-    with.advance(one.inputs, 0.5, &one.now);
-    FAIL() << "expected a solver_error";
-  } catch (const solver_error& failed) {
-    const std::string line = failed.what();
-    EXPECT_NE(line.find("at t = 0.01"), std::string::npos) << line;
-    EXPECT_NE(line.find("try a smaller step"), std::string::npos) << line;
-  }
-  EXPECT_EQ(one.now.time, before.time);
-  EXPECT_EQ(one.now.state, before.state);
-  one.inputs.push.force = {};
-  with.forget();
-  with.advance(one.inputs, 0.02, &one.now);
-  EXPECT_EQ(one.now.time, 0.02);
 }
 
 }  // namespace

@@ -135,21 +135,6 @@ TEST(JointSum, IsTheFiltersAtAnyBlockBoundary) {
   }
 }
 
-TEST(JointSum, BiasMayStartAnywhereInABlock) {
-  constexpr std::size_t columns = 9;
-  for (const std::size_t start : {std::size_t{1}, std::size_t{60}, block_length - 1, block_length, std::size_t{300}}) {
-    const std::vector<Sample> samples = made_samples(600, columns, start, 2 + static_cast<unsigned>(start));
-    VectorXd held = VectorXd::Zero(columns);
-    const MatrixXd expected = recursive(samples, &held);
-    joint_sum joint(columns);
-    MatrixXd sum = MatrixXd::Zero(columns, columns);
-    const joint_segment end = summed(samples, 0, samples.size(), block_length, &joint, &sum);
-    EXPECT_LT(difference(full(sum), expected), 1e-12) << "start " << start;
-    EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12) << "start " << start;
-    EXPECT_EQ(end.kept, 0.0) << "nothing from before the start counts";
-  }
-}
-
 TEST(JointSum, SegmentsJoinToTheWhole) {
   constexpr std::size_t columns = 8;
   const std::vector<Sample> samples = made_samples(1500, columns, 450, 3);
@@ -168,22 +153,6 @@ TEST(JointSum, SegmentsJoinToTheWhole) {
   }
   EXPECT_LT(difference(total, expected), 1e-11);
   EXPECT_LT((held - expected_held).norm() / held.norm(), 1e-12);
-}
-
-TEST(JointSum, BlocksWithoutAUsedSampleKeepTheJumps) {
-  constexpr std::size_t columns = 8;
-  std::vector<Sample> samples = made_samples(700, columns, 0, 4);
-  for (std::size_t k = 100; k < 600; ++k) { /* held out over several blocks */
-    samples[k].row.setZero();
-    samples[k].gain = samples[k].weight = 0.0;
-  }
-  VectorXd held = VectorXd::Zero(columns);
-  const MatrixXd expected = recursive(samples, &held);
-  joint_sum joint(columns);
-  MatrixXd sum = MatrixXd::Zero(columns, columns);
-  const joint_segment end = summed(samples, 0, samples.size(), 64, &joint, &sum);
-  EXPECT_LT(difference(full(sum), expected), 1e-12);
-  EXPECT_LT((end.held - held).norm() / held.norm(), 1e-12);
 }
 
 /* a pass that is stopped leaves a block and a segment unfinished; the next one must not see them */

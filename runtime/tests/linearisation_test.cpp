@@ -108,28 +108,6 @@ TEST(Linearisation, SolvesAsTheDenseMatrixDoes) {
   }
 }
 
-TEST(Linearisation, SolvesForSpeedsAlone) {
-  for (const Json& text : rigs()) {
-    Case one(text);
-    const Eigen::Index size = static_cast<Eigen::Index>(one.state.size());
-    const auto n = static_cast<Eigen::Index>(one.numbers.joint_count());
-    linearisation blocks(one.numbers);
-    for (int trial = 0; trial < 20; ++trial) {
-      one.draw();
-      one.evaluate();
-      blocks.take(one.equations, one.state.data(), one.inputs, rigid_slopes::exact);
-      ASSERT_TRUE(blocks.factor(std::pow(10.0, one.between(-6.0, -3.0))));
-      Eigen::VectorXd all = Eigen::VectorXd::Zero(size), speeds(n);
-      for (Eigen::Index j = 0; j < n; ++j) {
-        all[n + j] = speeds[j] = one.between(-1.0, 1.0);
-      }
-      blocks.solve(all.data());
-      blocks.solve_speeds(speeds.data());
-      EXPECT_LT((all.segment(n, n) - speeds).norm(), 1e-12 * speeds.norm());
-    }
-  }
-}
-
 // Column by column against central differences of the equations.
 TEST(Linearisation, IsTheSlopeOfTheEquations) {
   for (const Json& text : rigs()) {

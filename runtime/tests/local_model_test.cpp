@@ -24,7 +24,6 @@ using tendonfmu::estimation::fit_problem;
 using tendonfmu::estimation::local_model;
 using tendonfmu::estimation::scaled_box;
 using tendonfmu::estimation::unknown_role;
-using Groups = std::vector<std::int32_t>;
 
 /* --- the model of the cost ------------------------------------------------------------------------------------------
  */
@@ -32,10 +31,10 @@ using Groups = std::vector<std::int32_t>;
 /* A finger that expects other numbers than those that made its recording, and its cost around x. */
 class Case {
  public:
-  explicit Case(const Groups* group = nullptr, double prior = 0.0)
+  explicit Case(double prior = 0.0)
       : truth_(made::learnable_finger()),
         image_(made::image_of(guess())),
-        problem_(image_.data(), image_.size(), group ? group->data() : nullptr, nullptr),
+        problem_(image_.data(), image_.size(), nullptr, nullptr),
         box_(problem_.unknowns),
         prior_(prior) {
     made::Recording r = made::made(truth_, 2500, 0.004, 7);
@@ -86,14 +85,9 @@ VectorXd along(const Case& c, Index unknown, double length) {
   return step;
 }
 
-TEST(LocalModel, IsTheCostWhereItStands) {
-  const Case c(nullptr, 0.7);
-  EXPECT_NEAR(c.model().cost(VectorXd::Zero(c.x.size())), c.at.cost, 1e-10 * c.at.cost);
-}
-
 /* e is linear in the friction of a place, and that in all numbers of its law but the rate */
 TEST(LocalModel, IsExactInWhatEntersLinearly) {
-  const Case c(nullptr, 0.7);
+  const Case c(0.7);
   for (const unknown_role role :
        {unknown_role::coulomb, unknown_role::drop, unknown_role::viscous, unknown_role::value}) {
     for (const Index k : c.with(role)) {
@@ -116,70 +110,6 @@ TEST(LocalModel, ErrorFallsWithTheFourthPowerOfAStepInARate) {
     }
   }
   EXPECT_GE(judged, 5u);
-}
-
-/* a rate and the drop in front of it, together; where the fourth power nearly vanishes, the fifth is seen */
-TEST(LocalModel, ErrorFallsSoAlsoWhereTheDropChangesWithTheRate) {
-  const Case c;
-  std::size_t judged = 0;
-  for (std::size_t side = 0; side < c.problem().unknowns.rates().size(); ++side) {
-    const auto [rate, drop] = c.problem().unknowns.rates()[side];
-    const auto error = [&, rate = rate, drop = drop](double length) {
-      return c.error(along(c, rate, length) + along(c, drop, 0.5));
-    };
-    const double whole = error(0.2), half = error(0.1);
-    if (half > 1e-10 * c.at.cost) {
-      EXPECT_GT(whole / half, 12.0) << c.problem().unknowns[static_cast<std::size_t>(rate)].path;
-      ++judged;
-    }
-  }
-  EXPECT_GE(judged, 5u);
-}
-
-/* laws of both joints with one rate; and a drop that is fixed */
-TEST(LocalModel, ErrorFallsSoWhereLawsShareARateOrTheirDropIsFixed) {
-  const Case all;
-  Groups group(all.problem().finger.get()->shape.parameter_count, -1);
-  std::vector<std::uint32_t> rates;
-  for (const Index k : all.with(unknown_role::rate)) {
-    const auto& unknown = all.problem().unknowns[static_cast<std::size_t>(k)];
-    if (unknown.path.find(".friction.stribeck") != std::string::npos) {
-      rates.push_back(unknown.parameters[0]);
-    }
-  }
-  ASSERT_EQ(rates.size(), 2u);
-  for (const std::uint32_t p : rates) {
-    group[p] = 0;
-  }
-  const Case shared(&group);
-  ASSERT_EQ(shared.problem().unknowns.count(), 1u);
-  const double whole = shared.error(along(shared, 0, 0.2)), half = shared.error(along(shared, 0, 0.1));
-  EXPECT_GT(whole / half, 12.0);
-  EXPECT_LT(whole / half, 24.0);
-}
-
-TEST(LocalModel, ItsBestStepStaysInTheBoxAndNothingNearIsBetter) {
-  const Case c(nullptr, 1.0);
-  const local_model model = c.model();
-  const scaled_box around = c.box().around(c.x, 0.8);
-  const VectorXd best = model.best_step(around, 1e-6);
-  const double least = model.cost(best);
-  const double gained = c.at.cost - least;
-  EXPECT_GT(gained, 50.0);
-  EXPECT_NEAR(c.cost(best), least, 0.05 * gained) << "the cost itself falls as the model says";
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
-  for (int trial = 0; trial < 300; ++trial) {
-    VectorXd other(c.x.size());
-    const double length = std::pow(10.0, -3.0 + trial % 4);
-    for (Index k = 0; k < other.size(); ++k) {
-      other[k] = best[k] + length * normal(random);
-    }
-    other = around.clip(c.x + other) - c.x;
-    EXPECT_GT(model.cost(other), least - 0.02 * gained);
-  }
-  const VectorXd there = c.x + best;
-  EXPECT_LT((around.clip(there) - there).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 /* --- a step within a box --------------------------------------------------------------------------------------------
@@ -263,13 +193,6 @@ TEST(BoxedStep, IsTheBestOfAllActiveSets) {
     const double least = least_by_brute_force(q);
     ASSERT_NEAR(q.at(d), least, 1e-9 * (1.0 + std::fabs(least))) << "trial " << trial;
   }
-}
-
-TEST(BoxedStep, MovesNothingWhereEverythingIsHeld) {
-  std::mt19937_64 random(12);
-  Parabola q = random_parabola(4, &random);
-  q.box.lower = q.box.upper = q.x;
-  EXPECT_EQ(boxed_step(q.h, q.g, q.x, q.box), VectorXd::Zero(4));
 }
 
 /* an unknown that nothing depends on, and two that only their sum shows: without a prior h is singular */

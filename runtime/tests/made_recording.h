@@ -70,16 +70,9 @@ struct Recording {
 inline Recording moved(std::size_t joints, std::size_t tendons, std::size_t samples, double step, unsigned seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  Recording r{samples,
-              joints,
-              tendons,
-              Numbers(samples),
-              Numbers(samples * tendons),
-              Numbers(samples * joints),
-              Numbers(samples * joints),
-              Numbers(samples * joints),
-              Numbers(samples * joints),
-              std::vector<unsigned char>(samples, 1)};
+  Recording r{samples, joints, tendons, Numbers(samples), Numbers(samples * tendons), {}, {}, {}, {}, {}};
+  r.angle = r.velocity = r.external = r.bias = Numbers(samples * joints);
+  r.use.assign(samples, 1);
   for (std::size_t k = 0; k < samples; ++k) {
     r.time[k] = step * static_cast<double>(k);
   }

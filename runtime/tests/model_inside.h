@@ -26,18 +26,6 @@ struct Model {
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  std::vector<model_item> items() const {
-    std::vector<model_item> list;
-    model_visit(
-        &shape,
-        [](void* context, const model_item* item) {
-          static_cast<std::vector<model_item>*>(context)->push_back(*item);
-          return 0;
-        },
-        &list);
-    return list;
-  }
-
   std::vector<unsigned char> written() const {
     std::vector<unsigned char> image(model_image_size(&shape));
     model_write(&shape, values.data(), image.data());

@@ -82,29 +82,6 @@ void expect_penrose(const Matrix& a, const Matrix& b, double tolerance) {
   EXPECT_LT(distance(transposed(b * a), b * a), tolerance);
 }
 
-TEST(PseudoInverse, OfOneNumberIsItsReciprocal) {
-  std::size_t rank = 0;
-  EXPECT_DOUBLE_EQ(inverse(Matrix(1, 1, {0.009}), &rank)(0, 0), 1.0 / 0.009);
-  EXPECT_EQ(rank, 1u);
-}
-
-TEST(PseudoInverse, OfAnInvertibleMatrixIsItsInverse) {
-  const Matrix b = inverse(Matrix(2, 2, {2.0, 1.0, 1.0, 1.0}));
-  EXPECT_LT(distance(b, Matrix(2, 2, {1.0, -1.0, -1.0, 2.0})), 1e-15);
-}
-
-TEST(PseudoInverse, OfAColumnIsItsTransposeOverItsSquare) {
-  const Matrix b = inverse(Matrix(3, 1, {0.01, -0.02, 0.02}));
-  EXPECT_LT(distance(b, Matrix(1, 3, {0.01 / 9e-4, -0.02 / 9e-4, 0.02 / 9e-4})), 1e-13);
-}
-
-TEST(PseudoInverse, FindsTheJointAnglesOfAnAntagonisticPair) {
-  // two tendons pull on one joint with equal and opposite arms: q is the mean of what each says
-  const Matrix b = inverse(Matrix(2, 1, {0.008, -0.008}));
-  EXPECT_NEAR(b(0, 0), 62.5, 1e-12);
-  EXPECT_NEAR(b(0, 1), -62.5, 1e-12);
-}
-
 TEST(PseudoInverse, KeepsPenrosesConditionsForRandomMatricesOfEverySize) {
   std::mt19937_64 random(11);
   for (const std::size_t columns : {1, 2, 3, 4, 8, 16}) {
@@ -115,62 +92,6 @@ TEST(PseudoInverse, KeepsPenrosesConditionsForRandomMatricesOfEverySize) {
       expect_penrose(a, b, 1e-10);
     }
   }
-}
-
-TEST(PseudoInverse, IsIndifferentToUnits) {
-  std::mt19937_64 random(12);
-  for (const double unit : {1e-9, 1e-3, 1e3}) {
-    Matrix a = random_matrix(8, 4, random);
-    const Matrix expected = inverse(a);
-    for (double& x : a.a) {
-      x *= unit;
-    }
-    Matrix b = inverse(a);
-    for (double& x : b.a) {
-      x *= unit;
-    }
-    EXPECT_LT(distance(b, expected), 1e-13 * expected.largest());
-  }
-}
-
-TEST(PseudoInverse, OfColumnsOfDifferentScaleStaysAccurate) {
-  // D scales columns: (A·D)⁺ = D⁻¹·A⁺ for full column rank, and one-sided Jacobi keeps each row's relative accuracy
-  std::mt19937_64 random(13);
-  const Matrix a = random_matrix(12, 3, random), b = inverse(a);
-  const double scale[3] = {1.0, 1e-5, 1e-10};
-  Matrix scaled = a;
-  for (std::size_t i = 0; i < 12; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      scaled(i, j) *= scale[j];
-    }
-  }
-  std::size_t rank = 0;
-  const Matrix c = inverse(scaled, &rank);
-  EXPECT_EQ(rank, 3u);
-  for (std::size_t j = 0; j < 3; ++j) {
-    for (std::size_t i = 0; i < 12; ++i) {
-      EXPECT_NEAR(c(j, i) * scale[j], b(j, i), 1e-12 * b.largest());
-    }
-  }
-}
-
-TEST(PseudoInverse, OfAnIllConditionedMatrixStillMapsBack) {
-  // Vandermonde matrix of 6 columns, condition about 1e5
-  Matrix a(10, 6);
-  for (std::size_t i = 0; i < 10; ++i) {
-    for (std::size_t j = 0; j < 6; ++j) {
-      a(i, j) = std::pow(0.1 * static_cast<double>(i + 1), static_cast<double>(j));
-    }
-  }
-  std::size_t rank = 0;
-  const Matrix b = inverse(a, &rank);
-  EXPECT_EQ(rank, 6u);
-  Matrix identity(6, 6);
-  for (std::size_t j = 0; j < 6; ++j) {
-    identity(j, j) = 1.0;
-  }
-  EXPECT_LT(distance(b * a, identity), 1e-9);
-  EXPECT_LT(distance(a * b * a, a), 1e-10);
 }
 
 TEST(PseudoInverse, CountsExactlyDependentColumnsOut) {
@@ -187,40 +108,11 @@ TEST(PseudoInverse, CountsExactlyDependentColumnsOut) {
   }
 }
 
-TEST(PseudoInverse, OfATallProductOfLowRankKeepsPenrosesConditions) {
-  std::mt19937_64 random(15);
-  Matrix left = random_matrix(8, 2, random), right = random_matrix(2, 4, random);
-  for (double& x : left.a) {
-    x = std::round(4.0 * x); /* small integers: the product is exact */
-  }
-  for (double& x : right.a) {
-    x = std::round(4.0 * x);
-  }
-  const Matrix a = left * right;
-  expect_penrose(a, inverse(a), 1e-10);
-}
-
-TEST(PseudoInverse, OfAZeroColumnHasAZeroRow) {
-  const Matrix a(3, 2, {1.0, 0.0, 2.0, 0.0, 2.0, 0.0});
-  std::size_t rank = 0;
-  const Matrix b = inverse(a, &rank);
-  EXPECT_EQ(rank, 1u);
-  EXPECT_LT(distance(b, Matrix(2, 3, {1.0 / 9, 2.0 / 9, 2.0 / 9, 0, 0, 0})), 1e-16);
-}
-
 TEST(PseudoInverse, OfZerosIsZeroOfRankZero) {
   std::size_t rank = 9;
   const Matrix b = inverse(Matrix(4, 3), &rank);
   EXPECT_EQ(rank, 0u);
   EXPECT_EQ(b.largest(), 0.0);
-}
-
-TEST(PseudoInverse, OfFewerTendonsThanJointsHasTheRankOfTheTendons) {
-  std::mt19937_64 random(16);
-  std::size_t rank = 0;
-  const Matrix a = random_matrix(2, 4, random), b = inverse(a, &rank);
-  EXPECT_EQ(rank, 2u);
-  expect_penrose(a, b, 1e-12);
 }
 
 }  // namespace

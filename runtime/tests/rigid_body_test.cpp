@@ -56,25 +56,6 @@ TEST_F(RigidBody, KineticEnergyIsHalfOfSpeedMassSpeed) {
   }
 }
 
-// Torques of unit accelerations, less those of none, are the columns of the mass matrix.
-TEST_F(RigidBody, InverseDynamicsHasTheMassMatrix) {
-  for (int trial = 0; trial < 50; ++trial) {
-    draw();
-    const chain_motion<double> motion = moved();
-    double mass[max_joints * max_joints], rest[max_joints] = {}, without[max_joints];
-    mass_matrix(small, motion, mass);
-    inverse_dynamics(small, motion, speed, rest, without);
-    for (std::size_t k = 0; k < n; ++k) {
-      double unit[max_joints] = {}, with[max_joints];
-      unit[k] = 1.0;
-      inverse_dynamics(small, motion, speed, unit, with);
-      for (std::size_t j = 0; j < n; ++j) {
-        EXPECT_NEAR(with[j] - without[j], mass[j * n + k], 1e-15);
-      }
-    }
-  }
-}
-
 // dT/dt + dV/dt = torque · q̇ for any acceleration: holds for velocity terms and gravity together.
 TEST_F(RigidBody, PowerOfTheTorquesIsTheGrowthOfEnergy) {
   std::uniform_real_distribution<double> any(-50.0, 50.0);
@@ -91,77 +72,6 @@ TEST_F(RigidBody, PowerOfTheTorquesIsTheGrowthOfEnergy) {
     const double h = 1e-5;
     const double growth = (energy_after(h, acceleration) - energy_after(-h, acceleration)) / (2 * h);
     EXPECT_NEAR(power, growth, 1e-6 * (1.0 + std::fabs(power)));
-  }
-}
-
-// A force does work on a point as its torques do on the joints.
-TEST_F(RigidBody, ForceAtAPointTurnsTheJointsByTheJacobian) {
-  const three point = {0.02, -0.01, 0.005};
-  const vector3<double> force = {0.7, -1.1, 0.4};
-  for (int trial = 0; trial < 50; ++trial) {
-    draw();
-    const chain_motion<double> motion = moved();
-    for (std::size_t link = 0; link < n; ++link) {
-      const point_motion<double> at = move_point(motion.links[link], point);
-      double torque[max_joints] = {}, power = 0.0;
-      add_torque_of_force(motion, link, at.place, force, torque);
-      for (std::size_t j = 0; j < n; ++j) {
-        power += torque[j] * speed[j];
-      }
-      EXPECT_NEAR(power, dot(force, at.velocity), 1e-14);
-      for (std::size_t j = link + 1; j < n; ++j) {
-        EXPECT_EQ(torque[j], 0.0);
-      }
-    }
-  }
-}
-
-TEST_F(RigidBody, VelocitiesAreTheGrowthOfPlaces) {
-  const three point = {0.02, -0.01, 0.005};
-  const double none[max_joints] = {}, h = 1e-6;
-  for (int trial = 0; trial < 20; ++trial) {
-    draw();
-    const vector3<double> velocity = move_point(moved().links[n - 1], point).velocity;
-    vector3<double> place[2];
-    for (const int side : {0, 1}) {
-      double angle[max_joints];
-      for (std::size_t j = 0; j < n; ++j) {
-        angle[j] = q[j] + (side ? h : -h) * speed[j];
-      }
-      chain_motion<double> motion;
-      move_chain(small, angle, none, &motion);
-      place[side] = move_point(motion.links[n - 1], point).place;
-    }
-    const vector3<double> apart = place[1] - place[0];
-    EXPECT_NEAR(velocity.x, apart.x / (2 * h), 1e-8);
-    EXPECT_NEAR(velocity.y, apart.y / (2 * h), 1e-8);
-    EXPECT_NEAR(velocity.z, apart.z / (2 * h), 1e-8);
-  }
-}
-
-// Over duals the same formulas give the same values, and slopes along a direction.
-TEST_F(RigidBody, DualsAgreeWithNumbers) {
-  using One = dual<1>;
-  draw();
-  One angle[max_joints], rate[max_joints], torque[max_joints];
-  for (std::size_t j = 0; j < n; ++j) {
-    angle[j] = One(q[j]);
-    rate[j] = One(speed[j]);
-  }
-  angle[1].slope[0] = 1.0;
-  const double acceleration[max_joints] = {3.0, -2.0, 1.0}, h = 1e-6;
-  chain_motion<One> motion;
-  move_chain(small, angle, rate, &motion);
-  inverse_dynamics(small, motion, rate, acceleration, torque);
-  double before[max_joints], after[max_joints], same[max_joints];
-  inverse_dynamics(small, moved(), speed, acceleration, same);
-  q[1] += h;
-  inverse_dynamics(small, moved(), speed, acceleration, after);
-  q[1] -= 2 * h;
-  inverse_dynamics(small, moved(), speed, acceleration, before);
-  for (std::size_t j = 0; j < n; ++j) {
-    EXPECT_EQ(torque[j].value, same[j]);
-    EXPECT_NEAR(torque[j].slope[0], (after[j] - before[j]) / (2 * h), 1e-8);
   }
 }
 

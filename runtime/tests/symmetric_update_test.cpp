@@ -47,11 +47,6 @@ std::vector<double> some_triangle(std::size_t p, unsigned seed) {
   return lower;
 }
 
-/* a sum of `count` products of size one, each rounded once or twice */
-double allowance(std::size_t count) {
-  return 1e-15 * static_cast<double>(count + 10);
-}
-
 struct Size {
   std::size_t p, k, stride;
 };
@@ -72,69 +67,71 @@ class SymmetricUpdateTest : public testing::TestWithParam<int> {
   const symmetric_update* kernel_ = nullptr;
 };
 
+/* Rows of sums over term(row, column, s), s < count, beside what was there; NaN is left as it was. */
+template <class Term>
+void expect_sums(const std::vector<double>& found, std::size_t stride, const std::vector<double>& before,
+                 std::size_t count, Term term) {
+  ASSERT_EQ(found.size(), before.size());
+  const double allowance =
+      1e-15 * static_cast<double>(count + 10);  // each product of size one is rounded once or twice
+  for (std::size_t at = 0; at < found.size(); ++at) {
+    if (std::isnan(before[at])) {
+      ASSERT_TRUE(std::isnan(found[at])) << at;
+      continue;
+    }
+    long double expected = before[at];
+    for (std::size_t s = 0; s < count; ++s) {
+      expected += term(at / stride, at % stride, s);
+    }
+    ASSERT_NEAR(found[at], static_cast<double>(expected), allowance) << at / stride << ", " << at % stride;
+  }
+}
+
+/* what is written, whatever was there */
+std::vector<double> zeros(std::size_t k, std::size_t p, std::size_t stride) {
+  std::vector<double> rows = some_rows(k, p, stride, 1);
+  for (double& x : rows) {
+    x = std::isnan(x) ? x : 0.0;
+  }
+  return rows;
+}
+
 TEST_P(SymmetricUpdateTest, AddsOuterProductsToTheLowerTriangleAlone) {
   for (const auto& [p, k, stride] : sizes) {
     const std::vector<double> rows = some_rows(k, p, stride, 1), before = some_triangle(p, 2);
     std::vector<double> after = before;
     kernel_->add_outer_products(after.data(), p, rows.data(), k, stride, -0.75);
-    for (std::size_t j = 0; j < p; ++j) {
-      for (std::size_t i = 0; i < p; ++i) {
-        if (i < j) {
-          ASSERT_TRUE(std::isnan(after[j * p + i])) << p << " " << i << " " << j;
-          continue;
-        }
-        long double expected = before[j * p + i];
-        for (std::size_t r = 0; r < k; ++r) {
-          expected -= 0.75L * rows[r * stride + i] * rows[r * stride + j];
-        }
-        ASSERT_NEAR(after[j * p + i], static_cast<double>(expected), allowance(k)) << p << " " << i << " " << j;
-      }
-    }
+    expect_sums(after, p, before, k, [&, stride = stride](std::size_t j, std::size_t i, std::size_t r) {
+      return -0.75L * rows[r * stride + i] * rows[r * stride + j];
+    });
   }
 }
 
 TEST_P(SymmetricUpdateTest, MultipliesByTheWholeSymmetricMatrix) {
   for (const auto& [p, k, stride] : sizes) {
-    std::vector<double> rows = some_rows(k, p, stride, 3);
-    for (std::size_t i = 0; i < p; i += 3) {  // columns of zeros, as of parameters that do not matter at present
-      for (std::size_t r = 0; r < k; ++r) {
-        rows[r * stride + i] = 0.0;
-      }
+    std::vector<double> rows = some_rows(k, p, stride, 3), product(k * (p + 2), untouched);
+    for (std::size_t at = 0; at < rows.size(); ++at) {  // columns of zeros, as of parameters that do not matter
+      rows[at] = at % stride % 3 || std::isnan(rows[at]) ? rows[at] : 0.0;
     }
     const std::vector<double> lower = some_triangle(p, 4);
-    const std::size_t product_stride = p + 2;
-    std::vector<double> product(k * product_stride, untouched);
-    kernel_->multiply_symmetric(product.data(), product_stride, lower.data(), p, rows.data(), k, stride);
-    for (std::size_t r = 0; r < k; ++r) {
-      for (std::size_t i = 0; i < p; ++i) {
-        long double expected = 0.0L;
-        for (std::size_t c = 0; c < p; ++c) {
-          expected += static_cast<long double>(rows[r * stride + c]) * lower[std::min(i, c) * p + std::max(i, c)];
-        }
-        ASSERT_NEAR(product[r * product_stride + i], static_cast<double>(expected), allowance(p)) << p << " " << i;
-      }
-      ASSERT_TRUE(std::isnan(product[r * product_stride + p]));
-    }
+    kernel_->multiply_symmetric(product.data(), p + 2, lower.data(), p, rows.data(), k, stride);
+    expect_sums(product, p + 2, zeros(k, p, p + 2), p,
+                [&, p = p, stride = stride](std::size_t r, std::size_t i, std::size_t c) {
+                  return static_cast<long double>(rows[r * stride + c]) * lower[std::min(i, c) * p + std::max(i, c)];
+                });
   }
 }
 
 TEST_P(SymmetricUpdateTest, AddsWeightedRows) {
   for (const auto& [p, k, stride] : sizes) {
-    for (const std::size_t a : {std::size_t{1}, std::size_t{7}, std::size_t{50}}) {
+    for (const std::size_t a : {1, 7, 50}) {
       const std::vector<double> rows = some_rows(k, p, stride, 9), weights = some_rows(a, k, k + 1, 10);
       const std::vector<double> before = some_rows(a, p, p + 3, 11);
       std::vector<double> after = before;
       kernel_->add_weighted_rows(after.data(), p + 3, a, weights.data(), k + 1, rows.data(), k, stride, p, -2.0);
-      for (std::size_t r = 0; r < a; ++r) {
-        for (std::size_t i = 0; i < p; ++i) {
-          long double expected = before[r * (p + 3) + i];
-          for (std::size_t s = 0; s < k; ++s) {
-            expected -= 2.0L * weights[r * (k + 1) + s] * rows[s * stride + i];
-          }
-          ASSERT_NEAR(after[r * (p + 3) + i], static_cast<double>(expected), allowance(k)) << p << " " << a;
-        }
-        ASSERT_TRUE(std::isnan(after[r * (p + 3) + p]));
-      }
+      expect_sums(after, p + 3, before, k, [&, k = k, stride = stride](std::size_t r, std::size_t i, std::size_t s) {
+        return -2.0L * weights[r * (k + 1) + s] * rows[s * stride + i];
+      });
     }
   }
 }
@@ -142,23 +139,16 @@ TEST_P(SymmetricUpdateTest, AddsWeightedRows) {
 TEST_P(SymmetricUpdateTest, MultipliesRowsByRows) {
   for (const auto& [p, k, stride] : sizes) {
     const std::size_t a = std::min<std::size_t>(k, 61);
-    std::vector<double> left = some_rows(a, p, stride, 12);
+    std::vector<double> left = some_rows(a, p, stride, 12), product(a * (k + 1), untouched);
     for (std::size_t r = 0; r < a; ++r) {
       left[r * stride + p / 2] = 0.0;
     }
     const std::vector<double> right = some_rows(k, p, p, 13);
-    std::vector<double> product(a * (k + 1), untouched);
     kernel_->multiply_transposed(product.data(), k + 1, left.data(), a, stride, right.data(), k, p, p);
-    for (std::size_t r = 0; r < a; ++r) {
-      for (std::size_t s = 0; s < k; ++s) {
-        long double expected = 0.0L;
-        for (std::size_t i = 0; i < p; ++i) {
-          expected += static_cast<long double>(left[r * stride + i]) * right[s * p + i];
-        }
-        ASSERT_NEAR(product[r * (k + 1) + s], static_cast<double>(expected), allowance(p)) << p << " " << r << " " << s;
-      }
-      ASSERT_TRUE(std::isnan(product[r * (k + 1) + k]));
-    }
+    expect_sums(product, k + 1, zeros(a, k, k + 1), p,
+                [&, p = p, stride = stride](std::size_t r, std::size_t s, std::size_t i) {
+                  return static_cast<long double>(left[r * stride + i]) * right[s * p + i];
+                });
   }
 }
 
@@ -176,17 +166,6 @@ TEST_P(SymmetricUpdateTest, GivesTheSameBitsForAPartAsForTheWhole) {
       const double* expected = whole.data() + (j + first) * p + j + first;
       ASSERT_EQ(std::memcmp(part.data() + j * q + j, expected, (q - j) * sizeof(double)), 0) << first << " " << j;
     }
-  }
-}
-
-TEST_P(SymmetricUpdateTest, DoesNothingForNoRowsAndZeroRows) {
-  std::vector<double> lower = some_triangle(5, 6), product(10, untouched);
-  const std::vector<double> before = lower, zeros(10, 0.0);
-  kernel_->add_outer_products(lower.data(), 5, zeros.data(), 0, 5, 1.0);
-  EXPECT_EQ(std::memcmp(lower.data(), before.data(), sizeof(double) * lower.size()), 0);
-  kernel_->multiply_symmetric(product.data(), 5, lower.data(), 5, zeros.data(), 2, 5);
-  for (const double x : product) {
-    EXPECT_EQ(x, 0.0);
   }
 }
 

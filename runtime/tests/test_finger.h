@@ -4,10 +4,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tendonfmu_description.h"
+#include "tendonfmu_outputs.hpp"
 
 namespace test_finger {
 
@@ -35,23 +38,26 @@ inline const char* const json = R"({
   "contact": {"threshold": [0.04, 0.04], "threshold_per_force": [1e-4, 1e-4]},
   "extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.01}]})";
 
+inline const std::string name = "\"name\": \"test\",";
+
+inline void put(std::string& text, const std::string& after, const std::string& added) {
+  text.insert(text.find(after) + after.size(), added);
+}
+
 // The same with every optional key of the detection. Two joints in contact by turns, released after a while; what
 // is not known of the friction differs between them.
 inline std::string every_key() {
   std::string text = json;
-  const auto put = [&](const std::string& after, const std::string& added) {
-    text.insert(text.find(after) + after.size(), added);
-  };
-  put("\"velocity_threshold\": {", "\"hysteresis\": 0.3, ");
-  put("\"bias\": {", R"("forgetting": "absorption", "entry_load": true, "start_share": 0.5, )");
-  put("\"contact\": {", R"("method": "cusum",
+  put(text, "\"velocity_threshold\": {", "\"hysteresis\": 0.3, ");
+  put(text, "\"bias\": {", R"("forgetting": "absorption", "entry_load": true, "start_share": 0.5, )");
+  put(text, "\"contact\": {", R"("method": "cusum",
     "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
     "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},
     "uncertainty": [[[0.1, 0.05, -0.1, 0.2, 0.3, 0.1], [0, 0.1, 0, 0, 0, 0.2]], [[0.1, 0.1, 0.1, 0.1, 0, 0]]],
     "uncertainty_level": 2, "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5],
     "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15,
     "drift": {"quick_time": 0.05, "slow_time": 0.4, "threshold": [0.05, 0.04], "threshold_per_force": [1e-4, 2e-4]}, )");
-  put("\"name\": \"test\",", R"("links": [{"axis": [0, 0, 2]}, {"axis": [0, 1, 0.2], "offset": [0.05, 0, 0]}],
+  put(text, name, R"("links": [{"axis": [0, 0, 2]}, {"axis": [0, 1, 0.2], "offset": [0.05, 0, 0]}],
     "tip": [0.03, 0, 0.004],)");
   return text;
 }
@@ -59,18 +65,15 @@ inline std::string every_key() {
 // The same, with sensors that are watched.
 inline std::string watched_sensors() {
   std::string text = every_key();
-  const std::string name = "\"name\": \"test\",";
-  text.insert(text.find(name) + name.size(), R"("sensor_fault": {"jump_margin": 0.5, "recovery_time": 0.05},)");
+  put(text, name, R"("sensor_fault": {"jump_margin": 0.5, "recovery_time": 0.05},)");
   return text;
 }
 
 // And with a position filter and every effect of `extensions`, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
-  const std::string name = "\"name\": \"test\",";
-  text.insert(text.find(name) + name.size(), R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)");
-  const std::string list = "\"extensions\": [";
-  text.insert(text.find(list) + list.size(), R"({"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
+  put(text, name, R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)");
+  put(text, "\"extensions\": [", R"({"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
     {"effect": "inertia", "joint": 1, "inertia": 1e-4}, {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05},
     {"effect": "preload_friction", "tendon": 1, "coulomb": 0.4},
     {"effect": "preload_friction", "joint": 2, "tendon": 2, "coulomb": 0.4},
@@ -107,6 +110,16 @@ inline std::vector<unsigned char> image(const std::string& text = json) {
   std::vector<unsigned char> copy(bytes, bytes + size);
   tendonfmu_free_image(block);
   return copy;
+}
+
+// The fingers that every promise of tendonfmu.h is tried on: the paper's, with every key beyond it, with watched
+// sensors, with every effect.
+enum Kind { paper, detecting, watching, extended, kinds };
+
+inline const std::vector<unsigned char>& image_of(int kind) {
+  static const std::vector<unsigned char> images[kinds] = {image(), image(every_key()), image(watched_sensors()),
+                                                           image(every_effect())};
+  return images[kind];
 }
 
 // Inputs of a motion with reversals, rests and two pushes; row-major as tendonfmu_run() takes them.
@@ -151,61 +164,37 @@ struct Motion {
   tendonfmu_inputs all() const { return row(0); }
 };
 
-// Room for the outputs of a run.
+// Room for all outputs of some samples, by the names of tendonfmu_outputs. What is not written stays NaN, 9, -9.
 struct Outputs {
-  std::vector<double> compensated, torque, friction, bias, angle, speed;
-  std::vector<double> deviation, residual, innovation, stuck, jump, drift, parts, tip_force, tip_std, misfit;
-  std::vector<unsigned char> joint_contact, contact, slack, observable;
-  std::vector<int> link;
+  template <class Number>
+  using Rows = std::map<std::string_view, std::vector<Number>>;
 
-  explicit Outputs(std::size_t samples) {
-    for (auto* row : {&compensated, &torque, &friction, &bias, &angle, &speed, &deviation, &residual, &innovation,
-                      &stuck, &jump, &drift}) {
-      row->assign(samples * joints, NAN);
-    }
-    parts.assign(samples * joints * (tendons + 3), NAN);
-    for (auto* row : {&tip_force, &tip_std}) {
-      row->assign(samples * 3, NAN);
-    }
-    misfit.assign(samples, NAN);
-    observable.assign(samples, 9);
-    link.assign(samples, -9);
-    joint_contact.assign(samples * joints, 9);
-    contact.assign(samples, 9);
-    slack.assign(samples * tendons, 9);
+  Rows<double> real;
+  Rows<unsigned char> flag;
+  Rows<int> whole;
+
+  explicit Outputs(std::size_t samples, std::size_t n = joints, std::size_t m = tendons) {
+    tendonfmu_outputs unused = {};
+    tendonfmu::detail::for_each_output({}, unused, n, m, [&](const char* name, auto, auto* array, std::size_t size) {
+      rows(array)[name].assign(samples * size, unwritten(array));
+    });
   }
   tendonfmu_outputs view() {
-    tendonfmu_outputs outputs = {};
-    outputs.compensated_torque = compensated.data();
-    outputs.joint_torque = torque.data();
-    outputs.friction_torque = friction.data();
-    outputs.bias_torque = bias.data();
-    outputs.joint_angle = angle.data();
-    outputs.joint_speed = speed.data();
-    outputs.joint_contact = joint_contact.data();
-    outputs.contact = contact.data();
-    outputs.slack = slack.data();
-    outputs.compensated_torque_std = deviation.data();
-    outputs.residual = residual.data();
-    outputs.innovation = innovation.data();
-    outputs.stuck_friction = stuck.data();
-    outputs.friction_jump = jump.data();
-    outputs.drift = drift.data();
-    outputs.friction_parts = parts.data();
-    outputs.fingertip_force = tip_force.data();
-    outputs.fingertip_force_std = tip_std.data();
-    outputs.fingertip_force_observable = observable.data();
-    outputs.fingertip_force_misfit = misfit.data();
-    outputs.contact_link = link.data();
-    return outputs;
+    tendonfmu_outputs all = {};
+    tendonfmu::detail::for_each_output(
+        {}, all, joints, tendons,
+        [&](const char* name, auto, auto*& array, std::size_t) { array = rows(array).at(name).data(); });
+    return all;
   }
-  bool operator==(const Outputs& o) const {
-    return compensated == o.compensated && torque == o.torque && friction == o.friction && bias == o.bias &&
-           angle == o.angle && speed == o.speed && joint_contact == o.joint_contact && contact == o.contact &&
-           slack == o.slack && deviation == o.deviation && residual == o.residual && innovation == o.innovation &&
-           stuck == o.stuck && jump == o.jump && drift == o.drift && parts == o.parts && tip_force == o.tip_force &&
-           tip_std == o.tip_std && misfit == o.misfit && observable == o.observable && link == o.link;
-  }
+  bool operator==(const Outputs& o) const { return real == o.real && flag == o.flag && whole == o.whole; }
+
+ private:
+  Rows<double>& rows(const double*) { return real; }
+  Rows<unsigned char>& rows(const unsigned char*) { return flag; }
+  Rows<int>& rows(const int*) { return whole; }
+  static double unwritten(const double*) { return NAN; }
+  static unsigned char unwritten(const unsigned char*) { return 9; }
+  static int unwritten(const int*) { return -9; }
 };
 
 // A created finger that frees itself.
@@ -225,11 +214,41 @@ struct Finger {
   Finger& operator=(const Finger&) = delete;
   operator tendonfmu_finger*() const { return handle; }
 
+  // the first sample, or one more
+  tendonfmu_status take(double time, const tendonfmu_inputs& inputs) const {
+    return tendonfmu_is_initialised(handle) ? tendonfmu_step(handle, time, &inputs)
+                                            : tendonfmu_initialise(handle, time, &inputs);
+  }
+  // samples from..to of a motion
+  Outputs run(const Motion& motion, std::size_t from, std::size_t to) const {
+    Outputs outputs(to - from);
+    const tendonfmu_outputs view = outputs.view();
+    const tendonfmu_inputs inputs = motion.row(from);
+    if (tendonfmu_run(handle, to - from, &motion.time[from], &inputs, &view, nullptr) != TENDONFMU_OK) {
+      std::fprintf(stderr, "sample refused: %s\n", tendonfmu_last_error(handle));
+      std::abort();
+    }
+    return outputs;
+  }
+  Outputs run(const Motion& motion) const { return run(motion, 0, motion.time.size()); }
+
   std::vector<unsigned char> saved() const {
     std::vector<unsigned char> bytes(tendonfmu_state_size(handle));
     tendonfmu_save_state(handle, bytes.data(), bytes.size());
     return bytes;
   }
 };
+
+// Those that this processor has.
+inline std::vector<const char*> kernels() {
+  const Finger finger;
+  std::vector<const char*> found;
+  for (const char* kernel : {"plain", "sse2", "avx2"}) {
+    if (tendonfmu_set_kernel(finger, kernel) == TENDONFMU_OK) {
+      found.push_back(kernel);
+    }
+  }
+  return found;
+}
 
 }  // namespace test_finger

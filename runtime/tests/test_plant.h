@@ -69,6 +69,32 @@ inline Json plain(std::size_t joints, std::size_t tendons) {
   return rig;
 }
 
+/* As many joints and tendons as there may be, with every kind of effect. */
+inline Json largest() {
+  Json rig = plain(16, 64);
+  const Json law = {{"static", 0.003}, {"coulomb", 0.002}, {"stribeck_velocity", 0.005}};
+  const Json weak = {{"static", 1e-4}, {"coulomb", 1e-4}, {"stribeck_velocity", 0.1}};
+  for (Json& tendon : rig["finger"]["tendons"]) {
+    for (int j = 0; j < 16; ++j) {
+      tendon["edge_friction"].push_back(law);
+      if (j < 15) {
+        tendon["pulley_friction"].push_back(law);
+      }
+    }
+  }
+  for (Json& joint : rig["finger"]["joints"]) {
+    joint = {{"friction", weak}, {"load_friction", {{"static", 1e-6}, {"coulomb", 1e-6}, {"stribeck_velocity", 0.1}}}};
+  }
+  rig["physics"]["wrist"] = {
+      {"amplitude", 0.1}, {"period", 5}, {"arms", std::vector<double>(64, 0.001)}, {"friction", law}};
+  rig["physics"]["friction"] = {
+      {"heat", {{"coefficient", 0.01}}},
+      {"edges", {{{"tendon", 64}, {"joint", 16}, {"shape", "sine"}, {"rest", 0.5}, {"coefficient", 0.01}}}}};
+  rig["physics"]["obstacle"] = {{"centre", {0.64, 0, 0}}, {"radius", 0.01}, {"stiffness", 100}};
+  rig["physics"]["joint_coupling"] = std::vector<double>(15, 0.01);
+  return rig;
+}
+
 /* A plant that frees itself. */
 struct Plant {
   tendonfmu_plant* handle;
