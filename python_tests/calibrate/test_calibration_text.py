@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from tendonfmu.calibration.report import left_out
-from tendonfmu.calibration.text import size_rows, tiles, verdict
+from tendonfmu.calibration.text import size_rows, verdict
 from tendonfmu.report.numbers import together
 
 
@@ -45,13 +45,6 @@ def test_the_verdict_is_one_sentence_with_the_figures() -> None:
     assert tone == "bad" and "no better" in sentence
     tone, sentence = verdict(report(0.0065, 0.006, 0, 5.33))
     assert tone == "" and "larger at pip at 20 N: 6.50 before, 9.00 now" in sentence
-
-
-def test_tiles_show_the_worst_joint() -> None:
-    values = list(tiles(report(0.0142, 0.00614, 3, None)))
-    assert values[0][0] == "14.2 → 6.14" and values[1][0] == "14.2 → 9.21" and "pip at 20 N" in values[1][2]
-    assert values[2][:2] == ("0", "in 27 min") and "tuned for 6 an hour on 100 min of other motion" in values[2][2]
-    assert values[3][0] == "20.0" and "at pip" in values[3][2]
 
 
 def test_pushes_are_told_by_size() -> None:
