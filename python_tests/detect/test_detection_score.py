@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.detect.counting import Signals, pooled, score_detection, stretches
+from tendonfmu.detect.counting import Signals, pooled, score_detection
 from tendonfmu.detect.summary import roc, summarise
 from tendonfmu.statistics.intervals import RESAMPLES, of_sums, quantile, rate, share
 
@@ -130,13 +130,6 @@ def test_a_gap_in_time_is_no_free_time_and_one_sample_is_no_error() -> None:
     assert (len(one.events), one.missed, one.free_seconds) == (1, 1, 0.0)
 
 
-def test_stretches_of_uneven_samples() -> None:
-    time = np.array([0.0, 0.05, 0.3, 0.31, 0.35, 0.36, 1.0])
-    found = stretches(time, np.array([1, 0, 1, 0, 0, 1, 1], bool))
-    assert found.tolist() == [[0, 0], [2, 6]]
-    assert stretches(time, np.zeros(7, bool)).shape == (0, 2)
-
-
 # --- torque -----------------------------------------------------------------------------------------------------------
 
 
@@ -164,15 +157,6 @@ def test_torque_in_contact_and_residual_of_free_time() -> None:
         assert summary.contact.rms[j].value == pytest.approx(np.sqrt(np.mean((y - x)[label, j] ** 2)))
         # the error of a regression of independent samples, within what ten events can tell
         assert found.low < slope < found.high and found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.7)
-
-
-def test_a_joint_without_load_has_no_correlation() -> None:
-    zero = np.zeros((len(TIME), 1))
-    contact = summarise(score_detection(TIME, flags((1.0, 2.0)), flags(), Signals(zero, zero + 0.1, zero))).contact
-    assert contact is not None
-    assert math.isnan(contact.correlation[0].value) and math.isnan(contact.slope[0].value)
-    assert contact.rms[0].value == pytest.approx(0.1) and contact.within is None
-    assert math.isnan(contact.rms[0].low)  # one event says nothing of their spread
 
 
 def test_pooled_is_the_sum_and_keeps_what_only_one_recording_knows() -> None:
@@ -220,12 +204,6 @@ def test_resampled_intervals_are_those_of_theory() -> None:
     assert quantile(values, 0.5, seed=7) == median != quantile(values, 0.5, seed=8)
     assert math.isnan(quantile(values[:4], 0.5, seed=7).low) and math.isnan(quantile(values[:0], 0.5, 7).value)
     assert RESAMPLES >= 1000
-
-
-def test_many_blocks_are_put_together_without_loss() -> None:
-    sums = np.column_stack([np.ones(1234), np.arange(1234.0)])
-    found = of_sums(sums, lambda each: each[:, 1:] / each[:, :1], seed=0)[0]
-    assert found.value == pytest.approx(616.5) and found.low < 616.5 < found.high
 
 
 def test_no_alarm_at_all_still_has_an_upper_bound() -> None:

@@ -82,12 +82,6 @@ def test_slow_recordings_hold_for_longer() -> None:
     assert rule.keys is not None and rule.keys["hold_time"] == pytest.approx(HOLD_SAMPLES / 20.0)
 
 
-def test_springs_that_are_softer_widen_the_margin() -> None:
-    plain, soft = (learn_sensors(FINGER, [part(1, softer=softer)]) for softer in (1.0, 0.6))
-    assert plain.keys is not None and soft.keys is not None
-    assert soft.keys["jump_margin"] > 2.0 * plain.keys["jump_margin"]
-
-
 def test_a_sensor_that_fails_in_free_motion_leaves_the_key_out() -> None:
     """A margin wide enough for a force that reads 0 would be none."""
     rule = learn_sensors(FINGER, [changed(part(1), 0, 0.0)])
