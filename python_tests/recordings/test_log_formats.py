@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from command import Call
@@ -75,14 +74,6 @@ def test_topics_come_onto_the_clock_of_the_time(tmp_path: Path, plugin: str) -> 
     assert found["tendon_force[1]"] == pytest.approx(10 + found["time"] / 0.005)
     assert found["joint_position[1]"] == pytest.approx(0.001 * found["time"] / 0.005, abs=1e-12)
     assert any("interpolated onto one clock; its largest gap is 10 ms" in note for note in log.notes)
-
-
-def test_topics_with_the_same_stamps_are_not_interpolated(tmp_path: Path) -> None:
-    bag = two_topics(tmp_path, late=0, every=1)
-    log = convert_table(bag, with_map(tmp_path, bag_map()))
-    (note,) = [each for each in log.notes if "largest gap" in each]
-    assert "joint_states: has a sample at each time, none is interpolated; its largest gap is 5 ms" in note
-    assert log.columns["joint_position[1]"] == pytest.approx(0.001 * (np.arange(400) + 0.4), abs=1e-12)
 
 
 def test_gaps_are_refused_or_left_out(tmp_path: Path) -> None:
@@ -176,14 +167,6 @@ def test_stamps_become_seconds_from_the_first(tmp_path: Path, stamps: list[str],
     assert found == pytest.approx([0.0, 0.5, last], rel=0, abs=1e-15)
 
 
-def test_stamps_of_parquet(tmp_path: Path) -> None:
-    time = pd.to_datetime([0, 2_000_000, 4_000_001], unit="ns")
-    pd.DataFrame({"t": time, "force": 1.0, "spool": 2.0}).to_parquet(tmp_path / "log.parquet")
-    document = edited(SMALL, "columns/time/unit", "datetime")
-    found = convert_table(tmp_path / "log.parquet", with_map(tmp_path, document)).columns["time"]
-    assert found.tolist() == [0.0, 0.002, 0.004000001]
-
-
 @pytest.mark.parametrize(
     ("stamp", "unit", "words"),
     [
@@ -219,14 +202,6 @@ def test_units_of_pint(tmp_path: Path) -> None:
         assert units.factor(name, known) is None, name
     found = convert_table(*written(tmp_path, LOG, edited(SMALL, "columns/tendon_force[1]/unit", "dyn"))).columns
     assert found["tendon_force[1]"] == pytest.approx([1e-8, 2e-8, 3e-8])
-
-
-def test_the_table_agrees_with_pint() -> None:
-    for what, table in units.QUANTITIES.items():
-        reference = next(unit for unit, value in table.items() if value == 1.0)
-        for name, value in table.items():
-            by_pint = units._factor_by_pint(name.replace(".", "*"), reference.replace(".", "*"))
-            assert by_pint == pytest.approx(value, rel=1e-12), (what, name)
 
 
 @pytest.mark.parametrize(("name", "library"), [("MCAP, JSON", "mcap"), ("HDF5", "h5py"), ("ROS 2 bag, db3", "rosbags")])
@@ -266,19 +241,6 @@ def test_blocks_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
     assert again["time"].tolist() == np.concatenate([block["time"] for block in blocks]).tolist()
 
 
-def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(text_log, "CHUNK", 64)
-    rows = [f"{k},1,5" for k in range(100)]
-    for k, line, words in (
-        (61, "61,much,5", "row 62: 'much'"),
-        (40, "2,1,5", "row 41"),
-        (70, "70,1", "row 71: 2 fields"),
-    ):
-        log = "\n".join(["t,force,spool", *rows[:k], line, *rows[k + 1 :]]) + "\n"
-        with pytest.raises(InputError, match=words):
-            convert_table(*written(tmp_path, log))
-
-
 def test_a_block_without_a_whole_row_does_not_set_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Time counts from the first row that is kept, though blocks before it have none."""
     monkeypatch.setattr(text_log, "CHUNK", 64)
@@ -307,3 +269,24 @@ def test_what_mcap_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column time"):
         write_table(tmp_path / "rec.mcap", {"force": np.array([1.0])})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_agrees_with_pint() -> None:
+    for what, table in units.QUANTITIES.items():
+        reference = next(unit for unit, value in table.items() if value == 1.0)
+        for name, value in table.items():
+            by_pint = units._factor_by_pint(name.replace(".", "*"), reference.replace(".", "*"))
+            assert by_pint == pytest.approx(value, rel=1e-12), (what, name)
+
+
+def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text_log, "CHUNK", 64)
+    rows = [f"{k},1,5" for k in range(100)]
+    for k, line, words in (
+        (61, "61,much,5", "row 62: 'much'"),
+        (40, "2,1,5", "row 41"),
+        (70, "70,1", "row 71: 2 fields"),
+    ):
+        log = "\n".join(["t,force,spool", *rows[:k], line, *rows[k + 1 :]]) + "\n"
+        with pytest.raises(InputError, match=words):
+            convert_table(*written(tmp_path, log))

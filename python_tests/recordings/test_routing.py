@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from command import Call
-from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.files import write_table
@@ -104,12 +103,6 @@ def test_a_finger_begun_wrong_gets_its_routing_back(index: tuple[Finger, Recordi
     stiffness = [[tendon["stiffness"] for tendon in each.data["tendons"]] for each in (found, finger)]
     np.testing.assert_allclose(*stiffness, rtol=0.05)
     assert all(abs(tendon.get("zero") or 0.0) < 3.0 * STEP for tendon in found.data["tendons"])
-
-
-def test_what_is_right_stays(index: tuple[Finger, Recording]) -> None:
-    finger, recording = index
-    assert routed(finger, learn_routing(finger, [recording])) == (finger, [])
-    assert not belongs(finger, [recording])
 
 
 def test_a_zero_is_found_and_said(index: tuple[Finger, Recording]) -> None:
@@ -255,6 +248,23 @@ def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Fing
     assert _read(INDEX, None, [[FREE], [], []], Options()).routing is None
 
 
+def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:
+    """Its stretch is rounding, as of a motor whose angle is the joint's."""
+    finger, recording = made_up(7, encoder=1e-9, stiff=1e6)
+    learned = learn_routing(finger, [recording])
+    assert [each.stiffness.is_known for each in learned] == [False] * 3 and routed(finger, learned)[1] == []
+
+
+def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
+    finger, recording = made_up(6)
+    angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]
+    bare = [{key: value for key, value in row.items() if key != "zero"} for row in finger.data["tendons"]]
+    ordered, plain = (tendon_positions(data, angle, force) for data in (finger.data, {**finger.data, "tendons": bare}))
+    np.testing.assert_allclose(ordered - plain, np.broadcast_to(ZEROS, ordered.shape), atol=1e-15)
+    read = tendon_angles(replace(recording, groups={**recording.groups, "tendon_position": ordered}), finger)
+    np.testing.assert_allclose(read, angle, atol=1e-9)
+
+
 def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
     table, out = tmp_path / "tendons.txt", tmp_path / "finger.json"
     table.write_text("FDP mcp+ pip+\n\nEDC mcp- pip-\nFDS mcp+\n", encoding="utf-8")
@@ -275,49 +285,3 @@ def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
     assert call(*given).status == 2
     assert call(*given, "--tendon", "A mcp+", "--tendon", "A pip+").err.count("given twice") == 1
     assert call(*given, "--table", tmp_path / "nowhere.txt").status == 2
-
-
-@pytest.mark.long
-def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two MuJoCo fingers, one with spatial tendons: arms within 1 %, stiffness within 5 %, zeros within 3 steps."""
-    require("mujoco")
-    from evidence.detection import mujoco_pushes
-
-    monkeypatch.setitem(mujoco_pushes.SECONDS, "free", 130.0)
-    off, covered, alone = [], [], []
-    for number in (3, 19):
-        mujoco_pushes.make(tmp_path, number, ("free",))
-        finger = read_finger(mujoco_pushes.description_file(tmp_path, number))
-        for pretension in mujoco_pushes.PRETENSIONS:
-            whole = read_recording(mujoco_pushes.place(tmp_path, number, "free", pretension))
-            for begin in (0.0, 65.0):
-                for each in learn_routing(finger, [whole[begin : begin + 60.0]]):
-                    covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
-                    off += [
-                        *(abs(arm.value / arm.described - 1.0) / 0.01 for arm in each.arms.values()),
-                        abs(each.stiffness.value / each.stiffness.described - 1.0) / 0.05,
-                        abs(each.zero.value) / (3.0 * STEP),
-                    ]
-                part = whole[begin : begin + 60.0]
-                part.groups.pop("joint_position")
-                alone += [each.stiffness for each in learn_routing(finger, [part]) if each.stiffness.is_known]
-    assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
-    assert len(alone) == 36 and max(abs(each.value / each.described - 1.0) for each in alone) < 0.014
-    assert sum(abs(each.value - each.described) <= each.half for each in alone) == 35
-
-
-def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:
-    """Its stretch is rounding, as of a motor whose angle is the joint's."""
-    finger, recording = made_up(7, encoder=1e-9, stiff=1e6)
-    learned = learn_routing(finger, [recording])
-    assert [each.stiffness.is_known for each in learned] == [False] * 3 and routed(finger, learned)[1] == []
-
-
-def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
-    finger, recording = made_up(6)
-    angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]
-    bare = [{key: value for key, value in row.items() if key != "zero"} for row in finger.data["tendons"]]
-    ordered, plain = (tendon_positions(data, angle, force) for data in (finger.data, {**finger.data, "tendons": bare}))
-    np.testing.assert_allclose(ordered - plain, np.broadcast_to(ZEROS, ordered.shape), atol=1e-15)
-    read = tendon_angles(replace(recording, groups={**recording.groups, "tendon_position": ordered}), finger)
-    np.testing.assert_allclose(read, angle, atol=1e-9)

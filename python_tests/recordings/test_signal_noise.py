@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import joint_position_noise, white_noise
 
@@ -82,15 +81,6 @@ def test_of_encoders_with_quantisation() -> None:
     np.testing.assert_allclose(joint_position_noise(DATA, made, 2), expected, rtol=0.1)
 
 
-@pytest.mark.parametrize("step", [1e-4, 1e-3])
-def test_of_quantisation_alone(step: float) -> None:
-    """Also where the finger rests or is slow against the steps: never below that of the rounding, nor far above."""
-    rng = np.random.default_rng(4)
-    made = recording(rng, 0.0, 1e-6, angle_noise=0.0, angle_step=step)
-    found = joint_position_noise(DATA, made, 2) / (step / np.sqrt(12.0))
-    assert (found >= 0.999).all() and (found < 1.4).all(), found
-
-
 def test_impacts_and_gaps_do_not_count() -> None:
     rng = np.random.default_rng(5)
     time = times(rng)
@@ -99,16 +89,6 @@ def test_impacts_and_gaps_do_not_count() -> None:
     time[3000:] += 7.0
     values[3000:] += 0.5
     np.testing.assert_allclose(white_noise(time, values), 5e-4, rtol=0.1)
-
-
-def test_what_it_finds_is_a_description() -> None:
-    rng = np.random.default_rng(6)
-    made = recording(rng, 0.0, 1e-9, angle_noise=0.0, angle_step=1e-12)
-    noise = joint_position_noise(DATA, made)
-    assert (noise >= 1e-6).all()
-    finger = Instance.from_description(DATA | {"position_filter": {"noise": noise.tolist()}})
-    assert finger.get("position_filter.noise[2]") == noise[1]
-    assert finger.get("position_filter.jerk_density") == 1.0
 
 
 def test_refuses_what_says_nothing() -> None:
