@@ -14,10 +14,8 @@ import pytest
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
 from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
-from tendonfmu.diagnosis.effects import Place
 from tendonfmu.diagnosis.effects.description_edit import data_number
 from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
-from tendonfmu.estimate.structure import set_number
 from worn_finger import described
 
 Description = dict[str, Any]
@@ -158,20 +156,6 @@ def own_paths(number: Number) -> set[str]:
     """What moves with a number: static friction is known as so much more than coulomb friction."""
     stem, _, name = number.path.rpartition(".")
     return {number.path, f"{stem}.static"} if name == "coulomb" else {number.path}
-
-
-def test_static_friction_follows_coulomb_friction() -> None:
-    data = described()
-    (number,) = [each for each in numbers_of(data) if each.path == "joints[1].friction.coulomb"]
-    assert number.place == Place(1)
-    added = np.zeros(len(numbers_of(data)))
-    added[number.index] = 0.003
-    after = with_numbers(data, added)
-    expected = copy.deepcopy(data)
-    for name in ("static", "coulomb"):
-        set_number(expected, f"joints[1].friction.{name}", after["joints"][0]["friction"]["coulomb"])
-    assert after == expected
-    assert after["joints"][0]["friction"]["coulomb"] == pytest.approx(0.012)
 
 
 def test_what_is_added_stays_in_the_box() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from html import unescape
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
@@ -16,21 +15,15 @@ import pytest
 
 import diagnosis_examples as examples
 from command import Call
-from evidence.diagnosis.hidden_effects import hide
-from evidence.fingers.matched_rig import random_hand, record
-from repository_paths import ROOT
 from tendonfmu.cli.command import several_values
-from tendonfmu.diagnosis.effects import CANDIDATES
 from tendonfmu.diagnosis.result import Diagnosis
-from tendonfmu.errors import InputError, InternalError
+from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import check_unseen
 from tendonfmu.files.tables import read_table
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.report.diagnosis_files import write_diagnosis
 from tendonfmu.tasks.phases import PhaseState
 
-COMMANDS = ROOT / "docs" / "reference" / "commands"
-PAGE = (COMMANDS / "diagnose.md").read_text(encoding="utf-8")
 NAMED = {"diagnosis.html", "diagnosis.json", "extended.json", "extended.fmu", "nominal.json"}
 
 Called = list[tuple[Any, ...]]
@@ -103,24 +96,6 @@ def test_an_earlier_diagnosis_is_replaced_and_nothing_else(
     assert files_in(Path("out")) == {*report["files"], "notes.png"} == {*NAMED, "notes.png"}
 
 
-def test_the_same_diagnosis_gives_the_same_files(tmp_path: Path) -> None:
-    found = brief(examples.one_cause())
-    for name in ("one", "two"):
-        write_diagnosis(found, tmp_path / name)
-    for name in files_in(tmp_path / "one"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
-
-
-def test_what_fails_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
-    write_diagnosis(brief(examples.adequate()), tmp_path / "out")
-    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
-    broken = replace(brief(examples.three_causes()), extended_data={"format": "tendonfmu-finger-1", "name": "broken"})
-    with pytest.raises(InternalError, match="joints"):
-        write_diagnosis(broken, tmp_path / "out")
-    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
-    assert files_in(tmp_path) == {"out"}
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -184,12 +159,6 @@ def test_a_test_that_holds_what_is_trained_on_is_refused() -> None:
         check_unseen([monday], [other, copy])
 
 
-def test_effects_are_on_the_page() -> None:
-    rows = [f"| `{each.name}` | {each.title} | {each.excited_by} |" for each in CANDIDATES]
-    missing = [row for row in rows if row not in PAGE]
-    assert missing == [], "docs/reference/commands/diagnose.md, The effects: \n" + "\n".join(rows)
-
-
 # --- the next experiment ----------------------------------------------------------------------------------------------
 
 
@@ -220,29 +189,3 @@ def test_the_next_experiment_is_written(call: Call, tmp_path: Path) -> None:
     assert np.ptp(motion["joint_position[1]"]) < 1e-9 and np.ptp(motion["joint_position[2]"]) > 0.5
     assert np.abs(motion["joint_velocity[2]"]).max() <= 0.4 * 1.001
     assert found.experiment.sentence in answer.out and "m.csv: 3" in answer.err
-
-
-# --- for real ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-def test_a_hidden_spring_is_found(call: Call, tmp_path: Path) -> None:
-    """A spring hidden in recordings that code of its own has made: the command names it and writes a model with it."""
-    hand = random_hand(21, joints=1, presliding=False, source=2, rate=250.0)
-    hand, label = hide(hand, "cover_stiffness", 3.0, seed=21, motion=3, seconds=40.0)
-    for name, seed in (("train", 3), ("test", 4)):
-        (tmp_path / name).mkdir()
-        record(hand, seed=seed, seconds=40.0).write(tmp_path / name)
-    words = "diagnose train/nominal.json train/recording.parquet --test test/recording.parquet -o out --kinematics 2"
-    answer = call(*words.split())
-    assert answer.status == 0, answer.err
-    report = json.loads(Path("out/diagnosis.json").read_text(encoding="utf-8"))
-    jsonschema.validate(report, json.loads((files_of("tendonfmu") / "schema" / "diagnosis.schema.json").read_text()))
-    first = report["causes"][0]
-    assert "cover_stiffness" in {first["effect"], *(other["effect"] for other in first["confusable_with"])}
-    assert first["joint"] == label["joint"] and report["gain"]["interval"][0] > 0
-    assert report["extended"]["test_rms"][0] < report["nominal"]["test_rms"][0] < report["nominal"]["bias_only_rms"][0]
-    page = Path("out/diagnosis.html").read_text(encoding="utf-8")
-    assert first["size"] in page and first["title"] in unescape(page)
-    run = "run out/extended.fmu test/recording.parquet -o run.csv --kinematics 2"
-    assert call(*run.split()).status == 0

@@ -25,13 +25,12 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numb
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
-from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
-from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
+from tendonfmu.diagnosis.series import make_grid
+from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, scan
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import moment_arms
-from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.statistics.splines import residual_of
@@ -84,12 +83,6 @@ def hidden() -> FitRecording:
     return recorded(with_cover(), 21, 3)
 
 
-@pytest.fixture(scope="module")
-def sound() -> FitRecording:
-    """40 s of what the description describes, by tendon positions."""
-    return recorded(finger(), 22, 1)
-
-
 # --- forces as the model predicts them --------------------------------------------------------------------------------
 
 
@@ -109,29 +102,6 @@ def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecordi
     assert np.allclose(stretch, force, atol=1e-9), "angles stay as they were measured"
 
 
-def test_blocks_are_those_of_the_candidates(hidden: FitRecording) -> None:
-    grid = make_grid([hidden])
-    blocks = sample_blocks(grid, [hidden])
-    assert blocks.count == grid.blocks == len(series_of(finger(), [hidden], grid).time)
-    exact = exact_model(finger(), hidden)
-    means = np.array([exact[blocks.of[0] == k].mean(axis=0) for k in (0, 7, grid.blocks - 1)])
-    assert np.allclose(block_prediction(finger(), [hidden], blocks)[[0, 7, -1]], means, atol=1e-15)
-
-
-@pytest.mark.parametrize("delay", [0.02, -0.015])
-def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, sound: FitRecording) -> None:
-    data = finger() | {"extensions": [{"effect": "time_delay", "delay": delay}]}
-    grid = make_grid([sound])
-    series = series_of(data, [sound], grid)
-    predicted = predicted_of(data, [sound], grid, series)[0]
-    before, after = (Instance.from_description(data, 1).run(each.recording.arrays()) for each in (sound, predicted))
-    inside = slice(20, -20)  # a delay has no force to pair with at the ends
-    # interpolated between samples: a millionth of a radian
-    assert np.abs(after["joint_angle"] - before["joint_angle"])[inside].max() < 2e-6
-    change = sound.recording.groups["tendon_force"] - predicted.recording.groups["tendon_force"]
-    assert np.abs(change).max() / STIFFNESS / 0.009 > 1e-5, "uncorrected it would be seen"
-
-
 # --- where it starts --------------------------------------------------------------------------------------------------
 
 
@@ -139,23 +109,6 @@ def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, s
 def test_positions_and_forces_tell_their_delay(samples: int) -> None:
     made = recorded(finger(), 23, 1, 20.0, samples)
     assert delay_of_positions(finger(), [made]) == pytest.approx(samples / RATE, abs=5e-4)
-
-
-def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
-    data = finger()
-    data["tendons"] = data["tendons"][1:3]
-    groups = {name: values[:, 1:3] if "tendon" in name else values for name, values in sound.recording.groups.items()}
-    few = replace(sound, recording=replace(sound.recording, groups=groups))
-    assert delay_of_positions(data, [few]) is None
-
-
-def test_a_pretension_that_stands_still_tells_no_delay(sound: FitRecording) -> None:
-    rng = np.random.default_rng(1)
-    groups = dict(sound.recording.groups)
-    groups["tendon_force"] = 10.0 + 0.02 * rng.standard_normal(groups["tendon_force"].shape)
-    groups["tendon_position"] = sound.model.joint_angle @ moment_arms(finger()).T + 10.0 / STIFFNESS
-    still = replace(sound, recording=replace(sound.recording, groups=groups))
-    assert delay_of_positions(finger(), [still]) is None
 
 
 def scanned(made: FitRecording) -> Any:
@@ -183,13 +136,6 @@ def test_the_scan_starts_with_presliding_where_there_is_some() -> None:
     assert starts[0].error < 0.7 * without
 
 
-def test_the_scan_finds_joints_that_are_softer_than_their_tendons() -> None:
-    soft = [{"effect": "presliding", "joint": j, "displacement": 0.05} for j in (1, 2)]
-    truth = finger() | {"extensions": [{"effect": "presliding", "displacement": 0.05}, *soft]}  # 25 µm at tendons
-    starts = scanned(recorded(truth, 25, 3, 20.0))
-    assert [each.place for each in starts[0].presliding] == [Place(), Place(joint=1), Place(joint=2)]
-
-
 def test_negative_friction_is_no_cause() -> None:
     rows = [
         {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
@@ -198,17 +144,6 @@ def test_negative_friction_is_no_cause() -> None:
     least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, 0.0)
     assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
     assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
-
-
-def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
-    rng = np.random.default_rng(2)
-    groups = dict(sound.recording.groups)
-    groups["tendon_position"] = groups["tendon_position"] + 1e-5 * rng.standard_normal(groups["tendon_position"].shape)
-    noisy = prepare(described(finger()), replace(sound.recording, groups=groups), 1, Held())
-    before, after = (least_sizes(finger(), [each], 0.005) for each in (sound, noisy))
-    assert after.tendon_noise == pytest.approx(np.hypot(before.tendon_noise, 1e-5 * np.sqrt(0.85)), rel=0.15)
-    assert np.all(after.joint_noise > 2.0 * before.joint_noise)
-    assert after.least("time_delay", None, None) == pytest.approx(0.75 * 0.005)
 
 
 # --- as it runs online ------------------------------------------------------------------------------------------------

@@ -67,12 +67,6 @@ def test_a_repeat_may_begin_earlier() -> None:
     assert found.shift == pytest.approx(-2.3, abs=1e-9) and found.begin == pytest.approx(THEN.time[rows])
 
 
-def test_the_reference_that_shares_most_is_taken() -> None:
-    both = joined(later(THEN, 5.0, FOREIGN), THEN, FOREIGN, THEN)
-    (found,) = find_repeats(both, forces(both), [0, 1, 2], [3])
-    assert found.then == 1 and found.shift == 0.0
-
-
 def test_a_controller_that_follows_as_well_repeats_it() -> None:
     rng = np.random.default_rng(3)
     wandering = 0.01 * np.ptp(THEN.angle, axis=0) * np.sin(2 * np.pi * 0.4 * THEN.time[:, None] + rng.uniform(0, 6, 2))

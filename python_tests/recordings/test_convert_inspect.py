@@ -166,17 +166,6 @@ def test_a_position_has_the_index_of_its_force(tmp_path: Path) -> None:
     assert [lines[f"tendon_position[{k}]"].source for k in (1, 2, 3)] == ["x_flex_mm", "?", "x_side_mm"]
 
 
-def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> None:
-    numbers = tuple(str(k) for k in range(1, 12))
-    lines = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers))
-    assert len(lines) == 23
-    for number in numbers:
-        line = lines[f"tendon_position[{number}]"]
-        assert (line.source, line.sure) == (f"pos{number}", "likely") and "as many as forces" in line.why
-    joints = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers) | {"pos12": SPOOL})
-    assert "joint_position[12]" in joints  # not as many as forces: angles of joints, as by the word alone
-
-
 # --- messages ---------------------------------------------------------------------------------------------------------
 
 

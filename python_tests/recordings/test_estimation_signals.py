@@ -131,10 +131,3 @@ def test_slow_or_short_recordings_are_not_smoothed() -> None:
     found = smoothing_of([recording(seconds=20.0, rate=50.0)], DATA)
     assert found is not None and found.cutoff is not None
     assert found.cutoff == pytest.approx(OF_RATE * 50.0) and found.every == 1
-
-
-@pytest.mark.parametrize(("rate", "every"), [(1000.0, 3), (500.0, 1), (250.0, 1)])
-def test_samples_are_dropped_where_the_signals_are_slow_and_enough_are_left(rate: float, every: int) -> None:
-    found = smoothing_of([recording(noise=0.0, rate=rate)], DATA)
-    assert found is not None and found.cutoff == pytest.approx(min(HIGHEST, OF_RATE * rate))
-    assert found.every == every

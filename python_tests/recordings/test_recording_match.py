@@ -257,7 +257,7 @@ def held_to_the_end(values: Numbers) -> None:
     [
         (clipped, "tendon_force", "clipped", "warning"),
         (coarse, "tendon_position", "coarse", "warning"),
-        (pushing, "tendon_force", "pushing", "warning"),
+        (pushing, "tendon_force", "pushing", "error"),
         *((held, group, "held", "warning") for group in ("tendon_force", "tendon_position", "joint_position")),
         *((held_to_the_end, group, "held", "error") for group in ("tendon_force", "tendon_position", "joint_position")),
     ],

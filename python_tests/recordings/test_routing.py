@@ -128,15 +128,6 @@ def test_arm_stiffness_and_unit_are_named(index: tuple[Finger, Recording]) -> No
     assert unit.severity == "error" and '"unit": "gf"' in unit.line()
 
 
-def test_a_unit_of_forces_shows_in_stiff_springs_too() -> None:
-    """Whose stretch is too small a part of the positions for the balance of the columns."""
-    finger, recording = made_up(5, encoder=1e-5, stiff=20.0)
-    assert not belongs(finger, [recording])
-    grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
-    (unit,) = belongs(finger, [replace(recording, groups=grams)])
-    assert (unit.kind, unit.severity) == ("scale", "error") and '"unit": "gf"' in unit.line()
-
-
 def test_what_the_motion_cannot_tell_stays() -> None:
     finger, recording = made_up(3, still=True)
     learned = learn_routing(finger, [recording])

@@ -18,7 +18,6 @@ from tendonfmu.report.fit_figures import (
     correlation_sheet,
     error_sheet,
     relative_error,
-    residual_sheets,
     strongest_pairs,
     torque_sheets,
 )
@@ -65,24 +64,6 @@ def test_a_gap_breaks_the_line(fit: FitPicture) -> None:
     drawn = curve(next(iter(torque_sheets(dataclasses.replace(fit, series=[late])))).panels[0], "predicted")
     (broken,) = np.flatnonzero(np.isnan(drawn.x))
     assert np.isnan(drawn.y[broken]) and drawn.x[broken + 1] - drawn.x[broken - 1] > 1.4
-
-
-def test_residual_over_velocity_shows_what_is_in_it(fit: FitPicture) -> None:
-    """3 mN·m per rad/s plus 1 mN·m of noise: median on the line, band 10 to 90 %. Samples of contact do not count."""
-    series = fit.series[0]
-    noise = np.random.default_rng(3).normal(scale=1e-3, size=series.torque.shape)
-    planted = 0.003 * series.joint_speed + noise
-    used = series.used.copy()
-    planted[1000:2000], used[1000:2000] = 5.0, False
-    planted[3000:3010] = np.nan
-    changed = dataclasses.replace(series, residual=planted, used=used)
-    sheet = next(iter(residual_sheets(dataclasses.replace(fit, series=[changed]))))
-    (panel,) = [panel for panel in sheet.panels if panel.title.endswith("velocity")]
-    middle, (band,) = curve(panel, "median"), panel.bands
-    inner = np.abs(np.gradient(middle.x)) < 0.2  # in wide bins the slope itself spreads it
-    assert inner.sum() > 10
-    np.testing.assert_allclose(middle.y[inner], 3.0 * middle.x[inner], atol=0.3)
-    np.testing.assert_allclose((band.high - band.low)[inner], 2 * 1.2816, rtol=0.25)
 
 
 # --- friction laws ----------------------------------------------------------------------------------------------------
