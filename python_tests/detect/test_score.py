@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from command import Answer, Call
 from repository_paths import ROOT
 from tendonfmu.cli import main
-from tendonfmu.detect.scoring import read_subject, run_track, scaled_detection
+from tendonfmu.detect.scoring import scaled_detection
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
@@ -117,19 +117,6 @@ def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any
         inside = next((i for i in range(k, len(time)) if contact[i] or not label[i]), k)
         found.append(time[inside] - time[k] if quiet and contact[inside] and label[inside] else None)
     return found
-
-
-@pytest.mark.parametrize("path", [PUSHES, FREE_X4])
-def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
-    """joint_contact is |r| > threshold (docs/reference/semantics.md#contact-detector), so r is right."""
-    subject = read_subject(INDEX)
-    track = run_track(subject, read_recording(path), 1, None)
-    contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
-    threshold = np.array(contact["threshold"]) + force[:, None] * np.array(contact["threshold_per_force"])
-    known = ~np.isnan(track.residual)
-    assert known[1:].all() and not known[0].any()
-    above = np.abs(track.residual)[known] > threshold[known]
-    assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
 
 
 def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.detect.sensor_faults import AMPLE, HOLD_SAMPLES, finds_a_fault, learn_sensors
-from tendonfmu.estimate.structure import Choice, build_structure, with_values
-from tendonfmu.model import native
-from tendonfmu.model.description import Finger
+from tendonfmu.detect.sensor_faults import AMPLE, finds_a_fault, learn_sensors
 
 Array = NDArray[np.float64]
 
@@ -77,11 +71,6 @@ def test_a_failing_sensor_is_found(tendon: int) -> None:
     assert finds_a_fault(FINGER, [changed(sound, tendon, 0.0)], rule.keys)
 
 
-def test_slow_recordings_hold_for_longer() -> None:
-    rule = learn_sensors(FINGER, [part(1, rate=20.0)])
-    assert rule.keys is not None and rule.keys["hold_time"] == pytest.approx(HOLD_SAMPLES / 20.0)
-
-
 def test_a_sensor_that_fails_in_free_motion_leaves_the_key_out() -> None:
     """A margin wide enough for a force that reads 0 would be none."""
     rule = learn_sensors(FINGER, [changed(part(1), 0, 0.0)])
@@ -107,14 +96,3 @@ def test_why_it_is_left_out(data: dict[str, object], drop: str, why: str) -> Non
         arrays |= {key: arrays[key][:, 1:3] for key in ("tendon_force", "tendon_position")}
     rule = learn_sensors(data, [FreePart("made", arrays, each.mean_force, each.counted, each.seconds)])
     assert rule.keys is None and rule.why == why
-
-
-def test_a_fit_leaves_the_watch_out_and_keeps_its_keys() -> None:
-    """The sensors' watch is no part of the friction model."""
-    joints = [{"friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}, {}]
-    data = json.loads(json.dumps(FINGER | {"joints": joints, "sensor_fault": {"jump_margin": 0.7}}))
-    finger = Finger(Path("finger"), data)
-    structure = build_structure(finger, Choice())
-    assert "sensor_fault" not in structure.start.data
-    values = np.array([parameter.start for parameter in native.Instance(structure.start.image).parameters()])
-    assert with_values(structure, values).data["sensor_fault"] == {"jump_margin": 0.7}

@@ -9,7 +9,6 @@ from scipy.stats import binom
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
 from repetitions import repeated
-from synthetic_series import make_series, nuisance_of, with_effect
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.blocks import make_folds
@@ -84,17 +83,6 @@ def test_a_fraction_of_the_noise_is_confirmed(memory: float, size: float) -> Non
         target = coloured(rng, 0.0, memory) + size * values[:, :, 0]
         found.append(confirmation(series_with(target), nominal).p_value(values, 400))
     assert np.mean(np.array(found) < 0.01) >= 0.9
-
-
-def test_an_effect_of_a_motion_is_confirmed() -> None:
-    series = make_series(7, 40.0)
-    nuisance = nuisance_of(series)
-    signal = np.tanh(series.velocity[:, 1] / 0.02) * series.angle[:, 1] ** 2
-    hidden = with_effect(series, nuisance, signal, joint=1, strength=0.3)
-    column = np.zeros((len(signal), JOINTS, 1))
-    column[:, 1, 0] = signal
-    nominal = np.stack([each[:, -7:] for each in nuisance], axis=1)
-    assert confirmation(hidden, nominal).p_value(column, 100) < 1e-3
 
 
 # --- what is asked of it ----------------------------------------------------------------------------------------------

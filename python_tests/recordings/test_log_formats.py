@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from command import Call
@@ -290,3 +291,11 @@ def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pyt
         log = "\n".join(["t,force,spool", *rows[:k], line, *rows[k + 1 :]]) + "\n"
         with pytest.raises(InputError, match=words):
             convert_table(*written(tmp_path, log))
+
+
+def test_stamps_of_parquet(tmp_path: Path) -> None:
+    time = pd.to_datetime([0, 2_000_000, 4_000_001], unit="ns")
+    pd.DataFrame({"t": time, "force": 1.0, "spool": 2.0}).to_parquet(tmp_path / "log.parquet")
+    document = edited(SMALL, "columns/time/unit", "datetime")
+    found = convert_table(tmp_path / "log.parquet", with_map(tmp_path, document)).columns["time"]
+    assert found.tolist() == [0.0, 0.002, 0.004000001]
