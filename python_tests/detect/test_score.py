@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
-import sys
-from contextlib import redirect_stderr, redirect_stdout
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,6 @@ from numpy.typing import NDArray
 
 from command import Answer, Call
 from repository_paths import ROOT
-from tendonfmu.cli import main
 from tendonfmu.detect.scoring import scaled_detection
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
@@ -36,28 +32,10 @@ Table = dict[str, NDArray[np.float64]]
 
 def report_of(answer: Answer, path: str = "s.json") -> dict[str, Any]:
     assert answer.status == 0, answer
-    return read_report(Path(path))
-
-
-def read_report(path: Path) -> dict[str, Any]:
-    report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    report: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
     schema = json.loads(files_of("tendonfmu").joinpath("schema", "score_report.schema.json").read_text())
     jsonschema.validate(report, schema, cls=jsonschema.Draft202012Validator)
     return report
-
-
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
-    """The demo scored and drawn in a folder of its own: that, and both streams."""
-    folder = tmp_path_factory.mktemp("scored")
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        arguments = ["score", INDEX, PUSHES, FREE_X4, "-o", folder / "s.json", "--figures", folder / "fig"]
-        patch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-    assert not ended.value.code, err.getvalue()
-    return folder, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture(scope="session")
@@ -78,10 +56,10 @@ def written(table: Table, name: str, **changes: NDArray[Any] | None) -> Path:
 # --- what comes out ---------------------------------------------------------------------------------------------------
 
 
-def test_the_demo_is_scored_as_by_hand(demo: tuple[Path, str, str]) -> None:
+def test_the_demo_is_scored_as_by_hand(call: Call) -> None:
     """Counted again by hand: a loop over samples, nothing of the product's."""
-    folder, out, err = demo
-    report = read_report(folder / "s.json")
+    answer = call("score", INDEX, PUSHES, FREE_X4, "-o", "s.json", "--figures", "fig")
+    report = report_of(answer)
     assert set(report) > LITERAL
     assert (report["format"], report["events"], report["found"]) == ("tendonfmu-score-1", 11, 8)
     recording = read_recording(PUSHES)
@@ -96,14 +74,14 @@ def test_the_demo_is_scored_as_by_hand(demo: tuple[Path, str, str]) -> None:
     for key in ("events", "found", "missed", "false_alarms", "free_minutes", "held"):
         assert report[key] == pytest.approx(sum(each[key] for each in report["recordings"]))
     assert 0.8 < report["recordings"][0]["free_minutes"] < 0.83 and len(report["free_rms"]) == 4
-    assert "8 of 11 found" in out and "no column contact" in err
+    assert "8 of 11 found" in answer.out and "no column contact" in answer.err
     own = [point for point in report["roc"]["points"] if point["factor"] == 1.0]
     assert [(each["found"], each["false_alarms"]) for each in own] == [(8, report["false_alarms"])]
     # thresholds in a range of 32, from latched up for good to nothing found
     factors = [point["factor"] for point in report["roc"]["points"]]
     assert factors == sorted(factors) and factors[-1] / factors[0] == 32.0
     assert report["roc"]["points"][-1]["found"] == report["roc"]["points"][-1]["false_alarms"] == 0
-    assert {file.name for file in (folder / "fig").iterdir()} == {"contacts.png", "events.png", "roc.png", "delays.png"}
+    assert {file.name for file in Path("fig").iterdir()} == {"contacts.png", "events.png", "roc.png", "delays.png"}
 
 
 def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any]) -> list[float | None]:
@@ -234,6 +212,8 @@ def two_tendons(table: Table) -> Path:
             ("r.csv: one sample",),
         ),
         (lambda table: Path("no.csv"), (), ("no.csv", "no such file")),
+        (lambda table: written(table, "r.csv"), ("r.csv",), ("given twice",)),
+        (lambda table: written(table, "r.csv"), ("--figures", "r.csv"), ("r.csv: a file; expected a folder",)),
     ],
 )
 def test_bad_input_is_named_and_leaves_nothing(
@@ -243,22 +223,6 @@ def test_bad_input_is_named_and_leaves_nothing(
     answer = call("score", INDEX, make(short), "-o", "s.json", *options)
     assert answer.status == 2 and answer.out == "" and len(answer.err.splitlines()) == 1, answer
     assert all(word in answer.err for word in words), answer.err
-    assert not Path("s.json").exists()
-
-
-def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
-    recording = written({name: column[:600] for name, column in pushes.items()}, "r.csv")
-    Path("broken.fmu").write_text("no archive")
-    for arguments, words in (
-        ((INDEX, recording, recording, "-o", "s.json"), "given twice"),
-        ((INDEX, recording, "-o", "s.txt"), "ends in .json"),
-        ((INDEX, recording, "-o", INDEX), "same file as the input"),
-        ((INDEX, recording, "-o", "s.json", "--figures", recording), "r.csv: a file; expected a folder"),
-        ((recording, recording, "-o", "s.json"), "a recording; expected FINGER.json"),
-        (("broken.fmu", recording, "-o", "s.json"), "broken.fmu: not an FMU"),
-    ):
-        answer = call("score", *arguments)
-        assert answer.status == 2 and words in answer.err, answer
     assert not Path("s.json").exists()
 
 

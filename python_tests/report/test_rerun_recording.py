@@ -22,23 +22,23 @@ from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.detect.contact_bound import residual_and_bound
 from tendonfmu.files.tables import read_table
-from tendonfmu.interface.running import RunResult
-from tendonfmu.recordings.recording import Recording, flagged_stretches
+from tendonfmu.recordings.recording import flagged_stretches
 from tendonfmu.report.rerun_recording import write_rerun
+
+Numbers = NDArray[np.float64]
 
 DEMO = ROOT / "examples" / "demo_recording"
 CALIBRATED = DEMO / "index_finger_calibrated.json"
-JOINTS = ["mcp_abduction", "mcp_flexion", "pip_flexion", "dip_flexion"]
 
 
 @dataclass
 class Contents:
     """What a file of Rerun holds, by entity."""
 
-    times: dict[str, NDArray[np.float64]] = field(default_factory=dict)  # s
+    times: dict[str, Numbers] = field(default_factory=dict)  # s
     values: dict[str, dict[str, list[Any]]] = field(default_factory=dict)  # by component, one list for each time
 
-    def curve(self, path: str) -> NDArray[np.float64]:
+    def curve(self, path: str) -> Numbers:
         return np.array([value for (value,) in self.values[path]["Scalars:scalars"]])
 
 
@@ -48,67 +48,44 @@ def contents_of(file: Path) -> Contents:
         from rerun.chunk import RrdReader
     except ImportError:
         from rerun.experimental import RrdReader  # of 0.39 and before
-    reader = RrdReader(file)
     found = Contents()
-    for chunk in reader.stream():
+    for chunk in RrdReader(file).stream():
         path, batch = chunk.entity_path.removeprefix("/"), chunk.to_record_batch()
-        if chunk.is_static:
-            continue
-        assert chunk.timeline_names == ["time"]
-        found.times[path] = batch["time"].cast("int64").to_numpy() / 1e9
-        found.values[path] = {name: batch[name].to_pylist() for name in batch.schema.names if ":" in name}
+        if not chunk.is_static:
+            found.times[path] = batch["time"].cast("int64").to_numpy() / 1e9
+            found.values[path] = {name: batch[name].to_pylist() for name in batch.schema.names if ":" in name}
     return found
 
 
-@dataclass(frozen=True)
-class Written:
-    """A part of the demo as it was written and read."""
-
-    recording: Recording
-    result: RunResult
-    contents: Contents
-
-    def output(self, name: str, index: int) -> NDArray[np.float64]:
-        return np.asarray(self.result.columns()[f"{name}[{index}]"], dtype=np.float64)
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+@pytest.mark.long
+def test_what_is_written_is_the_run(tmp_path: Path) -> None:
+    """Signals, residual and bound, contacts and labels of a part of the demo."""
     require("rerun")
-    recording = tf.read_recording(DEMO / "index_finger_pushes.parquet")[8.0:16.0]
-    finger = tf.read_finger(CALIBRATED)
-    result = tf.run(finger, recording)
-    file = tmp_path_factory.mktemp("rerun") / "out.rrd"
-    write_rerun(file, result.outputs, recording, finger, 1)
-    return Written(recording, result, contents_of(file))
-
-
-@pytest.mark.long
-def test_the_signals_are_those_of_the_table(written: Written) -> None:
-    time, found = written.result.outputs["time"], written.contents
-    for j, name in enumerate(JOINTS, start=1):
-        for group, output in (("torque", "joint_torque"), ("torque", "compensated_torque"), ("motion", "joint_angle")):
-            path = f"joints/{name}/{group}/{output}"
-            np.testing.assert_allclose(found.times[path], time, rtol=0, atol=1e-9)
-            np.testing.assert_array_equal(found.curve(path), written.output(output, j))
-        reference = written.recording.groups["external_torque"][:, j - 1]
-        np.testing.assert_array_equal(found.curve(f"joints/{name}/torque/external_torque"), reference)
-    forces = written.recording.groups["tendon_force"]
-    for name, force in zip(tf.read_finger(CALIBRATED).tendon_names, forces.T, strict=True):
+    recording, finger = tf.read_recording(DEMO / "index_finger_pushes.parquet")[8.0:16.0], tf.read_finger(CALIBRATED)
+    outputs = tf.run(finger, recording).outputs
+    write_rerun(tmp_path / "out.rrd", outputs, recording, finger, 1)
+    found, time = contents_of(tmp_path / "out.rrd"), outputs["time"]
+    residual, bound = residual_and_bound(finger, recording, 1)
+    assert recording.contact is not None
+    flags = {"contact/label": recording.contact}
+    for j, name in enumerate(finger.joint_names):
+        flags[f"contact/{j + 1}_{name}"] = outputs["joint_contact"][:, j]
+        drawn = {
+            "torque/external_torque": recording.groups["external_torque"],
+            "residual/residual": residual,
+            "residual/bound": bound,
+            "motion/joint_angle": outputs["joint_angle"],
+            **{f"torque/{output}": outputs[output] for output in ("joint_torque", "compensated_torque")},
+        }
+        for path, values in drawn.items():
+            np.testing.assert_allclose(found.times[f"joints/{name}/{path}"], time, rtol=0, atol=1e-9)
+            np.testing.assert_array_equal(found.curve(f"joints/{name}/{path}"), values[:, j])
+    for name, force in zip(finger.tendon_names, recording.groups["tendon_force"].T, strict=True):
         np.testing.assert_array_equal(found.curve(f"tendons/{name}/tendon_force"), force)
-
-
-@pytest.mark.long
-def test_contacts_and_labels_are_lanes(written: Written) -> None:
-    time = written.result.outputs["time"]
-    flags = {f"contact/{j}_{name}": written.output("joint_contact", j) for j, name in enumerate(JOINTS, start=1)}
-    assert written.recording.contact is not None
-    flags["contact/label"] = written.recording.contact
     for path, expected in flags.items():
-        states = [state for (state,) in written.contents.values[path]["StateChange:state"]]
-        begins = written.contents.times[path]
-        ends = np.append(begins[1:], time[-1])
-        spans = [(begin, end) for begin, end, state in zip(begins, ends, states, strict=True) if state]
+        states = [state for (state,) in found.values[path]["StateChange:state"]]
+        begins = found.times[path]
+        spans = [each[:2] for each in zip(begins, np.append(begins[1:], time[-1]), states, strict=True) if each[2]]
         np.testing.assert_allclose(spans, flagged_stretches(time, expected), rtol=0, atol=1e-9)
 
 
@@ -133,17 +110,6 @@ def test_the_residual_exceeds_its_bound_in_contact_and_only_then() -> None:
     np.testing.assert_allclose(residual_and_bound(tf.read_finger(plain), recording, 1)[1], expected, rtol=1e-15)
 
 
-@pytest.mark.long
-def test_residual_and_bound_are_drawn(written: Written) -> None:
-    residual, bound = residual_and_bound(tf.read_finger(CALIBRATED), written.recording, 1)
-    for j, name in enumerate(JOINTS):
-        path, found = f"joints/{name}/residual", written.contents
-        np.testing.assert_array_equal(found.curve(f"{path}/residual"), residual[:, j])
-        np.testing.assert_array_equal(found.curve(f"{path}/bound"), bound[:, j])
-        contact = written.output("joint_contact", j + 1) > 0
-        np.testing.assert_array_equal(found.curve(f"{path}/in_contact"), np.where(contact, residual[:, j], np.nan))
-
-
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
@@ -158,10 +124,9 @@ def test_the_command_writes_the_same_of_a_description_and_its_fmu(
     assert call("run", "f.fmu", "r.csv", "-o", "out.csv", "--rerun", "b.rrd").status == 0
     first, second = contents_of(tmp_path / "a.rrd"), contents_of(tmp_path / "b.rrd")
     assert first.values.keys() == second.values.keys() and len(first.values) > 10
-    table = read_table(tmp_path / "out.csv", lambda *_: None)
-    name = FINGER["joints"][0]["name"]
+    table, path = read_table(tmp_path / "out.csv", lambda *_: None), f"joints/{FINGER['joints'][0]['name']}/torque"
     for found in (first, second):
-        np.testing.assert_array_equal(found.curve(f"joints/{name}/torque/joint_torque"), table["joint_torque[1]"])
+        np.testing.assert_array_equal(found.curve(f"{path}/joint_torque"), table["joint_torque[1]"])
 
 
 def test_without_the_package_it_names_what_to_install(
