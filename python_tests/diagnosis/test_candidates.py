@@ -340,42 +340,6 @@ def test_nominal_columns_are_differences_of_the_core(case: Case) -> None:
 # --- what a magnitude means -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "place", "shape", "magnitudes"),
-    [
-        ("viscous_friction", Place(1, 3), {}, (0.4,)),
-        ("stribeck", Place(1, 3), {"stribeck_velocity": 0.0015}, (0.004,)),
-        ("asymmetric_friction", Place(1, 1), {}, (0.2, -0.1)),
-        ("edge_friction", Place(1, 2), {}, (0.015, 0.1)),
-        ("edge_friction", Place(2, 3), {"angle_low": -0.5, "angle_middle": 0.0, "angle_high": 0.4}, (0.3, -0.2)),
-        ("pulley_friction", Place(1, 3), {}, (0.01, 0.05)),
-        ("joint_friction", Place(2), {}, (0.003, 0.0005)),
-        ("cover_stiffness", Place(2), {}, (0.01,)),
-        ("gravity", Place(2), {}, (-0.004, 0.003)),
-        ("moment_arm", Place(2, 4), {}, (-0.0004,)),
-        ("preload_friction", Place(1, 3), {}, (0.3,)),
-        ("friction_drift", Place(), {"time_constant": 3.0}, (-0.2,)),
-    ],
-    ids=str,
-)
-def test_columns_explain_an_extended_finger(
-    case: Case, name: str, place: Place, shape: dict[str, float], magnitudes: tuple[float, ...]
-) -> None:
-    """What an extended finger adds is its columns times the magnitudes, but for the square of small friction."""
-    candidate = by_name(name)
-    assert place in candidate.places(case.data)
-    extended = candidate.extended(case.data, place, shape, magnitudes)
-    variant = candidate.variant(case.data, place, shape)
-    target = case.prediction(extended) - case.columns.prediction
-    columns = [
-        by_difference(case, variant.data, column.numbers, 1e-4 * column.expected, one_sided=column.sign > 0)
-        for column in variant.columns
-    ]
-    made = sum(size * column for size, column in zip(magnitudes, columns, strict=True))
-    assert np.abs(target).max() > 5e-5
-    assert np.linalg.norm(target - made) < 0.03 * np.linalg.norm(target)
-
-
 @pytest.mark.parametrize("name", CONTRACT)
 def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
     """All numbers of the term, also from magnitudes of 0: what is 0 would stay 0."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Sequence
 from html import unescape
@@ -233,25 +232,6 @@ def test_what_fails_is_left_out_and_named(tmp_path: Path, history: Callable[[], 
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
-
-
-def test_the_table_has_a_row_per_recording_and_cause(tmp_path: Path, history: Callable[[], History]) -> None:
-    found = history()
-    written = write_history(found, NAMES, tmp_path / "out")
-    assert {each.name for each in written} == {"history.html", "history.csv", "history.png"}
-    assert all(each.stat().st_size > 0 for each in written)
-    with (tmp_path / "out" / "history.csv").open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert list(rows[0]) == [
-        *("recording", "time_weeks", "effect", "joint", "tendon", "number", "unit", "reference", "now"),
-        *("now_low", "now_high", "named", "gain"),
-    ]
-    assert [float(row["now"]) for row in rows] == [1.01, 1.1, 1.2, 1.3]
-    assert [row["named"] for row in rows] == ["0", "0", "0", "1"]
-    assert {(row["effect"], row["joint"], row["tendon"], row["unit"]) for row in rows} == {
-        ("joint_friction", "1", "0", "N.m")
-    }
-    assert [float(row["time_weeks"]) for row in rows] == [1.0, 2.0, 3.0, 4.0]
 
 
 HOSTILE = "<script>alert('x')</script>&\""

@@ -1,6 +1,6 @@
 """Third-party recordings, da Vinci tools and the EMPS carriage: units, signs, filters, and what is refused.
 
-Measured files need ../shared/data or $TENDONFMU_DATA.
+The measured files of EMPS need ../shared/data or $TENDONFMU_DATA.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ def refused(call: Any, file: Path, words: list[str]) -> None:
 
 # --- da Vinci ---------------------------------------------------------------------------------------------------------
 
-RUNS = sorted((DATA / "davinci_tool" / "Tool_4_Maryland_L_4").glob("*.TXT"))[:6]
 RADIUS = 0.01
 HEADER = "%Used left spindle of tool number 5\n%idxPulse_0=0\n"
 # time, spindle, torque, current, jaw, jaw torque, level, command, motor, target
@@ -103,26 +102,6 @@ def test_every_converter_is_there(tmp_path: Path) -> None:
     for path in (tmp_path / "absent.TXT", tmp_path):
         with pytest.raises(InputError, match=path.name):
             convert_tool(path, RADIUS)
-
-
-@needs("davinci data")
-@pytest.mark.parametrize(
-    "file", sorted((DATA / "davinci_tool").glob("Tool_4_Maryland_L_4/*.TXT")), ids=lambda f: f.stem
-)
-def test_measured_friction_opposes_the_motion(file: Path) -> None:
-    """tau - external_torque is positive while the spindle closes, negative while it opens: half a loop is friction.
-
-    Between 40 and 95 mN.m, as the data's own notes give it; the jaw turns 0.90 to 0.92 of the spindle.
-    """
-    found = convert_tool(file, RADIUS)
-    settled = found["time"] > 2.5
-    friction = (found["tendon_force[1]"] * RADIUS - found["external_torque[1]"])[settled]
-    spindle, jaw = found["tendon_position[1]"][settled] / RADIUS, found["joint_position[1]"][settled]
-    velocity = np.convolve(np.gradient(spindle, found["time"][settled]), np.ones(51) / 51, mode="same")
-    fast = np.abs(velocity) > 0.5 * np.abs(velocity).max()
-    half_loop = 0.5 * (friction[fast & (velocity > 0)].mean() - friction[fast & (velocity < 0)].mean())
-    assert 0.040 < half_loop < 0.095 and 0.8 < np.polyfit(spindle, jaw, 1)[0] < 1.0
-    assert found["external_torque[1]"][settled].mean() > 0.0
 
 
 # --- EMPS -------------------------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -151,22 +150,6 @@ def test_an_arm_that_varies_is_seen_and_no_other() -> None:
 
 
 # --- the commands -----------------------------------------------------------------------------------------------------
-
-
-def test_fit_learns_the_routing_and_reports_it(tmp_path: Path, call: Call, index: tuple[Finger, Recording]) -> None:
-    given, fitted, report = (tmp_path / f"{name}.json" for name in ("given", "fitted", "report"))
-    given.write_text(json.dumps(dict(changed(index[0], arms=0.2).data)), encoding="utf-8")
-    said = call(
-        "fit", given, FREE, "-o", fitted, "--report", report, "--routing", "--only", "joints[1].friction.coulomb"
-    )
-    assert said.status == 0 and "routing: tendon mcp_flexor_radial: moment arm at joint mcp_abduction" in said.out
-    np.testing.assert_allclose(read_finger(fitted).moment_arms, index[0].moment_arms, rtol=0.01)
-    document = json.loads(report.read_text(encoding="utf-8"))
-    schema = json.loads((ROOT / "python/tendonfmu/schema/fit_report.schema.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, schema)
-    assert sum(number["changed"] for number in document["routing"]["numbers"]) == int(
-        np.count_nonzero(index[0].moment_arms)
-    )
 
 
 def test_fit_without_joint_positions_says_so(tmp_path: Path, call: Call) -> None:

@@ -16,8 +16,6 @@ from tendonfmu.report.fit_figures import (
     SHOWN,
     correlation,
     correlation_sheet,
-    error_sheet,
-    relative_error,
     strongest_pairs,
     torque_sheets,
 )
@@ -55,15 +53,6 @@ def test_torque_over_time_is_that_of_the_recording(fit: FitPicture) -> None:
         assert panel.note == f"residual {100 * share:.0f} % of torque"
         assert flags is None or flags[rows[:-1]].all()
         assert 0.8 * SHOWN < measured.x[-1] - measured.x[0] < SHOWN + 0.01
-
-
-def test_a_gap_breaks_the_line(fit: FitPicture) -> None:
-    shown = curve(list(torque_sheets(fit))[-1].panels[0], "measured").x
-    series = fit.series[1]
-    late = dataclasses.replace(series, time=series.time + np.where(series.time > shown.mean(), 1.5, 0.0))
-    drawn = curve(next(iter(torque_sheets(dataclasses.replace(fit, series=[late])))).panels[0], "predicted")
-    (broken,) = np.flatnonzero(np.isnan(drawn.x))
-    assert np.isnan(drawn.y[broken]) and drawn.x[broken + 1] - drawn.x[broken - 1] > 1.4
 
 
 # --- friction laws ----------------------------------------------------------------------------------------------------
@@ -137,32 +126,7 @@ def test_bands_are_what_draws_from_the_covariance_give(fit: FitPicture, path: st
     np.testing.assert_allclose((drawn.high - drawn.fitted) / CONFIDENCE, np.std(curves, axis=0), rtol=0.08)
 
 
-def test_shared_values_add_up_in_a_band(fit: FitPicture) -> None:
-    """Two working points with one coulomb value between them: halfway its error is whole, not divided by √2."""
-    first, second = (
-        next(k for k, u in enumerate(fit.unknowns) if u.path == f"{EDGE}.laws[{i}].coulomb") for i in (1, 2)
-    )
-    together = (*fit.unknowns[first].parameters, *fit.unknowns[second].parameters)
-    joined = dataclasses.replace(fit.unknowns[first], parameters=together)
-    shared = [joined if k == first else unknown for k, unknown in enumerate(fit.unknowns) if k != second]
-    covariance = np.zeros((len(shared), len(shared)))
-    covariance[first, first] = 1e-6
-    effect = effect_at(fit, EDGE)
-    bands = LawBands(dataclasses.replace(fit, unknowns=shared, covariance=covariance))
-    drawn = bands.over_angle(effect, effect, 1, 0.01, np.array([0.5 * sum(effect.angles)]))
-    assert (drawn.high - drawn.fitted)[0] == pytest.approx(CONFIDENCE * 1e-3)
-
-
 # --- errors and correlation -------------------------------------------------------------------------------------------
-
-
-def test_every_number_has_its_dot(fit: FitPicture) -> None:
-    (panel,) = error_sheet(fit).panels
-    counts = {dots.style: len(dots.x) for dots in panel.dots}
-    known = fit.report["identified"]
-    assert counts.get("identified", 0) == known["count"] and sum(counts.values()) == known["of"]
-    entry = fit.report["parameters"][0]
-    assert relative_error({**entry, "standard_error": None}) == relative_error({**entry, "value": 0.0}) == np.inf
 
 
 def test_the_strongest_pair_comes_first(fit: FitPicture) -> None:

@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 
 import tendonfmu as tf
 from command import Call
-from fmu_binary import FINGER
 from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.detect.contact_bound import residual_and_bound
-from tendonfmu.files.tables import read_table
 from tendonfmu.recordings.recording import flagged_stretches
 from tendonfmu.report.rerun_recording import write_rerun
 
@@ -111,22 +109,6 @@ def test_the_residual_exceeds_its_bound_in_contact_and_only_then() -> None:
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-def test_the_command_writes_the_same_of_a_description_and_its_fmu(
-    call: Call, files: tuple[str, str], tmp_path: Path
-) -> None:
-    require("rerun")
-    answer = call("run", *files, "-o", "out.csv", "--rerun", "a.rrd")
-    assert answer.status == 0 and "a.rrd: the run, for the viewer Rerun" in answer.err
-    assert call("build", "finger.json", "-o", "f.fmu").status == 0
-    assert call("run", "f.fmu", "r.csv", "-o", "out.csv", "--rerun", "b.rrd").status == 0
-    first, second = contents_of(tmp_path / "a.rrd"), contents_of(tmp_path / "b.rrd")
-    assert first.values.keys() == second.values.keys() and len(first.values) > 10
-    table, path = read_table(tmp_path / "out.csv", lambda *_: None), f"joints/{FINGER['joints'][0]['name']}/torque"
-    for found in (first, second):
-        np.testing.assert_array_equal(found.curve(f"{path}/joint_torque"), table["joint_torque[1]"])
 
 
 def test_without_the_package_it_names_what_to_install(

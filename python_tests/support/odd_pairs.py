@@ -152,26 +152,15 @@ def described(**keys: Any) -> Quirk:
 
 
 QUIRKS |= {
-    "five_seconds": recorded(5.0, 100.0),
     "twenty_hertz": recorded(20.0, 20.0),
-    "a_sample_every_half_second": recorded(60.0, 2.0),
     "degrees_for_radians": scaled(*ENCODERS, by=180.0 / np.pi, kinematics=3),
     "forces_in_millinewtons": scaled("tendon_force", by=1e3),
-    "absurdly_large": scaled(*SENSORS, by=1e12),
     "absurdly_small": scaled("tendon_force", by=1e-200),
     "wrong_signs": scaled("tendon_position", by=-1.0),
     "threshold_zero": described(velocity_threshold={"tendon": 0.0, "joint": 0.0}),
-    "threshold_huge": described(velocity_threshold={"tendon": 10.0, "joint": 1000.0}),
     "noise_zero": described(bias={"noise_std": 0.0, "noise_std_per_force": 0.0}),
     "bias_eager": described(bias={"drift_variance": 1e3, "forget_rate": 0.0, "noise_time": 0.001}),
 }
-
-
-@quirk
-def no_friction_given(rng: np.random.Generator, pair: Pair) -> None:
-    parts = (*pair.description["joints"], *pair.description["tendons"])
-    for part, key in product(parts, ("friction", "load_friction", "edge_friction", "pulley_friction")):
-        part.pop(key, None)
 
 
 @quirk
@@ -182,23 +171,11 @@ def viscous_alone(rng: np.random.Generator, pair: Pair) -> None:
 
 
 @quirk
-def soft_tendons_with_names_of_any_letters(rng: np.random.Generator, pair: Pair) -> None:
-    for tendon in pair.description["tendons"]:
-        tendon |= {"stiffness": 1e-3, "name": "Zeigefinger <b>№ 2</b> & ↯ ${x} {{y}} %s"}
-
-
-@quirk
 def presliding_is_there(rng: np.random.Generator, pair: Pair) -> None:
     pair.description["extensions"] = [
         {"effect": "presliding", "joint": 1, "displacement": 0.01},
         {"effect": "presliding", "tendon": 1, "displacement": 1e-4},
     ]
-
-
-@quirk
-def other_joint_count(rng: np.random.Generator, pair: Pair) -> None:
-    for columns, name in product(pair.all, ENCODERS):
-        columns[name] = np.hstack([columns[name], columns[name][:, :1]])
 
 
 @quirk
@@ -221,37 +198,12 @@ def slack_tendons(rng: np.random.Generator, columns: Columns) -> None:
     force[:, -1] *= rng.integers(0, 2)
 
 
-@in_columns
-def huge_noise(rng: np.random.Generator, columns: Columns) -> None:
-    columns["tendon_force"] += 30.0 * rng.normal(size=columns["tendon_force"].shape)
-    columns["tendon_position"] += 5e-3 * rng.normal(size=columns["tendon_position"].shape)
-
-
-@quirk
-def constant_signals(rng: np.random.Generator, pair: Pair) -> None:
-    for columns, name in product(pair.recordings, (*SENSORS, *ENCODERS)):
-        columns[name][:] = columns[name][0]
-
-
 @quirk
 def stuck_sensor(rng: np.random.Generator, pair: Pair) -> None:
     name = str(rng.choice(["tendon_force", "tendon_position", "joint_position"]))
     for columns in pair.recordings:
         part = slice(len(columns["time"]) // 4, int(len(columns["time"]) * rng.uniform(0.4, 0.95)))
         columns[name][part, 0] = columns[name][part.start, 0]
-
-
-@quirk
-def a_joint_that_rests(rng: np.random.Generator, pair: Pair) -> None:
-    pair.kinematics = 3
-    for columns in pair.all:
-        columns["joint_position"][:, -1] = 0.1 + 1e-6 * rng.normal(size=len(columns["time"]))
-        columns["joint_velocity"][:, -1] = 0.0
-
-
-@in_columns
-def known_load(rng: np.random.Generator, columns: Columns) -> None:
-    columns["external_torque"] = 0.02 * np.sin(columns["time"])[:, None] * np.ones(columns["joint_position"].shape)
 
 
 @in_columns
@@ -298,25 +250,11 @@ def another_finger_in_the_test(rng: np.random.Generator, pair: Pair) -> None:
 
 
 @quirk
-def contact_in_the_test(rng: np.random.Generator, pair: Pair) -> None:
-    pair.tests = [moved(rng, pair.description, 6.0, 100.0)]
-    pair.tests[0]["contact"] = np.ones(len(pair.tests[0]["time"]))
-
-
-@quirk
 def a_tendon_that_moves_nothing(rng: np.random.Generator, pair: Pair) -> None:
     arms = [0.0] * len(pair.description["joints"])
     pair.description["tendons"].append({"name": "spare", "stiffness": 5000.0, "moment_arms": arms})
     for columns, name in product(pair.all, SENSORS):
         columns[name] = np.hstack([columns[name], columns[name][:, :1]])
-
-
-@quirk
-def nearly_the_same_arms(rng: np.random.Generator, pair: Pair) -> None:
-    """Joints that the tendons can hardly tell apart."""
-    for tendon in pair.description["tendons"]:
-        first = tendon["moment_arms"][0] or 0.008
-        tendon["moment_arms"] = [first * (1.0 + 1e-9 * j * rng.random()) for j in range(len(tendon["moment_arms"]))]
 
 
 def make_pair(name: str, seed: int = 0) -> Pair:
