@@ -52,15 +52,6 @@ def test_noise_is_not_confirmed(memory: float, wander: float) -> None:
     assert np.mean(found < 0.5) > 0.1, "it never says anything"
 
 
-@pytest.mark.parametrize(("memory", "wander"), repeated([(0.0, 0.0), (0.97, 0.0)], 1))
-def test_columns_as_slow_as_the_bias_are_hardly_confirmed(memory: float, wander: float) -> None:
-    """Periods of 3 to 20 s beside splines with knots every 2 s. Of one number 1 to 5 % are at a nominal 1 %; without
-    what is given back to the stretches it is 5 to 11 %, of four numbers 14 to 24 %."""
-    found = by_chance(memory, wander, 0.05, 0.3)
-    assert np.sum(found < 0.01) <= most(0.05, len(found))
-    assert np.sum(found < 1e-4) <= most(0.005, len(found))
-
-
 def test_what_was_tried_counts() -> None:
     rng = np.random.default_rng(3)
     values = waves(rng, 1)

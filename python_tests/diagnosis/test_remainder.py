@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,21 +85,6 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
         assert line is not None
         assert line.frequency == pytest.approx(3.7, abs=0.02)
         assert "3.7 Hz" in found.description
-
-
-@pytest.mark.long
-def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
-    series = make_series(3, seconds=40.0)
-    nuisance = nuisance_of(series)
-    residual = residual_of(series, nuisance)
-    gap = (series.time > 12.0) & (series.time < 15.0)
-    masked = replace(series, used=~gap)
-    one = measure_remainder(masked, residual, bias_splines(masked), seed=5)
-    spoilt = np.where(gap[:, None], 10.0, residual)
-    other = measure_remainder(masked, spoilt, bias_splines(masked), seed=5)
-    assert other.p_value == one.p_value
-    np.testing.assert_array_equal(other.prediction[~gap], one.prediction[~gap])
-    assert not other.prediction[gap].any()
 
 
 def test_too_short_is_not_judged() -> None:

@@ -198,20 +198,6 @@ def test_the_name_of_one_element_does_not_make_it_an_external_torque(tmp_path: P
     assert lines["external_torque[2]"].source == "/tendons.external_torque[ext]"  # the array says so
 
 
-def test_bad_usage(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t,force\n1,2\n")
-    for arguments, words in (
-        (["inspect", "log.csv", "--map", "map.json"], ["--map", "expected -o"]),
-        (["inspect", "log.csv", "-o", "map.csv"], ["map.csv", ".json"]),
-        (["inspect", "absent.csv"], ["absent.csv", "no such file"]),
-        (["inspect", "log.csv", "-o", "log.json/x.json"], ["log.json"]),
-        (["table", "log.csv", "--map", "map.json"], ["--output", "missing"]),
-    ):
-        answer = call("convert", *arguments)
-        assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
-        assert all(word in answer.err for word in words), answer.err
-
-
 def test_a_clock_is_found_by_its_values(tmp_path: Path) -> None:
     """Whatever its name is; a counter of samples is none, and a ramp of a motor is not even."""
     columns = {"n": np.arange(400), "Zeit": 7.0 + T, "tension": FORCE, "spool_position": SPOOL, "joint_angle": ANGLE}
