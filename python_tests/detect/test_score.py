@@ -226,6 +226,14 @@ def test_bad_input_is_named_and_leaves_nothing(
     assert not Path("s.json").exists()
 
 
+def test_what_is_no_model_is_refused(call: Call, pushes: Table) -> None:
+    recording = written({name: column[:600] for name, column in pushes.items()}, "r.csv")
+    Path("broken.fmu").write_text("no archive")
+    for model, words in ((recording, "a recording; expected FINGER.json"), ("broken.fmu", "broken.fmu: not an FMU")):
+        answer = call("score", model, recording, "-o", "s.json")
+        assert answer.status == 2 and words in answer.err and not Path("s.json").exists(), answer
+
+
 def close_to(found: Any, shown: Any, key: str, tolerance: float = 6e-3) -> None:
     """By default within what the page rounds to three digits."""
     if isinstance(shown, dict):

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.detect.sensor_faults import AMPLE, finds_a_fault, learn_sensors
+from tendonfmu.estimate.structure import Choice, build_structure, with_values
+from tendonfmu.model import native
+from tendonfmu.model.description import Finger
 
 Array = NDArray[np.float64]
 
@@ -96,3 +102,14 @@ def test_why_it_is_left_out(data: dict[str, object], drop: str, why: str) -> Non
         arrays |= {key: arrays[key][:, 1:3] for key in ("tendon_force", "tendon_position")}
     rule = learn_sensors(data, [FreePart("made", arrays, each.mean_force, each.counted, each.seconds)])
     assert rule.keys is None and rule.why == why
+
+
+def test_a_fit_leaves_the_watch_out_and_keeps_its_keys() -> None:
+    """The sensors' watch is no part of the friction model."""
+    joints = [{"friction": {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1}}, {}]
+    data = json.loads(json.dumps(FINGER | {"joints": joints, "sensor_fault": {"jump_margin": 0.7}}))
+    finger = Finger(Path("finger"), data)
+    structure = build_structure(finger, Choice())
+    assert "sensor_fault" not in structure.start.data
+    values = np.array([parameter.start for parameter in native.Instance(structure.start.image).parameters()])
+    assert with_values(structure, values).data["sensor_fault"] == {"jump_margin": 0.7}

@@ -8,9 +8,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from fit_cases import small_finger
 from tendonfmu.diagnosis import cause_gains
+from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.cause import Cause, Where
+from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.statistics import Interval
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
@@ -102,3 +105,27 @@ def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
         "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s
         "move slowly",
     ]
+
+
+def in_nominal(data: Any, effect: Term) -> bool:
+    made = whole._Result.__new__(whole._Result)
+    search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
+    made._searched = cast("Any", search)
+    return made._is_in_nominal(effect)
+
+
+def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Joint 1 of the nominal finger has friction of its own; friction by the load is a cause of the extended one."""
+    span = SimpleNamespace(speed=np.ones(2), tendon_speed=np.full((4, 2), 0.01))
+    monkeypatch.setattr(whole, "span_of", lambda data, recordings: span)
+    stribeck, nominal = by_name("stribeck"), small_finger()
+    flat = {"coulomb": 0.006, "static": 0.006, "stribeck_velocity": 0.1}
+    nominal["joints"][0] = {"name": "base", "friction": flat}
+    nominal["joints"][1] = {"name": "tip"}
+    extended = {**nominal, "joints": [{**nominal["joints"][0], "load_friction": flat}, nominal["joints"][1]]}
+    own, of_load = Term(stribeck, Place(1), {"stribeck_velocity": 0.1}), Term(stribeck, Place(1), {"load": 1.0})
+    assert in_nominal(nominal, own) and in_nominal(extended, own)
+    assert in_nominal(extended, of_load) and not in_nominal(nominal, of_load)
+    assert not in_nominal(nominal, Term(stribeck, Place(2), {}))  # no law at joint 2
+    curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
+    assert not in_nominal(curved, own)  # the law has what the effect would add

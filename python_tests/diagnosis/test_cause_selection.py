@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
-from tendonfmu.diagnosis.effects import Place
-from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, hypotheses
+from tendonfmu.diagnosis.effects import Place, by_name
+from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, LARGEST_SECANT, hypotheses
 from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
 from tendonfmu.diagnosis.signal_choice import lag_of
@@ -333,3 +333,21 @@ def test_noise_of_positions_is_what_smoothing_takes_off() -> None:
     still = np.zeros((5000, 1))
     still[2500:] = 0.01
     assert noise_of(still, still) == pytest.approx([0.01 / np.sqrt(12.0)])
+
+
+def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) -> None:
+    """Next to what the effect takes away: for its fits to decide."""
+    twin = columns[:, :, 0] + 0.2 * columns[:, :, 5]
+    values = np.stack([columns[:, :, 0], twin, columns[:, :, 1]], axis=2)
+    made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
+    selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
+    best = selection.refined("moment_arm_variation")
+    assert best.tendon == 1
+    assert [each.tendon for each in selection.near(best)] == [2]
+
+
+def test_steps_that_lead_to_nothing_visible_are_not_tried() -> None:
+    play = by_name("backlash")
+    assert SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 1.01})
+    assert not SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 0.99})
+    assert SENSORS.worth(by_name("gravity"), Place(1), {})

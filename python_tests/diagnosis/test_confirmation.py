@@ -139,3 +139,11 @@ def test_splines_take_a_slow_bias_and_leave_a_fast_one() -> None:
     series.segment[1500:] = 1
     assert np.array_equal(constant_bias(series).toarray().sum(axis=0), [1500, BLOCKS - 1500])
     assert series.step == STEP
+
+
+def test_what_is_nuisance_is_nothing_new() -> None:
+    rng = np.random.default_rng(6)
+    nominal = waves(rng, 4)
+    test = confirmation(series_with(coloured(rng) + 5.0 * nominal[:, :, 0]), nominal)
+    assert test.p_value(np.zeros((BLOCKS, JOINTS, 1)), 1) == 1.0
+    assert test.p_value(np.ones((BLOCKS, JOINTS, 1)), 1) > 0.01

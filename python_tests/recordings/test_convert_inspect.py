@@ -216,3 +216,19 @@ def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> 
         assert (line.source, line.sure) == (f"pos{number}", "likely") and "as many as forces" in line.why
     joints = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers) | {"pos12": SPOOL})
     assert "joint_position[12]" in joints  # not as many as forces: angles of joints, as by the word alone
+
+
+def test_unused_fields_that_come_as_a_group_may_be_joints(call: Call, tmp_path: Path) -> None:
+    """Encoders of joints with a name of their own; temperatures never cross 0, and one field alone is no group."""
+    names = ("flex", "back")
+    columns = of_tendons("F_{} [N]", "x_{} [m]", names) | {f"halla_{name}": np.degrees(ANGLE) for name in names}
+    columns |= {f"heat_{name}": 30.0 + 0.1 * ANGLE for name in names} | {"odd": ANGLE}
+    lines = proposed(tmp_path, columns)
+    for k, name in enumerate(names, start=1):
+        line = lines[f"joint_position[{k}]"]
+        assert (line.source, line.unit, line.sure) == (f"halla_{name}", "?", "undecided")
+    assert not {"heat_flex", "odd"} & {line.source for line in lines.values()}
+    assert (
+        '"?" is left to you: joint_position[1], joint_position[2]'
+        in call("convert", "inspect", "log.csv", "-o", "new.json").err
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +151,20 @@ def test_no_filter_passes_over_a_gap() -> None:
     time = np.r_[np.arange(0.0, 1.0, 0.002), np.arange(5.0, 6.0, 0.002)]
     angle = 0.5 * time + 3.0 * (time > 3.0)
     assert central_velocity(time, angle, 20.0) == pytest.approx(0.5, rel=1e-6)
+
+
+def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path: Path) -> None:
+    machine_log(tmp_path, machine(noise=0.02))
+    made = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "one.json")
+    assert made.status == 0
+    assert call("describe", "joint", "--name", "joint", "--recording", "rec.parquet", "-o", "other.json").status == 0
+    assert json.loads((tmp_path / "one.json").read_text()) == json.loads((tmp_path / "other.json").read_text())
+    for arguments, words in (
+        (["servo", "--name", "a"], ["'servo'", "joint or finger"]),
+        (["joint", "--name", " "], ["--name"]),
+        (["joint", "--name", "a", "--recording", "rec.parquet", "--torque", "3"], ["--torque", "--recording"]),
+        (["joint", "--name", "a", "--recording", "absent.csv"], ["absent.csv"]),
+    ):
+        answer = call("describe", *arguments, "-o", "new.json")
+        assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
+        assert all(word in answer.err for word in words) and not (tmp_path / "new.json").exists()
