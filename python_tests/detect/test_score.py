@@ -58,7 +58,7 @@ def written(table: Table, name: str, **changes: NDArray[Any] | None) -> Path:
 
 def test_the_demo_is_scored_as_by_hand(call: Call) -> None:
     """Counted again by hand: a loop over samples, nothing of the product's."""
-    answer = call("score", INDEX, PUSHES, FREE_X4, "-o", "s.json", "--figures", "fig")
+    answer = call("score", INDEX, PUSHES, FREE_X4, "-o", "s.json")
     report = report_of(answer)
     assert set(report) > LITERAL
     assert (report["format"], report["events"], report["found"]) == ("tendonfmu-score-1", 11, 8)
@@ -81,7 +81,6 @@ def test_the_demo_is_scored_as_by_hand(call: Call) -> None:
     factors = [point["factor"] for point in report["roc"]["points"]]
     assert factors == sorted(factors) and factors[-1] / factors[0] == 32.0
     assert report["roc"]["points"][-1]["found"] == report["roc"]["points"][-1]["false_alarms"] == 0
-    assert {file.name for file in Path("fig").iterdir()} == {"contacts.png", "events.png", "roc.png", "delays.png"}
 
 
 def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any]) -> list[float | None]:
@@ -102,9 +101,11 @@ def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Tab
     force = np.linspace(0.0, 2.0, len(pushes["time"]))
     labelled = written(pushes, "a.parquet", contact=None, touched=pushes["contact"], newton=force)
     plain = written(pushes, "b.parquet", touched=pushes["contact"], contact=None, **load)
-    answer = call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton", "--json")
+    options = ("--labels", "touched", "--force", "newton", "--figures", "fig", "--json")
+    answer = call("score", INDEX, labelled, plain, "-o", "s.json", *options)
     report = report_of(answer)
     assert json.loads(answer.out) == report
+    assert {file.name for file in Path("fig").iterdir()} == {"contacts.png", "events.png", "roc.png", "delays.png"}
     first, second = report["recordings"]
     assert (report["labels"], report["events"], first["events"], second["events"]) == ("touched", 8, 4, 4)
     assert (first["external_torque"], second["external_torque"]) == (True, False)

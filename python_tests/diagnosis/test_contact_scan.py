@@ -35,7 +35,7 @@ def pushed(series: Series) -> Series:
     return replace(series, target=target)
 
 
-@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize("seed", repeated([11, 12], 0))
 def test_pushes_are_found_with_time_and_joint(seed: int) -> None:
     series = pushed(make_series(seed))
     found = events_of(series)

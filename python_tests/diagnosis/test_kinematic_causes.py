@@ -15,6 +15,7 @@ import pytest
 
 from command import Call
 from encoder_finger import EncoderFinger, encoder_finger
+from repetitions import repeated
 from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import KinematicCauses, find_kinematic_causes
@@ -64,7 +65,7 @@ def test_each_is_named_alone(
         assert cause.changed.change.value == pytest.approx(size, rel=0.02)
 
 
-@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize("number", repeated([1, 2, 3], 0))
 def test_nothing_is_named_where_nothing_is_off(number: int) -> None:
     """Springs that stiffen, and another load than the reference's, are no change."""
     finger = encoder_finger(number, hardening=0.004)
