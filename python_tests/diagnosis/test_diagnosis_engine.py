@@ -201,6 +201,7 @@ def test_places_of_one_effect_are_one_cause() -> None:
     assert [each.effect for each in load.alike] == ["moment_arm", "force_gain", "inertia"]
 
 
+@pytest.mark.long
 def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     given, seen = described(finger()), list[str]()
     chosen = choose(given, [hidden], FitSettings(threads=1))
