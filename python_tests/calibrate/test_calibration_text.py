@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
-from tendonfmu.calibration.report import left_out
 from tendonfmu.calibration.text import size_rows, verdict
 from tendonfmu.report.numbers import together
 
@@ -57,13 +55,3 @@ def test_pushes_are_told_by_size() -> None:
     assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
     assert found[2][1:] == ("4 of 4", "40 to 100 %")
     assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
-
-
-def test_many_stretches_that_are_left_out_are_one_warning() -> None:
-    events: list[Any] = [
-        SimpleNamespace(recording="a.csv", start=10.0 * k, end=11.0 * k, description=f"at joint {k}")
-        for k in range(1, 5)
-    ]
-    assert len(left_out(events[:2])) == 2 and left_out(events[:2])[0].endswith("at joint 1; left out of the fit")
-    (said,) = left_out(events)
-    assert said.startswith("4 stretches, 10 s in all") and "at joint 4" in said

@@ -100,18 +100,6 @@ def test_held_to_the_end(spans: list[tuple[float, float]], held: bool, part: flo
     assert event.held_share == pytest.approx(part)
 
 
-def test_at_the_alarm() -> None:
-    torque = np.column_stack([TIME, -TIME])
-    signals = Signals(compensated=torque, external=2 * torque, force=3 * TIME)
-    event = score_detection(TIME, flags((2.0, 3.0)), flags((2.5, 3.0)), signals).events[0]
-    assert event.compensated == pytest.approx([2.5, -2.5])
-    assert event.external == pytest.approx([5.0, -5.0])
-    assert event.force == pytest.approx(7.5)
-    summary = summarise(score_detection(TIME, flags((2.0, 3.0)), flags((2.5, 3.0)), signals))
-    assert summary.external_at_alarm is not None and summary.force_at_alarm is not None
-    assert [each.value for each in summary.external_at_alarm] == pytest.approx([5.0, 5.0])
-
-
 def test_nobody_pushes_or_somebody_always_does() -> None:
     everywhere = np.ones(len(TIME), bool)
     quiet = score_detection(TIME, ~everywhere, ~everywhere)

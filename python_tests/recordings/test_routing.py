@@ -183,25 +183,6 @@ def test_redundant_tendons_show_their_stiffness() -> None:
     assert len(covered) == 30 and np.mean(covered) >= 0.85
 
 
-def test_at_one_joint_arms_are_known_against_each_other() -> None:
-    finger, recording = made_up(2)
-    recording.groups.update({name: values[:, :2] for name, values in recording.groups.items() if "tendon" in name})
-    recording.groups["tendon_position"] -= recording.groups.pop("joint_position")[:, 1:] @ ARMS[:2, 1:].T
-    data = json.loads(json.dumps(dict(finger.data)))
-    data["joints"], data["contact"] = data["joints"][:1], {"threshold": [0.1]}
-    data["tendons"] = [
-        {**tendon, "moment_arms": [factor * tendon["moment_arms"][0]]}
-        for tendon, factor in zip(data["tendons"][:2], (1.1, 1.0), strict=True)
-    ]
-    given = finger_from_data(data)
-    first, second = learn_routing(given, [recording])
-    assert (first.seen_from, second.seen_from) == ([1], [0])
-    assert not first.arms[0].is_known and second.arms[0].differs
-    assert second.arms[0].value == pytest.approx(1.1 * ARMS[1, 0], abs=3.0 * second.arms[0].half)
-    lines = [finding.line() for finding in belongs(given, [recording])]
-    assert "10 % larger than described (seen from tendon 1)" in lines[-1], lines
-
-
 def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:
     given = tmp_path / "given.json"
     given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")
