@@ -194,6 +194,12 @@ def test_resampled_intervals_are_those_of_theory() -> None:
     assert RESAMPLES >= 1000
 
 
+def test_many_blocks_are_put_together_without_loss() -> None:
+    sums = np.column_stack([np.ones(1234), np.arange(1234.0)])
+    found = of_sums(sums, lambda each: each[:, 1:] / each[:, :1], seed=0)[0]
+    assert found.value == pytest.approx(616.5) and found.low < 616.5 < found.high
+
+
 def test_a_roc_asks_for_every_factor_and_counts() -> None:
     size = np.where(flags((2.0, 3.0)), 3.0, np.where(flags((6.0, 7.0)), 1.5, 0.0))
     points = roc(lambda factor: score_detection(TIME, flags((2.0, 3.0)), size > factor), (1.0, 2.0, 4.0))
@@ -204,9 +210,3 @@ def test_a_roc_asks_for_every_factor_and_counts() -> None:
     ]
     assert points[0].false_alarms_per_hour.value == pytest.approx(3600 / 8.9)
     assert points[1].median_delay == 0.0 and math.isnan(points[2].median_delay)
-
-
-def test_many_blocks_are_put_together_without_loss() -> None:
-    sums = np.column_stack([np.ones(1234), np.arange(1234.0)])
-    found = of_sums(sums, lambda each: each[:, 1:] / each[:, :1], seed=0)[0]
-    assert found.value == pytest.approx(616.5) and found.low < 616.5 < found.high

@@ -85,28 +85,6 @@ def test_an_effect_that_a_law_may_have_needs_more_beside_presliding(
     assert cause_gains._needed(causes, gains, sliding) == needed
 
 
-# --- experiments are planned for laws of the nominal description ------------------------------------------------------
-
-
-def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
-    """Uncertain, it comes with what would settle it: more of the same motion, or another experiment."""
-    known = {"p_value": 1e-9, "terms": ()}
-    small, wide, none = (
-        Cause(Where(effect), gain=Interval(*gain), **known)
-        for effect, gain in (
-            ("inertia", (0.01, 0.005, 0.015)),
-            ("gravity", (0.14, -0.05, 0.42)),
-            ("backlash", (-0.1, -0.2, 0.0)),
-        )
-    )
-    parts = not_taken([small, wide, none], {none.key: "move slowly"}, 40.0)
-    assert [cause.effect for cause in parts["too_small"]] == ["inertia"]
-    assert [cause.experiment for cause in parts["uncertain"]] == [
-        "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s
-        "move slowly",
-    ]
-
-
 def in_nominal(data: Any, effect: Term) -> bool:
     made = whole._Result.__new__(whole._Result)
     search = SimpleNamespace(nominal=SimpleNamespace(data=data), fitted_to=[SimpleNamespace(kinematics=1)])
@@ -129,3 +107,25 @@ def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytes
     assert not in_nominal(nominal, Term(stribeck, Place(2), {}))  # no law at joint 2
     curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
     assert not in_nominal(curved, own)  # the law has what the effect would add
+
+
+# --- experiments are planned for laws of the nominal description ------------------------------------------------------
+
+
+def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
+    """Uncertain, it comes with what would settle it: more of the same motion, or another experiment."""
+    known = {"p_value": 1e-9, "terms": ()}
+    small, wide, none = (
+        Cause(Where(effect), gain=Interval(*gain), **known)
+        for effect, gain in (
+            ("inertia", (0.01, 0.005, 0.015)),
+            ("gravity", (0.14, -0.05, 0.42)),
+            ("backlash", (-0.1, -0.2, 0.0)),
+        )
+    )
+    parts = not_taken([small, wide, none], {none.key: "move slowly"}, 40.0)
+    assert [cause.effect for cause in parts["too_small"]] == ["inertia"]
+    assert [cause.experiment for cause in parts["uncertain"]] == [
+        "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s
+        "move slowly",
+    ]

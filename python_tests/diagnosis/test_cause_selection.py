@@ -259,6 +259,17 @@ def test_an_effect_of_some_places_is_named_there(
     assert found.key == ("load_friction", *place)
 
 
+def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) -> None:
+    """Next to what the effect takes away: for its fits to decide."""
+    twin = columns[:, :, 0] + 0.2 * columns[:, :, 5]
+    values = np.stack([columns[:, :, 0], twin, columns[:, :, 1]], axis=2)
+    made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
+    selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
+    best = selection.refined("moment_arm_variation")
+    assert best.tendon == 1
+    assert [each.tendon for each in selection.near(best)] == [2]
+
+
 # --- gains ------------------------------------------------------------------------------------------------------------
 
 
@@ -319,6 +330,13 @@ def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:
     assert SENSORS.resolved(found["gravity"], [1e-12])
 
 
+def test_steps_that_lead_to_nothing_visible_are_not_tried() -> None:
+    play = by_name("backlash")
+    assert SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 1.01})
+    assert not SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 0.99})
+    assert SENSORS.worth(by_name("gravity"), Place(1), {})
+
+
 def test_noise_of_positions_is_what_smoothing_takes_off() -> None:
     rng = np.random.default_rng(6)
     smooth = np.sin(np.linspace(0.0, 20.0, 5000))[:, None] * [1.0, 1.0, 1.0, 0.0]
@@ -333,21 +351,3 @@ def test_noise_of_positions_is_what_smoothing_takes_off() -> None:
     still = np.zeros((5000, 1))
     still[2500:] = 0.01
     assert noise_of(still, still) == pytest.approx([0.01 / np.sqrt(12.0)])
-
-
-def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) -> None:
-    """Next to what the effect takes away: for its fits to decide."""
-    twin = columns[:, :, 0] + 0.2 * columns[:, :, 5]
-    values = np.stack([columns[:, :, 0], twin, columns[:, :, 1]], axis=2)
-    made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
-    selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
-    best = selection.refined("moment_arm_variation")
-    assert best.tendon == 1
-    assert [each.tendon for each in selection.near(best)] == [2]
-
-
-def test_steps_that_lead_to_nothing_visible_are_not_tried() -> None:
-    play = by_name("backlash")
-    assert SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 1.01})
-    assert not SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 0.99})
-    assert SENSORS.worth(by_name("gravity"), Place(1), {})

@@ -91,6 +91,14 @@ def test_columns_are_asked_for_together_and_their_scale_is_nothing() -> None:
     assert test.p_value(np.concatenate([values, values], axis=2), 1) == pytest.approx(whole, rel=1e-3)
 
 
+def test_what_is_nuisance_is_nothing_new() -> None:
+    rng = np.random.default_rng(6)
+    nominal = waves(rng, 4)
+    test = confirmation(series_with(coloured(rng) + 5.0 * nominal[:, :, 0]), nominal)
+    assert test.p_value(np.zeros((BLOCKS, JOINTS, 1)), 1) == 1.0
+    assert test.p_value(np.ones((BLOCKS, JOINTS, 1)), 1) > 0.01
+
+
 def test_too_few_stretches_confirm_nothing() -> None:
     rng = np.random.default_rng(7)
     values = waves(rng, 2)[:500]
@@ -139,11 +147,3 @@ def test_splines_take_a_slow_bias_and_leave_a_fast_one() -> None:
     series.segment[1500:] = 1
     assert np.array_equal(constant_bias(series).toarray().sum(axis=0), [1500, BLOCKS - 1500])
     assert series.step == STEP
-
-
-def test_what_is_nuisance_is_nothing_new() -> None:
-    rng = np.random.default_rng(6)
-    nominal = waves(rng, 4)
-    test = confirmation(series_with(coloured(rng) + 5.0 * nominal[:, :, 0]), nominal)
-    assert test.p_value(np.zeros((BLOCKS, JOINTS, 1)), 1) == 1.0
-    assert test.p_value(np.ones((BLOCKS, JOINTS, 1)), 1) > 0.01

@@ -84,6 +84,12 @@ def hidden() -> FitRecording:
     return recorded(with_cover(), 21, 3)
 
 
+@pytest.fixture(scope="module")
+def sound() -> FitRecording:
+    """40 s of what the description describes, by tendon positions."""
+    return recorded(finger(), 22, 1)
+
+
 # --- forces as the model predicts them --------------------------------------------------------------------------------
 
 
@@ -103,6 +109,20 @@ def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecordi
     assert np.allclose(stretch, force, atol=1e-9), "angles stay as they were measured"
 
 
+@pytest.mark.parametrize("delay", [0.02, -0.015])
+def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, sound: FitRecording) -> None:
+    data = finger() | {"extensions": [{"effect": "time_delay", "delay": delay}]}
+    grid = make_grid([sound])
+    series = series_of(data, [sound], grid)
+    predicted = predicted_of(data, [sound], grid, series)[0]
+    before, after = (Instance.from_description(data, 1).run(each.recording.arrays()) for each in (sound, predicted))
+    inside = slice(20, -20)  # a delay has no force to pair with at the ends
+    # interpolated between samples: a millionth of a radian
+    assert np.abs(after["joint_angle"] - before["joint_angle"])[inside].max() < 2e-6
+    change = sound.recording.groups["tendon_force"] - predicted.recording.groups["tendon_force"]
+    assert np.abs(change).max() / STIFFNESS / 0.009 > 1e-5, "uncorrected it would be seen"
+
+
 # --- where it starts --------------------------------------------------------------------------------------------------
 
 
@@ -110,6 +130,14 @@ def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecordi
 def test_positions_and_forces_tell_their_delay(samples: int) -> None:
     made = recorded(finger(), 23, 1, 20.0, samples)
     assert delay_of_positions(finger(), [made]) == pytest.approx(samples / RATE, abs=5e-4)
+
+
+def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
+    data = finger()
+    data["tendons"] = data["tendons"][1:3]
+    groups = {name: values[:, 1:3] if "tendon" in name else values for name, values in sound.recording.groups.items()}
+    few = replace(sound, recording=replace(sound.recording, groups=groups))
+    assert delay_of_positions(data, [few]) is None
 
 
 def scanned(made: FitRecording) -> Any:
@@ -137,6 +165,13 @@ def test_the_scan_starts_with_presliding_where_there_is_some() -> None:
     assert starts[0].error < 0.7 * without
 
 
+def test_the_scan_finds_joints_that_are_softer_than_their_tendons() -> None:
+    soft = [{"effect": "presliding", "joint": j, "displacement": 0.05} for j in (1, 2)]
+    truth = finger() | {"extensions": [{"effect": "presliding", "displacement": 0.05}, *soft]}  # 25 µm at tendons
+    starts = scanned(recorded(truth, 25, 3, 20.0))
+    assert [each.place for each in starts[0].presliding] == [Place(), Place(joint=1), Place(joint=2)]
+
+
 def test_negative_friction_is_no_cause() -> None:
     rows = [
         {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
@@ -145,6 +180,17 @@ def test_negative_friction_is_no_cause() -> None:
     least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, 0.0)
     assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
     assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
+
+
+def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
+    rng = np.random.default_rng(2)
+    groups = dict(sound.recording.groups)
+    groups["tendon_position"] = groups["tendon_position"] + 1e-5 * rng.standard_normal(groups["tendon_position"].shape)
+    noisy = prepare(described(finger()), replace(sound.recording, groups=groups), 1, Held())
+    before, after = (least_sizes(finger(), [each], 0.005) for each in (sound, noisy))
+    assert after.tendon_noise == pytest.approx(np.hypot(before.tendon_noise, 1e-5 * np.sqrt(0.85)), rel=0.15)
+    assert np.all(after.joint_noise > 2.0 * before.joint_noise)
+    assert after.least("time_delay", None, None) == pytest.approx(0.75 * 0.005)
 
 
 # --- as it runs online ------------------------------------------------------------------------------------------------
@@ -258,49 +304,3 @@ def test_presliding_as_long_as_the_motion_is_a_spring(hidden: FitRecording) -> N
         joint = {"effect": "presliding", "joint": 1, "displacement": share * float(span.travel[0])}
         assert is_spring({**finger(), "extensions": [joint]}, span) == spring
     assert not is_spring(finger(), span)
-
-
-@pytest.fixture(scope="module")
-def sound() -> FitRecording:
-    """40 s of what the description describes, by tendon positions."""
-    return recorded(finger(), 22, 1)
-
-
-@pytest.mark.parametrize("delay", [0.02, -0.015])
-def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, sound: FitRecording) -> None:
-    data = finger() | {"extensions": [{"effect": "time_delay", "delay": delay}]}
-    grid = make_grid([sound])
-    series = series_of(data, [sound], grid)
-    predicted = predicted_of(data, [sound], grid, series)[0]
-    before, after = (Instance.from_description(data, 1).run(each.recording.arrays()) for each in (sound, predicted))
-    inside = slice(20, -20)  # a delay has no force to pair with at the ends
-    # interpolated between samples: a millionth of a radian
-    assert np.abs(after["joint_angle"] - before["joint_angle"])[inside].max() < 2e-6
-    change = sound.recording.groups["tendon_force"] - predicted.recording.groups["tendon_force"]
-    assert np.abs(change).max() / STIFFNESS / 0.009 > 1e-5, "uncorrected it would be seen"
-
-
-def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
-    data = finger()
-    data["tendons"] = data["tendons"][1:3]
-    groups = {name: values[:, 1:3] if "tendon" in name else values for name, values in sound.recording.groups.items()}
-    few = replace(sound, recording=replace(sound.recording, groups=groups))
-    assert delay_of_positions(data, [few]) is None
-
-
-def test_the_scan_finds_joints_that_are_softer_than_their_tendons() -> None:
-    soft = [{"effect": "presliding", "joint": j, "displacement": 0.05} for j in (1, 2)]
-    truth = finger() | {"extensions": [{"effect": "presliding", "displacement": 0.05}, *soft]}  # 25 µm at tendons
-    starts = scanned(recorded(truth, 25, 3, 20.0))
-    assert [each.place for each in starts[0].presliding] == [Place(), Place(joint=1), Place(joint=2)]
-
-
-def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
-    rng = np.random.default_rng(2)
-    groups = dict(sound.recording.groups)
-    groups["tendon_position"] = groups["tendon_position"] + 1e-5 * rng.standard_normal(groups["tendon_position"].shape)
-    noisy = prepare(described(finger()), replace(sound.recording, groups=groups), 1, Held())
-    before, after = (least_sizes(finger(), [each], 0.005) for each in (sound, noisy))
-    assert after.tendon_noise == pytest.approx(np.hypot(before.tendon_noise, 1e-5 * np.sqrt(0.85)), rel=0.15)
-    assert np.all(after.joint_noise > 2.0 * before.joint_noise)
-    assert after.least("time_delay", None, None) == pytest.approx(0.75 * 0.005)

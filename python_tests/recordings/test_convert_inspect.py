@@ -159,6 +159,17 @@ def test_tendons_without_numbers_keep_the_order_of_the_log(
     assert found["map"]["comment"] == order["line"]
 
 
+def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> None:
+    numbers = tuple(str(k) for k in range(1, 12))
+    lines = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers))
+    assert len(lines) == 23
+    for number in numbers:
+        line = lines[f"tendon_position[{number}]"]
+        assert (line.source, line.sure) == (f"pos{number}", "likely") and "as many as forces" in line.why
+    joints = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers) | {"pos12": SPOOL})
+    assert "joint_position[12]" in joints  # not as many as forces: angles of joints, as by the word alone
+
+
 # --- messages ---------------------------------------------------------------------------------------------------------
 
 
@@ -205,17 +216,6 @@ def test_a_clock_is_found_by_its_values(tmp_path: Path) -> None:
     assert (line.source, line.unit) == ("Zeit", "s")
     columns.pop("Zeit")
     assert proposed(tmp_path, columns)["time"].source == "?"
-
-
-def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> None:
-    numbers = tuple(str(k) for k in range(1, 12))
-    lines = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers))
-    assert len(lines) == 23
-    for number in numbers:
-        line = lines[f"tendon_position[{number}]"]
-        assert (line.source, line.sure) == (f"pos{number}", "likely") and "as many as forces" in line.why
-    joints = proposed(tmp_path, of_tendons("F{}", "pos{}", numbers) | {"pos12": SPOOL})
-    assert "joint_position[12]" in joints  # not as many as forces: angles of joints, as by the word alone
 
 
 def test_unused_fields_that_come_as_a_group_may_be_joints(call: Call, tmp_path: Path) -> None:

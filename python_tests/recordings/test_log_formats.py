@@ -169,6 +169,14 @@ def test_stamps_become_seconds_from_the_first(tmp_path: Path, stamps: list[str],
     assert found == pytest.approx([0.0, 0.5, last], rel=0, abs=1e-15)
 
 
+def test_stamps_of_parquet(tmp_path: Path) -> None:
+    time = pd.to_datetime([0, 2_000_000, 4_000_001], unit="ns")
+    pd.DataFrame({"t": time, "force": 1.0, "spool": 2.0}).to_parquet(tmp_path / "log.parquet")
+    document = edited(SMALL, "columns/time/unit", "datetime")
+    found = convert_table(tmp_path / "log.parquet", with_map(tmp_path, document)).columns["time"]
+    assert found.tolist() == [0.0, 0.002, 0.004000001]
+
+
 @pytest.mark.parametrize(
     ("stamp", "unit", "words"),
     [
@@ -265,6 +273,14 @@ def test_units_of_pint(tmp_path: Path) -> None:
     assert found["tendon_force[1]"] == pytest.approx([1e-8, 2e-8, 3e-8])
 
 
+def test_the_table_agrees_with_pint() -> None:
+    for what, table in units.QUANTITIES.items():
+        reference = next(unit for unit, value in table.items() if value == 1.0)
+        for name, value in table.items():
+            by_pint = units._factor_by_pint(name.replace(".", "*"), reference.replace(".", "*"))
+            assert by_pint == pytest.approx(value, rel=1e-12), (what, name)
+
+
 @pytest.mark.parametrize(("name", "library"), [("MCAP, JSON", "mcap"), ("HDF5", "h5py"), ("ROS 2 bag, db3", "rosbags")])
 def test_a_missing_library_says_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, library: str
@@ -302,6 +318,19 @@ def test_blocks_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
     assert again["time"].tolist() == np.concatenate([block["time"] for block in blocks]).tolist()
 
 
+def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text_log, "CHUNK", 64)
+    rows = [f"{k},1,5" for k in range(100)]
+    for k, line, words in (
+        (61, "61,much,5", "row 62: 'much'"),
+        (40, "2,1,5", "row 41"),
+        (70, "70,1", "row 71: 2 fields"),
+    ):
+        log = "\n".join(["t,force,spool", *rows[:k], line, *rows[k + 1 :]]) + "\n"
+        with pytest.raises(InputError, match=words):
+            convert_table(*written(tmp_path, log))
+
+
 def test_a_block_without_a_whole_row_does_not_set_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Time counts from the first row that is kept, though blocks before it have none."""
     monkeypatch.setattr(text_log, "CHUNK", 64)
@@ -330,32 +359,3 @@ def test_what_mcap_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column time"):
         write_table(tmp_path / "rec.mcap", {"force": np.array([1.0])})
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_table_agrees_with_pint() -> None:
-    for what, table in units.QUANTITIES.items():
-        reference = next(unit for unit, value in table.items() if value == 1.0)
-        for name, value in table.items():
-            by_pint = units._factor_by_pint(name.replace(".", "*"), reference.replace(".", "*"))
-            assert by_pint == pytest.approx(value, rel=1e-12), (what, name)
-
-
-def test_faults_between_blocks_are_named_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(text_log, "CHUNK", 64)
-    rows = [f"{k},1,5" for k in range(100)]
-    for k, line, words in (
-        (61, "61,much,5", "row 62: 'much'"),
-        (40, "2,1,5", "row 41"),
-        (70, "70,1", "row 71: 2 fields"),
-    ):
-        log = "\n".join(["t,force,spool", *rows[:k], line, *rows[k + 1 :]]) + "\n"
-        with pytest.raises(InputError, match=words):
-            convert_table(*written(tmp_path, log))
-
-
-def test_stamps_of_parquet(tmp_path: Path) -> None:
-    time = pd.to_datetime([0, 2_000_000, 4_000_001], unit="ns")
-    pd.DataFrame({"t": time, "force": 1.0, "spool": 2.0}).to_parquet(tmp_path / "log.parquet")
-    document = edited(SMALL, "columns/time/unit", "datetime")
-    found = convert_table(tmp_path / "log.parquet", with_map(tmp_path, document)).columns["time"]
-    assert found.tolist() == [0.0, 0.002, 0.004000001]

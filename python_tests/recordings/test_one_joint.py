@@ -108,6 +108,16 @@ def test_what_does_not_move_is_refused(tmp_path: Path) -> None:
         convert_table(*machine_log(tmp_path, {name: values[:19] for name, values in machine(rest=0.0).items()}))
 
 
+# --- the example ------------------------------------------------------------------------------------------------------
+
+
+def test_no_filter_passes_over_a_gap() -> None:
+    """A joint that is elsewhere after the log was interrupted: no velocity comes of the jump."""
+    time = np.r_[np.arange(0.0, 1.0, 0.002), np.arange(5.0, 6.0, 0.002)]
+    angle = 0.5 * time + 3.0 * (time > 3.0)
+    assert central_velocity(time, angle, 20.0) == pytest.approx(0.5, rel=1e-6)
+
+
 def test_the_description_is_sound_and_its_numbers_are_those_of_the_log(call: Call, tmp_path: Path) -> None:
     machine_log(tmp_path, machine(noise=0.02))
     answer = call("convert", "table", "log.csv", "--map", "map.json", "-o", "rec.parquet", "--finger", "finger.json")
@@ -141,16 +151,6 @@ def test_a_description_without_a_log(call: Call, tmp_path: Path) -> None:
     assert call("fit", "axis.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
     fitted = read_finger(tmp_path / "fitted.json").data["joints"][0]["friction"]
     assert (fitted["coulomb"], fitted["viscous"]) == pytest.approx((COULOMB, VISCOUS), rel=0.03)
-
-
-# --- the example ------------------------------------------------------------------------------------------------------
-
-
-def test_no_filter_passes_over_a_gap() -> None:
-    """A joint that is elsewhere after the log was interrupted: no velocity comes of the jump."""
-    time = np.r_[np.arange(0.0, 1.0, 0.002), np.arange(5.0, 6.0, 0.002)]
-    angle = 0.5 * time + 3.0 * (time > 3.0)
-    assert central_velocity(time, angle, 20.0) == pytest.approx(0.5, rel=1e-6)
 
 
 def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path: Path) -> None:

@@ -127,6 +127,15 @@ def test_arm_stiffness_and_unit_are_named(index: tuple[Finger, Recording]) -> No
     assert unit.severity == "error" and '"unit": "gf"' in unit.line()
 
 
+def test_a_unit_of_forces_shows_in_stiff_springs_too() -> None:
+    """Whose stretch is too small a part of the positions for the balance of the columns."""
+    finger, recording = made_up(5, encoder=1e-5, stiff=20.0)
+    assert not belongs(finger, [recording])
+    grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
+    (unit,) = belongs(finger, [replace(recording, groups=grams)])
+    assert (unit.kind, unit.severity) == ("scale", "error") and '"unit": "gf"' in unit.line()
+
+
 def test_what_the_motion_cannot_tell_stays() -> None:
     finger, recording = made_up(3, still=True)
     learned = learn_routing(finger, [recording])
@@ -192,23 +201,6 @@ def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Fing
     assert _read(INDEX, None, [[FREE], [], []], Options()).routing is None
 
 
-def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:
-    """Its stretch is rounding, as of a motor whose angle is the joint's."""
-    finger, recording = made_up(7, encoder=1e-9, stiff=1e6)
-    learned = learn_routing(finger, [recording])
-    assert [each.stiffness.is_known for each in learned] == [False] * 3 and routed(finger, learned)[1] == []
-
-
-def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
-    finger, recording = made_up(6)
-    angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]
-    bare = [{key: value for key, value in row.items() if key != "zero"} for row in finger.data["tendons"]]
-    ordered, plain = (tendon_positions(data, angle, force) for data in (finger.data, {**finger.data, "tendons": bare}))
-    np.testing.assert_allclose(ordered - plain, np.broadcast_to(ZEROS, ordered.shape), atol=1e-15)
-    read = tendon_angles(replace(recording, groups={**recording.groups, "tendon_position": ordered}), finger)
-    np.testing.assert_allclose(read, angle, atol=1e-9)
-
-
 def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
     table, out = tmp_path / "tendons.txt", tmp_path / "finger.json"
     table.write_text("FDP mcp+ pip+\n\nEDC mcp- pip-\nFDS mcp+\n", encoding="utf-8")
@@ -231,10 +223,18 @@ def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
     assert call(*given, "--table", tmp_path / "nowhere.txt").status == 2
 
 
-def test_a_unit_of_forces_shows_in_stiff_springs_too() -> None:
-    """Whose stretch is too small a part of the positions for the balance of the columns."""
-    finger, recording = made_up(5, encoder=1e-5, stiff=20.0)
-    assert not belongs(finger, [recording])
-    grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
-    (unit,) = belongs(finger, [replace(recording, groups=grams)])
-    assert (unit.kind, unit.severity) == ("scale", "error") and '"unit": "gf"' in unit.line()
+def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:
+    """Its stretch is rounding, as of a motor whose angle is the joint's."""
+    finger, recording = made_up(7, encoder=1e-9, stiff=1e6)
+    learned = learn_routing(finger, [recording])
+    assert [each.stiffness.is_known for each in learned] == [False] * 3 and routed(finger, learned)[1] == []
+
+
+def test_a_planned_motion_drives_the_motors_from_their_zeros() -> None:
+    finger, recording = made_up(6)
+    angle, force = recording.groups["joint_position"], recording.groups["tendon_force"]
+    bare = [{key: value for key, value in row.items() if key != "zero"} for row in finger.data["tendons"]]
+    ordered, plain = (tendon_positions(data, angle, force) for data in (finger.data, {**finger.data, "tendons": bare}))
+    np.testing.assert_allclose(ordered - plain, np.broadcast_to(ZEROS, ordered.shape), atol=1e-15)
+    read = tendon_angles(replace(recording, groups={**recording.groups, "tendon_position": ordered}), finger)
+    np.testing.assert_allclose(read, angle, atol=1e-9)

@@ -222,15 +222,15 @@ def test_wrap_and_rate_of_a_map(tmp_path: Path) -> None:
     )
 
 
+def test_lists_of_another_length_are_named(tmp_path: Path, call: Call) -> None:
+    (tmp_path / "log.csv").write_text('t,q\n0.0,"[1, 2]"\n0.1,"[1, 2]"\n0.2,"[1]"\n', encoding="utf-8")
+    answer = call("convert", "inspect", tmp_path / "log.csv")
+    assert answer.status == 2 or "q" in answer.out
+
+
 def test_a_load_that_friction_nearly_balances_one_way_is_no_magnitude() -> None:
     phase = np.linspace(0.0, 40.0, 4000)
     angle, way = np.sin(phase), np.tanh(20.0 * np.cos(phase))
     signed = 10.0 + 9.99 * way + 0.005 * np.sin(300.0 * phase)  # closing against a spring, opening with it
     assert 0.0 <= signed.min() < 0.005 * signed.max()
     assert not is_magnitude(signed, angle)
-
-
-def test_lists_of_another_length_are_named(tmp_path: Path, call: Call) -> None:
-    (tmp_path / "log.csv").write_text('t,q\n0.0,"[1, 2]"\n0.1,"[1, 2]"\n0.2,"[1]"\n', encoding="utf-8")
-    answer = call("convert", "inspect", tmp_path / "log.csv")
-    assert answer.status == 2 or "q" in answer.out
