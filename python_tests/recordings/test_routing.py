@@ -193,12 +193,13 @@ def test_redundant_tendons_show_their_stiffness() -> None:
 
 
 def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:
-    given = tmp_path / "given.json"
+    given, free = tmp_path / "given.json", tmp_path / "free.parquet"
     given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")
-    case = _read(given, None, [[FREE], [], []], Options())
+    index[1][:30.0].write(free)
+    case = _read(given, None, [[free], [], []], Options())
     np.testing.assert_allclose(case.finger.moment_arms, index[0].moment_arms, rtol=0.01)
     assert case.routing is not None and len(case.routing["sentences"]) == 8
-    assert _read(INDEX, None, [[FREE], [], []], Options()).routing is None
+    assert _read(INDEX, None, [[free], [], []], Options()).routing is None
 
 
 def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
