@@ -43,8 +43,8 @@ def calibrated(folder: Path, demo_run: DemoRun) -> tuple[Calibration, Path]:
 
 @pytest.fixture(scope="session")
 def short(folder: Path) -> Path:
-    """24 s of the free motion."""
-    read_recording(folder / FREE)[:24.0].write(folder / "short.parquet")
+    """12 s of the free motion."""
+    read_recording(folder / FREE)[:12.0].write(folder / "short.parquet")
     return folder / "short.parquet"
 
 

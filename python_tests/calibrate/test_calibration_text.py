@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
-from tendonfmu.calibration.report import left_out
-from tendonfmu.calibration.text import size_rows, tiles, verdict
+from tendonfmu.calibration.text import size_rows, verdict
 from tendonfmu.report.numbers import together
 
 
@@ -47,13 +45,6 @@ def test_the_verdict_is_one_sentence_with_the_figures() -> None:
     assert tone == "" and "larger at pip at 20 N: 6.50 before, 9.00 now" in sentence
 
 
-def test_tiles_show_the_worst_joint() -> None:
-    values = list(tiles(report(0.0142, 0.00614, 3, None)))
-    assert values[0][0] == "14.2 → 6.14" and values[1][0] == "14.2 → 9.21" and "pip at 20 N" in values[1][2]
-    assert values[2][:2] == ("0", "in 27 min") and "tuned for 6 an hour on 100 min of other motion" in values[2][2]
-    assert values[3][0] == "20.0" and "at pip" in values[3][2]
-
-
 def test_pushes_are_told_by_size() -> None:
     rows = [
         {"from": 0.0, "below": 1.5, "events": 4, "found": 1, "interval": [0.1, 0.8]},
@@ -64,13 +55,3 @@ def test_pushes_are_told_by_size() -> None:
     assert [row[0] for row in found] == ["below 1.5 times", "1.5 to 3 times", "6 times and more"]
     assert found[2][1:] == ("4 of 4", "40 to 100 %")
     assert size_rows({"pushes": None}) == [] and math.isclose(together([3.0, 4.0]), math.sqrt(12.5))
-
-
-def test_many_stretches_that_are_left_out_are_one_warning() -> None:
-    events: list[Any] = [
-        SimpleNamespace(recording="a.csv", start=10.0 * k, end=11.0 * k, description=f"at joint {k}")
-        for k in range(1, 5)
-    ]
-    assert len(left_out(events[:2])) == 2 and left_out(events[:2])[0].endswith("at joint 1; left out of the fit")
-    (said,) = left_out(events)
-    assert said.startswith("4 stretches, 10 s in all") and "at joint 4" in said

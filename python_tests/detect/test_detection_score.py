@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.detect.counting import Signals, pooled, score_detection, stretches
+from tendonfmu.detect.counting import Signals, pooled, score_detection
 from tendonfmu.detect.summary import roc, summarise
 from tendonfmu.statistics.intervals import RESAMPLES, of_sums, quantile, rate, share
 
@@ -100,18 +100,6 @@ def test_held_to_the_end(spans: list[tuple[float, float]], held: bool, part: flo
     assert event.held_share == pytest.approx(part)
 
 
-def test_at_the_alarm() -> None:
-    torque = np.column_stack([TIME, -TIME])
-    signals = Signals(compensated=torque, external=2 * torque, force=3 * TIME)
-    event = score_detection(TIME, flags((2.0, 3.0)), flags((2.5, 3.0)), signals).events[0]
-    assert event.compensated == pytest.approx([2.5, -2.5])
-    assert event.external == pytest.approx([5.0, -5.0])
-    assert event.force == pytest.approx(7.5)
-    summary = summarise(score_detection(TIME, flags((2.0, 3.0)), flags((2.5, 3.0)), signals))
-    assert summary.external_at_alarm is not None and summary.force_at_alarm is not None
-    assert [each.value for each in summary.external_at_alarm] == pytest.approx([5.0, 5.0])
-
-
 def test_nobody_pushes_or_somebody_always_does() -> None:
     everywhere = np.ones(len(TIME), bool)
     quiet = score_detection(TIME, ~everywhere, ~everywhere)
@@ -128,13 +116,6 @@ def test_a_gap_in_time_is_no_free_time_and_one_sample_is_no_error() -> None:
     assert score_detection(time, flags(), flags()).free_seconds == pytest.approx(10.0)
     one = score_detection(np.array([3.0]), np.array([True]), np.array([False]))
     assert (len(one.events), one.missed, one.free_seconds) == (1, 1, 0.0)
-
-
-def test_stretches_of_uneven_samples() -> None:
-    time = np.array([0.0, 0.05, 0.3, 0.31, 0.35, 0.36, 1.0])
-    found = stretches(time, np.array([1, 0, 1, 0, 0, 1, 1], bool))
-    assert found.tolist() == [[0, 0], [2, 6]]
-    assert stretches(time, np.zeros(7, bool)).shape == (0, 2)
 
 
 # --- torque -----------------------------------------------------------------------------------------------------------
@@ -164,15 +145,6 @@ def test_torque_in_contact_and_residual_of_free_time() -> None:
         assert summary.contact.rms[j].value == pytest.approx(np.sqrt(np.mean((y - x)[label, j] ** 2)))
         # the error of a regression of independent samples, within what ten events can tell
         assert found.low < slope < found.high and found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.7)
-
-
-def test_a_joint_without_load_has_no_correlation() -> None:
-    zero = np.zeros((len(TIME), 1))
-    contact = summarise(score_detection(TIME, flags((1.0, 2.0)), flags(), Signals(zero, zero + 0.1, zero))).contact
-    assert contact is not None
-    assert math.isnan(contact.correlation[0].value) and math.isnan(contact.slope[0].value)
-    assert contact.rms[0].value == pytest.approx(0.1) and contact.within is None
-    assert math.isnan(contact.rms[0].low)  # one event says nothing of their spread
 
 
 def test_pooled_is_the_sum_and_keeps_what_only_one_recording_knows() -> None:
@@ -226,12 +198,6 @@ def test_many_blocks_are_put_together_without_loss() -> None:
     sums = np.column_stack([np.ones(1234), np.arange(1234.0)])
     found = of_sums(sums, lambda each: each[:, 1:] / each[:, :1], seed=0)[0]
     assert found.value == pytest.approx(616.5) and found.low < 616.5 < found.high
-
-
-def test_no_alarm_at_all_still_has_an_upper_bound() -> None:
-    """0 of 5 blocks of 2 s."""
-    found = summarise(score_detection(TIME, flags(), flags())).free_alarm_share
-    assert (found.value, found.low, found.high) == (0.0, 0.0, share(0, 5).high)
 
 
 def test_a_roc_asks_for_every_factor_and_counts() -> None:

@@ -125,12 +125,6 @@ def test_what_cannot_be_learned_is_left_out_and_said() -> None:
     assert without is None and sentences == ["contact.rest is left out: there are no tendon positions"]
 
 
-def test_a_rate_that_the_rests_do_not_support_is_said() -> None:
-    rule, sentences = learned(made(6.0, 1))
-    assert rule is not None and rule.limit > 6.0
-    assert "are supported at confidence" in sentences[0] and "not 6" in sentences[0]
-
-
 def test_tune_writes_the_rule_and_keeps_its_rate() -> None:
     tuning, recording = product("detect.tuning"), product("recordings.recording")
     sources = []

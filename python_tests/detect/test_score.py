@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
-import sys
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import replace
 from importlib.resources import files as files_of
 from pathlib import Path
 from typing import Any
@@ -19,12 +15,10 @@ from numpy.typing import NDArray
 
 from command import Answer, Call
 from repository_paths import ROOT
-from tendonfmu.cli import main
-from tendonfmu.detect.scoring import Scored, read_subject, run_track, scaled_detection, score_recordings
+from tendonfmu.detect.scoring import scaled_detection
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
-from tendonfmu.report.score_figures import contact_sheet, delay_sheet, event_sheet, roc_sheet
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
@@ -38,28 +32,10 @@ Table = dict[str, NDArray[np.float64]]
 
 def report_of(answer: Answer, path: str = "s.json") -> dict[str, Any]:
     assert answer.status == 0, answer
-    return read_report(Path(path))
-
-
-def read_report(path: Path) -> dict[str, Any]:
-    report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    report: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
     schema = json.loads(files_of("tendonfmu").joinpath("schema", "score_report.schema.json").read_text())
     jsonschema.validate(report, schema, cls=jsonschema.Draft202012Validator)
     return report
-
-
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
-    """The demo scored and drawn in a folder of its own: that, and both streams."""
-    folder = tmp_path_factory.mktemp("scored")
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        arguments = ["score", INDEX, PUSHES, FREE_X4, "-o", folder / "s.json", "--figures", folder / "fig"]
-        patch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-    assert not ended.value.code, err.getvalue()
-    return folder, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture(scope="session")
@@ -80,10 +56,10 @@ def written(table: Table, name: str, **changes: NDArray[Any] | None) -> Path:
 # --- what comes out ---------------------------------------------------------------------------------------------------
 
 
-def test_the_demo_scored_and_drawn(demo: tuple[Path, str, str]) -> None:
+def test_the_demo_is_scored_as_by_hand(call: Call) -> None:
     """Counted again by hand: a loop over samples, nothing of the product's."""
-    folder, out, err = demo
-    report = read_report(folder / "s.json")
+    answer = call("score", INDEX, PUSHES, FREE_X4, "-o", "s.json")
+    report = report_of(answer)
     assert set(report) > LITERAL
     assert (report["format"], report["events"], report["found"]) == ("tendonfmu-score-1", 11, 8)
     recording = read_recording(PUSHES)
@@ -98,16 +74,13 @@ def test_the_demo_scored_and_drawn(demo: tuple[Path, str, str]) -> None:
     for key in ("events", "found", "missed", "false_alarms", "free_minutes", "held"):
         assert report[key] == pytest.approx(sum(each[key] for each in report["recordings"]))
     assert 0.8 < report["recordings"][0]["free_minutes"] < 0.83 and len(report["free_rms"]) == 4
-    assert "8 of 11 found" in out and "no column contact" in err
+    assert "8 of 11 found" in answer.out and "no column contact" in answer.err
     own = [point for point in report["roc"]["points"] if point["factor"] == 1.0]
     assert [(each["found"], each["false_alarms"]) for each in own] == [(8, report["false_alarms"])]
     # thresholds in a range of 32, from latched up for good to nothing found
     factors = [point["factor"] for point in report["roc"]["points"]]
     assert factors == sorted(factors) and factors[-1] / factors[0] == 32.0
     assert report["roc"]["points"][-1]["found"] == report["roc"]["points"][-1]["false_alarms"] == 0
-    drawn = {file.name: file.read_bytes() for file in (folder / "fig").iterdir()}
-    assert set(drawn) == {"contacts.png", "events.png", "roc.png", "delays.png"}
-    assert all(content.startswith(b"\x89PNG") and len(content) > 10_000 for content in drawn.values())
 
 
 def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any]) -> list[float | None]:
@@ -123,27 +96,16 @@ def delays_by_hand(time: NDArray[Any], label: NDArray[Any], contact: NDArray[Any
     return found
 
 
-@pytest.mark.parametrize("path", [PUSHES, FREE_X4])
-def test_the_residual_is_what_the_decision_was_made_of(path: Path) -> None:
-    """joint_contact is |r| > threshold (docs/reference/semantics.md#contact-detector), so r is right."""
-    subject = read_subject(INDEX)
-    track = run_track(subject, read_recording(path), 1, None)
-    contact, force = subject.finger.data["contact"], np.abs(track.recording.groups["tendon_force"]).mean(axis=1)
-    threshold = np.array(contact["threshold"]) + force[:, None] * np.array(contact["threshold_per_force"])
-    known = ~np.isnan(track.residual)
-    assert known[1:].all() and not known[0].any()
-    above = np.abs(track.residual)[known] > threshold[known]
-    assert (above != track.outputs["joint_contact"][known]).mean() < 1e-5 < above.mean()
-
-
 def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Table) -> None:
     load = {name: None for name in pushes if name.startswith("external")}
     force = np.linspace(0.0, 2.0, len(pushes["time"]))
     labelled = written(pushes, "a.parquet", contact=None, touched=pushes["contact"], newton=force)
     plain = written(pushes, "b.parquet", touched=pushes["contact"], contact=None, **load)
-    answer = call("score", INDEX, labelled, plain, "-o", "s.json", "--labels", "touched", "--force", "newton", "--json")
+    options = ("--labels", "touched", "--force", "newton", "--figures", "fig", "--json")
+    answer = call("score", INDEX, labelled, plain, "-o", "s.json", *options)
     report = report_of(answer)
     assert json.loads(answer.out) == report
+    assert {file.name for file in Path("fig").iterdir()} == {"contacts.png", "events.png", "roc.png", "delays.png"}
     first, second = report["recordings"]
     assert (report["labels"], report["events"], first["events"], second["events"]) == ("touched", 8, 4, 4)
     assert (first["external_torque"], second["external_torque"]) == (True, False)
@@ -201,17 +163,6 @@ def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None
         close_to(packed[key], plain[key], key, tolerance=1e-3 if key.startswith(("free_rms", "recordings")) else 0.0)
 
 
-def test_the_same_seed_gives_the_same_bytes(call: Call, pushes: Table) -> None:
-    """Four events are too few to resample: the intervals that a seed moves are those of the free time."""
-    recording = written(pushes, "rec.parquet")
-    texts = []
-    for seed in ("3", "3", "4"):
-        report = report_of(call("score", INDEX, recording, "-o", "s.json", "--seed", seed))
-        assert report["delay_s"]["median"]["interval"] is None
-        texts.append(Path("s.json").read_text().replace('"seed": 4', '"seed": 3'))
-    assert texts[0] == texts[1] != texts[2]
-
-
 def test_scaled_detection_scales_all_that_decides() -> None:
     data = {"contact": {"threshold": [0.1, 0.2], "threshold_per_force": [None, 0.01], "hold_time": 0.05}}
     scaled = scaled_detection(data, 2.0)["contact"]
@@ -232,48 +183,6 @@ def test_scaled_detection_scales_all_that_decides() -> None:
         "uncertainty": [None],
         "uncertainty_level": 12.0,
     }
-
-
-def detection_bars(scored: Scored) -> dict[str, NDArray[np.float64]]:
-    """Style -> [k, 2] begin and end of each stretch."""
-    return {curve.style: curve.x.reshape(-1, 3)[:, :2] for curve in contact_sheet(scored).panels[-1].curves}
-
-
-def test_figures_show_what_was_counted(pushes: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    scored = score_recordings(INDEX, [written(pushes, "rec.parquet")])
-    track, events = scored.tracks[0], scored.scores[0].events
-    (rows,) = event_sheet(scored).panels
-    assert rows.heat is not None and rows.x_limits is not None
-    assert [name for _, name in rows.y_ticks] == ["3 found", "1 missed"]
-    delay = rows.bars[1].x
-    assert delay[:3].tolist() == sorted(event.delay for event in events if event.found)
-    first = min((event for event in events if event.found), key=lambda event: event.delay)
-    size = 1e3 * np.linalg.norm(track.outputs["compensated_torque"], axis=1)
-    at = np.linspace(*rows.x_limits, rows.heat.values.shape[1])
-    k = int(np.argmin(np.abs(at - delay[0])))
-    row = int(np.searchsorted(track.recording.time, first.onset + at[k] + 1e-9) - 1)
-    assert rows.heat.values[0, k] == pytest.approx(size[row])
-    assert np.isnan(rows.heat.values).any(axis=1).sum() == 1  # the last event is close to the end
-    over_time = contact_sheet(scored)
-    torques, bars = over_time.panels[:-1], detection_bars(scored)
-    assert {style: len(stretches) for style, stretches in bars.items()} == {"label": 4, "alarm": 3}
-    assert len(torques) == 2 and all(len(panel.stripes["label_stripe"]) == 4 for panel in torques)
-    assert bars["alarm"][:, 0].tolist() == [event.alarm for event in events if event.found]
-    spoilt = [replace(event, silent=event is not first) for event in events]  # an alarm just before the first one
-    bars = detection_bars(replace(scored, scores=[replace(scored.scores[0], events=spoilt)]))
-    assert bars["missed"][:, 0].tolist() == [first.alarm]
-    assert first.alarm not in bars["alarm"][:, 0] and len(bars["alarm"]) == 2
-    assert [name for _, name in over_time.keys[:4]] == scored.subject.finger.joint_names
-    assert scored.roc is not None
-    against, over = roc_sheet(scored, scored.roc).panels
-    own, found, rate = against.dots[2], against.bars[0], against.bars[1]
-    assert (own.x.tolist(), own.y.tolist()) == ([0.0], [75.0])
-    assert over.curves[0].y[over.curves[0].x.tolist().index(1.0)] == 75.0
-    assert np.all(found.low <= against.curves[0].y) and np.all(against.curves[0].x <= rate.high)
-    late = delay_sheet(scored).panels[0].curves[0]
-    assert late.y[2::2].tolist() == [25.0, 50.0, 75.0]
-    assert late.x[2::2].tolist() == pytest.approx(1e3 * delay[:3])
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------
@@ -304,6 +213,8 @@ def two_tendons(table: Table) -> Path:
             ("r.csv: one sample",),
         ),
         (lambda table: Path("no.csv"), (), ("no.csv", "no such file")),
+        (lambda table: written(table, "r.csv"), ("r.csv",), ("given twice",)),
+        (lambda table: written(table, "r.csv"), ("--figures", "r.csv"), ("r.csv: a file; expected a folder",)),
     ],
 )
 def test_bad_input_is_named_and_leaves_nothing(
@@ -316,30 +227,12 @@ def test_bad_input_is_named_and_leaves_nothing(
     assert not Path("s.json").exists()
 
 
-def test_files_that_cannot_be(call: Call, pushes: Table) -> None:
+def test_what_is_no_model_is_refused(call: Call, pushes: Table) -> None:
     recording = written({name: column[:600] for name, column in pushes.items()}, "r.csv")
     Path("broken.fmu").write_text("no archive")
-    for arguments, words in (
-        ((INDEX, recording, recording, "-o", "s.json"), "given twice"),
-        ((INDEX, recording, "-o", "s.txt"), "ends in .json"),
-        ((INDEX, recording, "-o", INDEX), "same file as the input"),
-        ((INDEX, recording, "-o", "s.json", "--figures", recording), "r.csv: a file; expected a folder"),
-        ((recording, recording, "-o", "s.json"), "a recording; expected FINGER.json"),
-        (("broken.fmu", recording, "-o", "s.json"), "broken.fmu: not an FMU"),
-    ):
-        answer = call("score", *arguments)
-        assert answer.status == 2 and words in answer.err, answer
-    assert not Path("s.json").exists()
-
-
-def test_every_option_is_on_the_page_and_its_example_is_what_comes_out(call: Call, demo: tuple[Path, str, str]) -> None:
-    page = (ROOT / "docs" / "reference" / "commands" / "score.md").read_text(encoding="utf-8")
-    options = set(re.findall(r"--[a-z][a-z-]+", call("score", "--help").out)) - {"--help"}
-    assert len(options) >= 6 and {option for option in options if option not in page} == {"--output"}
-    report = read_report(demo[0] / "s.json")
-    shown = json.loads(re.findall(r"```json\n(.*?)```", page, re.DOTALL)[0])
-    for key, value in shown.items():
-        close_to(report[key], value, key)
+    for model, words in ((recording, "a recording; expected FINGER.json"), ("broken.fmu", "broken.fmu: not an FMU")):
+        answer = call("score", model, recording, "-o", "s.json")
+        assert answer.status == 2 and words in answer.err and not Path("s.json").exists(), answer
 
 
 def close_to(found: Any, shown: Any, key: str, tolerance: float = 6e-3) -> None:

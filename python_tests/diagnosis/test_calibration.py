@@ -88,15 +88,6 @@ def test_a_sound_bench_has_none_and_a_refused_one_is_not_tried_again() -> None:
     assert calibration(view, selection, ("calibration",), LEAST_GAIN) is None
 
 
-def test_what_gain_and_arm_are_together_is_known_better_than_either() -> None:
-    together, _ = judged(SEVERAL, alike=True)
-    assert together is not None
-    sizes = {sensor.where.effect: sensor.correction for sensor in together.sensors if sensor.where.tendon == 3}
-    both, alone = sizes["calibration"], sizes["force_gain"]
-    assert both.value == pytest.approx(0.03 * (SEVERAL[2] + SEVERAL[6]), abs=0.01)
-    assert 3 * (both.high - both.low) < alone.high - alone.low and alone.low < 0.03 * SEVERAL[2] < alone.high
-
-
 def test_it_is_folded_back_into_the_description() -> None:
     """A single sensor that was found beside it belongs to it; all numbers of a place are together."""
     together, _ = judged(SEVERAL)

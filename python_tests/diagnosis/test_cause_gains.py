@@ -14,8 +14,6 @@ from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.cause import Cause, Where
 from tendonfmu.diagnosis.effects import Place, Term, by_name
-from tendonfmu.diagnosis.effects.places import law_of
-from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.statistics import Interval
 
 HELD_OUT = [np.array([True, True, False, False]), np.array([True, False, False, False])]
@@ -70,14 +68,6 @@ def test_on_tests_all_samples_count_if_only_sliding_ones_were_judged(worse: floa
     assert made.holds(SimpleNamespace(data=[np.array([[1.0 + worse], [9.0]])])) is holds
 
 
-@pytest.mark.parametrize(("delay", "shown"), [(16e-6, False), (-16e-6, False), (-0.012, True), (0.012, True)])
-def test_a_delay_of_a_hundredth_of_a_sample_is_not_shown(delay: float, shown: bool) -> None:
-    """A fit may end there although the search accepted a larger one."""
-    term = Term(by_name("time_delay"), Place(), {"delay": 0.012}, (1.0,))
-    data = {**small_finger(), "extensions": [{"effect": "time_delay", "delay": delay}]}
-    assert LeastSizes(np.zeros(2), np.zeros(4), 0.002, 0.0).shows_all("time_delay", [term], data) is shown
-
-
 @pytest.mark.parametrize(
     ("effects", "sliding", "needed"),
     [
@@ -93,16 +83,6 @@ def test_an_effect_that_a_law_may_have_needs_more_beside_presliding(
     causes = [Cause(Where(effect, None, None), "", "") for effect in effects]
     gains = [Interval(0.9 - 0.1 * k, 0.0, 1.0) for k in range(len(causes))]
     assert cause_gains._needed(causes, gains, sliding) == needed
-
-
-# --- experiments are planned for laws of the nominal description ------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("shape", "law"), [({}, ""), ({"viscous": 1.0}, ""), ({"pulley": 1.0, "x": 2.0}, "pulley"), ({"load": 1.0}, "load")]
-)
-def test_a_shape_says_which_law_of_a_place_it_is_of(shape: dict[str, float], law: str) -> None:
-    assert law_of(shape) == law
 
 
 def in_nominal(data: Any, effect: Term) -> bool:
@@ -127,6 +107,9 @@ def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytes
     assert not in_nominal(nominal, Term(stribeck, Place(2), {}))  # no law at joint 2
     curved = {**nominal, "joints": [{"name": "base", "friction": {**flat, "static": 0.007}}, nominal["joints"][1]]}
     assert not in_nominal(curved, own)  # the law has what the effect would add
+
+
+# --- experiments are planned for laws of the nominal description ------------------------------------------------------
 
 
 def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:

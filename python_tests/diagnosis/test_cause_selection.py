@@ -87,20 +87,6 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
     assert all(each.direction.low == [0.0] and each.direction.high == [np.inf] for each in found)
 
 
-@pytest.mark.parametrize("effect", ["gravity", "force_gain", "backlash", "pulley_eccentricity"])
-def test_effects_of_one_part_are_asked_for_at_single_places(effect: str, columns: Numbers) -> None:
-    found = hypotheses_of(candidate_columns(columns[:, :, :2], [Made(effect, 1), Made(effect, 2)]))
-    assert [each.direction.level for each in found] == [HERE, HERE]
-
-
-def test_an_effect_of_the_whole_finger_is_everywhere(columns: Numbers) -> None:
-    made = [Made("time_delay", shapes=({"delay": 0.01}, {"delay": -0.01}), secant=True)]
-    found = hypotheses_of(candidate_columns(columns[:, :, :2], made))
-    assert [(each.direction.level, each.key) for each in found] == [(EVERYWHERE, ("time_delay", None, None))] * 2
-    # what a step of 10 ms says of one of 40 ms is nothing
-    assert all(each.direction.high == LARGEST_SECANT and each.direction.low == 0.0 for each in found)
-
-
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:
     made = [Made("cover_stiffness", 1, sign=1), Made("inertia", 1, sign=-1), Made("gravity", 1, sign=0)]
     bounds = {
@@ -213,14 +199,6 @@ def test_what_cannot_be_told_apart_is_said(columns: Numbers, nominal: Numbers) -
     found = selection_of(noise(6) + 0.3 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
     assert found is not None
     assert {found.effect, *(each.effect for each in found.alike)} == {"cover_stiffness", "cover_hardening"}
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_columns_that_differ_by_rounding_are_alike(seed: int, columns: Numbers, nominal: Numbers) -> None:
-    values = np.stack([10.0 * columns[:, :, 0], columns[:, :, 0] / -150.3], axis=2)
-    made = [Made("force_gain", None, 1), Made("moment_arm", 1, 1)]
-    found = selection_of(noise(20 + seed) + 0.05 * values[:, :, 0], nominal, values, made).best(LEAST_GAIN)
-    assert found is not None and len(found.alike) == 1
 
 
 def test_each_further_name_counts_and_what_every_finger_has_does_not() -> None:
@@ -357,14 +335,6 @@ def test_steps_that_lead_to_nothing_visible_are_not_tried() -> None:
     assert SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 1.01})
     assert not SENSORS.worth(play, Place(1), {"width": 4e-4 / LARGEST_SECANT * 0.99})
     assert SENSORS.worth(by_name("gravity"), Place(1), {})
-
-
-def test_a_play_below_the_sensors_is_not_named(columns: Numbers, nominal: Numbers) -> None:
-    made = [Made("backlash", 1, shapes=({"width": 1e-4},), secant=True)]
-    target = noise(11) + 0.5 * columns[:, :, 0]
-    fine, coarse = (LeastSizes(np.full(JOINTS, size), np.zeros(4), 0.01, 0.0) for size in (1e-6, 1e-4))
-    assert selection_of(target, nominal, columns[:, :, :1], made, fine).best(LEAST_GAIN) is not None
-    assert selection_of(target, nominal, columns[:, :, :1], made, coarse).best(LEAST_GAIN) is None
 
 
 def test_noise_of_positions_is_what_smoothing_takes_off() -> None:

@@ -107,15 +107,12 @@ def exchanged() -> Columns:
         ("now.parquet --reference now.parquet", "now.parquet: the reference, but trained on as well"),
         ("now.parquet --reference copy.parquet", "copy.parquet: the reference, but trained on as well, as now.parquet"),
         ("now.parquet --test then.parquet --reference then.parquet", "then.parquet: the reference, but"),
-        ("now.parquet --reference nothing.parquet", "nothing.parquet"),
         ("now.parquet --reference longer.parquet", "are the same samples as 7 to"),
         ("now.parquet --reference three.parquet", "three.parquet: tendon_"),
         ("now.parquet --reference exchanged.parquet", "exchanged.parquet: tendon_force[1]"),
         ("now.parquet --scheduler tcp://127.0.0.1:1 --reference then.parquet", "--scheduler: given without --history"),
         ("now.parquet --history", "history: one recording; expected two at least, or a reference"),
         ("now.parquet then.parquet --history --test other.parquet", "--test: given with --history"),
-        ("now.parquet --history --reference now.parquet", "now.parquet: the reference, but trained on as well"),
-        ("now.parquet nothing.parquet --history", "nothing.parquet: No such file"),
     ],
 )
 def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: str, words: str) -> None:
@@ -131,5 +128,5 @@ def test_bad_usage_is_one_line(call: Call, tmp_path: Path, arguments: str, words
     )
     answer = call("diagnose", "finger.json", *arguments.split(), "--kinematics", "3", "-o", "new")
     assert answer.status == 2 and words in answer.err, answer.err
-    assert answer.err.count("\n") == 1 and any(each in answer.err for each in ("expected", "No such", "exchange"))
+    assert answer.err.count("\n") == 1 and any(word in answer.err for word in ("expected", "exchange"))
     assert answer.out == "" and not (tmp_path / "new" / "diagnosis.json").exists()

@@ -128,16 +128,6 @@ def test_a_load_is_told_as_contact_and_not_as_friction(rest: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("zeroed", repeated([0.0, 0.0128], 1), ids=["shown", "zeroed away"])
-def test_the_mean_of_a_change_is_no_load(zeroed: float) -> None:
-    """A weight pulls with 12.8 mN·m in the mean of its recording, unless the sensors were zeroed under it."""
-    now = record(replace(WELL, mass=0.03, load=-zeroed), motion=5, noise=2)
-    found = diagnose(finger(), [recording(now)], reference=[recording(record(motion=2), "then.parquet")], kinematics=3)
-    assert [each.where.effect for each in found.causes] == ["gravity"]
-    assert found.load is None
-
-
-@pytest.mark.long
 def test_a_load_beside_a_change_is_told() -> None:
     now = record(replace(WELL, dry=1.4 * WELL.dry, load=0.02), motion=5, noise=2)
     found = diagnose(finger(), [recording(now)], reference=[recording(record(motion=2), "then.parquet")], kinematics=3)

@@ -11,13 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
-from tendonfmu.diagnosis.effects import Place
+from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.effects.description_edit import data_number
 from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
-from tendonfmu.estimate.structure import set_number
 from worn_finger import described
 
 Description = dict[str, Any]
@@ -89,23 +86,6 @@ def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Cause]
     return {each.key: each for each in number_hypotheses(numbers, len(numbers), 0)}
 
 
-def test_places_of_one_effect_can_have_changed_together() -> None:
-    found = by_key(described())
-    levels = {key: each.direction.level for key, each in found.items() if key[0] == "edge_friction"}
-    assert levels == {
-        ("edge_friction", None, None): EVERYWHERE,
-        ("edge_friction", 1, 1): HERE,
-        ("edge_friction", 1, 2): HERE,
-    }
-    levels = {key: each.direction.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
-    assert levels[("edge_friction", None, None)] == EVERYWHERE
-    assert {key[1:] for key, level in levels.items() if level == SOMEWHERE} == {
-        (1, None),
-        (2, None),
-        *((None, i) for i in range(1, 5)),
-    }
-
-
 def test_both_sides_of_a_law_change_alike_or_against_each_other() -> None:
     side = {"static": 0.01, "coulomb": 0.01, "stribeck_velocity": 0.1, "viscous": 0.0}
     friction = {"positive": side, "negative": {**side, "static": 0.02, "coulomb": 0.02}}
@@ -158,20 +138,6 @@ def own_paths(number: Number) -> set[str]:
     """What moves with a number: static friction is known as so much more than coulomb friction."""
     stem, _, name = number.path.rpartition(".")
     return {number.path, f"{stem}.static"} if name == "coulomb" else {number.path}
-
-
-def test_static_friction_follows_coulomb_friction() -> None:
-    data = described()
-    (number,) = [each for each in numbers_of(data) if each.path == "joints[1].friction.coulomb"]
-    assert number.place == Place(1)
-    added = np.zeros(len(numbers_of(data)))
-    added[number.index] = 0.003
-    after = with_numbers(data, added)
-    expected = copy.deepcopy(data)
-    for name in ("static", "coulomb"):
-        set_number(expected, f"joints[1].friction.{name}", after["joints"][0]["friction"]["coulomb"])
-    assert after == expected
-    assert after["joints"][0]["friction"]["coulomb"] == pytest.approx(0.012)
 
 
 def test_what_is_added_stays_in_the_box() -> None:

@@ -9,7 +9,6 @@ from scipy.stats import binom
 
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
 from repetitions import repeated
-from synthetic_series import make_series, nuisance_of, with_effect
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.blocks import make_folds
@@ -53,37 +52,6 @@ def test_noise_is_not_confirmed(memory: float, wander: float) -> None:
     assert np.mean(found < 0.5) > 0.1, "it never says anything"
 
 
-@pytest.mark.parametrize(("memory", "wander"), repeated([(0.0, 0.0), (0.97, 0.0)], 1))
-def test_columns_as_slow_as_the_bias_are_hardly_confirmed(memory: float, wander: float) -> None:
-    """Periods of 3 to 20 s beside splines with knots every 2 s. Of one number 1 to 5 % are at a nominal 1 %; without
-    what is given back to the stretches it is 5 to 11 %, of four numbers 14 to 24 %."""
-    found = by_chance(memory, wander, 0.05, 0.3)
-    assert np.sum(found < 0.01) <= most(0.05, len(found))
-    assert np.sum(found < 1e-4) <= most(0.005, len(found))
-
-
-def test_a_hand_at_random_has_no_causes() -> None:
-    """Strokes, coloured noise that both joints share, a wandering bias; columns that follow the motion."""
-    rejected, tests = 0, 0
-    for seed in range(4):
-        series = make_series(500 + seed, 40.0)
-        plain = [each[:, -7:] for each in nuisance_of(series)]
-        nominal = np.zeros((len(series.time), JOINTS, 14))
-        for j, own in enumerate(plain):
-            nominal[:, j, 7 * j : 7 * j + 7] = own
-        test = confirmation(series, nominal)
-        for joint in range(JOINTS):
-            q, v = series.angle[:, joint], series.velocity[:, joint]
-            side = np.tanh(v / 0.02)
-            accelerated, slow = series.acceleration[:, joint], side * np.exp(-(v**2))
-            for signal in (np.sin(q), q**3, side * q, side * q**2, accelerated, slow):
-                column = np.zeros((len(q), JOINTS, 1))
-                column[:, joint, 0] = signal
-                rejected += test.p_value(column, 1) < 0.05
-                tests += 1
-    assert rejected <= most(0.05, tests)
-
-
 def test_what_was_tried_counts() -> None:
     rng = np.random.default_rng(3)
     values = waves(rng, 1)
@@ -106,17 +74,6 @@ def test_a_fraction_of_the_noise_is_confirmed(memory: float, size: float) -> Non
         target = coloured(rng, 0.0, memory) + size * values[:, :, 0]
         found.append(confirmation(series_with(target), nominal).p_value(values, 400))
     assert np.mean(np.array(found) < 0.01) >= 0.9
-
-
-def test_an_effect_of_a_motion_is_confirmed() -> None:
-    series = make_series(7, 40.0)
-    nuisance = nuisance_of(series)
-    signal = np.tanh(series.velocity[:, 1] / 0.02) * series.angle[:, 1] ** 2
-    hidden = with_effect(series, nuisance, signal, joint=1, strength=0.3)
-    column = np.zeros((len(signal), JOINTS, 1))
-    column[:, 1, 0] = signal
-    nominal = np.stack([each[:, -7:] for each in nuisance], axis=1)
-    assert confirmation(hidden, nominal).p_value(column, 100) < 1e-3
 
 
 # --- what is asked of it ----------------------------------------------------------------------------------------------
@@ -190,12 +147,3 @@ def test_splines_take_a_slow_bias_and_leave_a_fast_one() -> None:
     series.segment[1500:] = 1
     assert np.array_equal(constant_bias(series).toarray().sum(axis=0), [1500, BLOCKS - 1500])
     assert series.step == STEP
-
-
-def test_basis_leaves_out_what_is_there_already() -> None:
-    values = np.random.default_rng(3).standard_normal((400, 3))
-    double = np.column_stack([values, values @ [1.0, -2.0, 0.5], np.zeros(400)])
-    span = basis(double)
-    assert span.shape == (400, 3)
-    assert np.allclose(span.T @ span, np.eye(3), atol=1e-12)
-    assert np.allclose(without(double, span), 0.0, atol=1e-9)

@@ -25,7 +25,7 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numb
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
-from tendonfmu.diagnosis.series import block_prediction, exact_model, make_grid, sample_blocks
+from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
@@ -109,15 +109,6 @@ def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecordi
     assert np.allclose(stretch, force, atol=1e-9), "angles stay as they were measured"
 
 
-def test_blocks_are_those_of_the_candidates(hidden: FitRecording) -> None:
-    grid = make_grid([hidden])
-    blocks = sample_blocks(grid, [hidden])
-    assert blocks.count == grid.blocks == len(series_of(finger(), [hidden], grid).time)
-    exact = exact_model(finger(), hidden)
-    means = np.array([exact[blocks.of[0] == k].mean(axis=0) for k in (0, 7, grid.blocks - 1)])
-    assert np.allclose(block_prediction(finger(), [hidden], blocks)[[0, 7, -1]], means, atol=1e-15)
-
-
 @pytest.mark.parametrize("delay", [0.02, -0.015])
 def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, sound: FitRecording) -> None:
     data = finger() | {"extensions": [{"effect": "time_delay", "delay": delay}]}
@@ -147,15 +138,6 @@ def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     groups = {name: values[:, 1:3] if "tendon" in name else values for name, values in sound.recording.groups.items()}
     few = replace(sound, recording=replace(sound.recording, groups=groups))
     assert delay_of_positions(data, [few]) is None
-
-
-def test_a_pretension_that_stands_still_tells_no_delay(sound: FitRecording) -> None:
-    rng = np.random.default_rng(1)
-    groups = dict(sound.recording.groups)
-    groups["tendon_force"] = 10.0 + 0.02 * rng.standard_normal(groups["tendon_force"].shape)
-    groups["tendon_position"] = sound.model.joint_angle @ moment_arms(finger()).T + 10.0 / STIFFNESS
-    still = replace(sound, recording=replace(sound.recording, groups=groups))
-    assert delay_of_positions(finger(), [still]) is None
 
 
 def scanned(made: FitRecording) -> Any:
@@ -265,6 +247,7 @@ def test_places_of_one_effect_are_one_cause() -> None:
     assert [each.effect for each in load.alike] == ["moment_arm", "force_gain", "inertia"]
 
 
+@pytest.mark.long
 def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     given, seen = described(finger()), list[str]()
     chosen = choose(given, [hidden], FitSettings(threads=1))

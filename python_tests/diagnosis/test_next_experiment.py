@@ -27,11 +27,10 @@ from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
 from tendonfmu.diagnosis.series import exact_model
-from tendonfmu.errors import InputError, InternalError
+from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.friction_places import moment_arms, pretension_vector
-from tendonfmu.model.native import NativeError
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.simulate.motion_plan import Joints, expand_motion
 
@@ -165,27 +164,6 @@ def test_a_menu_has_what_a_finger_can_do() -> None:
     assert combined(loop, entry, recorded) == []
 
 
-@pytest.mark.long
-def test_a_tendon_that_a_load_holds() -> None:
-    """One pulling tendon against a known load: no pretension, the load changes in size and keeps its side."""
-    jaw = {
-        "joints": [{"friction": LAW}],
-        "tendons": [{"stiffness": 1e5, "moment_arms": [0.005]}],
-        "bias": FINGER["bias"],
-        "contact": {"threshold": [1.0]},
-        "format": FINGER["format"],
-        "name": "jaw",
-    }
-    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 30.0, np.array([0.02]), 30.0, np.array([0.1]))
-    entry = next(motions(recorded))
-    assert list(tensions(jaw, entry)) == []
-    (loaded,) = loads(jaw, entry, recorded)
-    assert [section.load[0] for section in loaded.sections] == pytest.approx([0.05, 0.1, 0.2, 0.4])
-    for each in (entry, loaded):
-        found = expected_recording(jaw, perform(jaw, each, 50.0), 3)
-        assert found.recording.groups["tendon_force"].min() > 0
-
-
 # --- the motion for the robot -----------------------------------------------------------------------------------------
 
 
@@ -227,11 +205,3 @@ def test_a_wrong_folder_is_refused(planned: Experiments, tmp_path: Path) -> None
     (folder / "diagnosis.json").write_text('{"format": "tendonfmu-diagnosis-1", "experiment": {}}', encoding="utf-8")
     with pytest.raises(InputError, match="experiment"):
         discriminating_motion(folder, FINGER)
-
-
-def test_no_question_no_experiment() -> None:
-    old = recording_of(FINGER, usual(10.0))
-    assert plan_experiments(FINGER, [old], []).best.sentence == ""
-    nowhere = Term(GAIN.candidate, Place(tendon=9))
-    with pytest.raises((InternalError, IndexError, NativeError)):  # a fault of who asks, not of an input
-        plan_experiments(FINGER, [old], [Question(nowhere)])

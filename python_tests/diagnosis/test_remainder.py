@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import lfilter
 
 from repetitions import repeated
 from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis.pictures import residual_views, whiteness
 from tendonfmu.diagnosis.remainder import measure_remainder
-from tendonfmu.diagnosis.remainder_map import remainder_map
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.splines import bias_splines
 
@@ -87,54 +85,6 @@ def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strengt
         assert line is not None
         assert line.frequency == pytest.approx(3.7, abs=0.02)
         assert "3.7 Hz" in found.description
-
-
-@pytest.mark.long
-def test_a_strong_line_in_smooth_signals_is_found() -> None:
-    """A filter that whitens smooth signals leaves nothing of a strong sine, but shows a weak one where no noise is."""
-    series = make_series(5)
-    rng = np.random.default_rng(5)
-    noise = sosfiltfilt(
-        butter(4, 6.0, fs=1.0 / series.step, output="sos"), rng.standard_normal((len(series.time), 2)), 0
-    )
-    residual = 1e-3 * noise / noise.std(axis=0)
-    for amplitude, frequency in ((3e-3, 1.5), (2e-5, 20.0)):
-        residual[:, 0] += amplitude * np.sin(2.0 * np.pi * frequency * series.time)
-    found = measure_remainder(series, residual, bias_splines(series)).findings
-    assert {(finding.joint, finding.group) for finding in found} == {(1, "line")}
-    assert found[0].line is not None
-    assert found[0].line.frequency == pytest.approx(1.5, abs=0.02)
-
-
-@pytest.mark.long
-def test_the_map_is_over_what_is_followed() -> None:
-    series = make_series(7)
-    nuisance = nuisance_of(series)
-    hidden = with_effect(series, nuisance, product(series), joint=1, strength=3.0)
-    residual = residual_of(hidden, nuisance)
-    found = remainder_map(hidden, residual, measure_remainder(hidden, residual, bias_splines(hidden)), "ab", "cdef")
-    assert found is not None
-    assert (found.joint, found.labels) == (2, ("angle of a (rad)", "angle of b (rad)"))
-    middles = np.meshgrid(*(0.5 * (edges[1:] + edges[:-1]) for edges in found.edges))
-    one, other = (middle / spread for middle, spread in zip(middles, series.angle.std(axis=0), strict=True))
-    known = np.isfinite(found.torque)
-    wave = np.sin(1.3 * one) * np.cos(1.1 * other)
-    assert np.corrcoef(found.torque[known], wave[known])[0, 1] > 0.6
-
-
-@pytest.mark.long
-def test_blocks_that_are_not_used_do_not_matter_and_it_repeats() -> None:
-    series = make_series(3, seconds=40.0)
-    nuisance = nuisance_of(series)
-    residual = residual_of(series, nuisance)
-    gap = (series.time > 12.0) & (series.time < 15.0)
-    masked = replace(series, used=~gap)
-    one = measure_remainder(masked, residual, bias_splines(masked), seed=5)
-    spoilt = np.where(gap[:, None], 10.0, residual)
-    other = measure_remainder(masked, spoilt, bias_splines(masked), seed=5)
-    assert other.p_value == one.p_value
-    np.testing.assert_array_equal(other.prediction[~gap], one.prediction[~gap])
-    assert not other.prediction[gap].any()
 
 
 def test_too_short_is_not_judged() -> None:

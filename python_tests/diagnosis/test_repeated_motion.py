@@ -52,27 +52,6 @@ def test_a_repeat_is_found_with_its_shift(shift: float) -> None:
     assert found.end == pytest.approx(THEN.time[-1] - shift, abs=1e-9)
 
 
-def test_a_repeat_may_begin_earlier() -> None:
-    rows = round(2.3 / STEP)
-    names = ("target", "used", "angle", "velocity", "acceleration", "force", "tendon_velocity", "travel")
-    cut = replace(
-        THEN,
-        **{name: getattr(THEN, name)[rows:] for name in names},
-        time=THEN.time[:-rows],
-        recording=THEN.recording[rows:],
-        segment=THEN.segment[rows:],
-    )
-    both = joined(THEN, cut)
-    (found,) = find_repeats(both, forces(both), [0], [1])
-    assert found.shift == pytest.approx(-2.3, abs=1e-9) and found.begin == pytest.approx(THEN.time[rows])
-
-
-def test_the_reference_that_shares_most_is_taken() -> None:
-    both = joined(later(THEN, 5.0, FOREIGN), THEN, FOREIGN, THEN)
-    (found,) = find_repeats(both, forces(both), [0, 1, 2], [3])
-    assert found.then == 1 and found.shift == 0.0
-
-
 def test_a_controller_that_follows_as_well_repeats_it() -> None:
     rng = np.random.default_rng(3)
     wandering = 0.01 * np.ptp(THEN.angle, axis=0) * np.sin(2 * np.pi * 0.4 * THEN.time[:, None] + rng.uniform(0, 6, 2))

@@ -65,6 +65,7 @@ def test_what_never_slides_makes_no_sample_stuck() -> None:
 
 
 def test_the_time_of_presliding_is_that_of_the_least_error() -> None:
+    """The fitted one stays if no other is better."""
     place = {"effect": "presliding", "joint": 1, "displacement": 1e-3}
     everywhere = {"effect": "presliding", "displacement": 3e-7}
     best = TIMES[3]
@@ -72,11 +73,8 @@ def test_the_time_of_presliding_is_that_of_the_least_error() -> None:
     found = settled(given, lambda data: abs(data["extensions"][1]["displacement"] - best))
     assert found == {"name": "finger", "extensions": [place, {**everywhere, "displacement": best}]}
     assert given["extensions"] == [place, everywhere]
-
-
-def test_the_fitted_time_stays_if_no_other_is_better() -> None:
-    given = {"extensions": [{"effect": "presliding", "displacement": 0.0053}]}
-    assert settled(given, lambda data: abs(data["extensions"][0]["displacement"] - 0.0053)) is given
+    fitted = {"extensions": [{"effect": "presliding", "displacement": 0.0053}]}
+    assert settled(fitted, lambda data: abs(data["extensions"][0]["displacement"] - 0.0053)) is fitted
 
 
 # --- what is left -----------------------------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 from pathlib import Path
 from typing import Any
 
@@ -86,16 +85,6 @@ def test_random_logs_read_back(tmp_path: Path, seed: int) -> None:
     assert len(read_recording(tmp_path / "rec.parquet")) == ROWS
 
 
-def test_parquet_reads_as_csv_does(tmp_path: Path) -> None:
-    frame = pd.DataFrame({"t": [0, 2, 4], "force": np.float32([0.25, 0.5, 0.75]), "spool": [5, 4, 3], "note": "abc"})
-    frame.to_parquet(tmp_path / "log.parquet")
-    frame.to_csv(tmp_path / "same.csv", index=False)
-    (tmp_path / "map.json").write_text(json.dumps(SMALL))
-    one, other = (convert_table(tmp_path / name, tmp_path / "map.json") for name in ("log.parquet", "same.csv"))
-    for name, values in one.columns.items():
-        assert values.tolist() == other.columns[name].tolist()
-
-
 def test_the_first_reading_may_be_the_zero(tmp_path: Path) -> None:
     """A clock of nanoseconds since 1970, which starts at 0 then."""
     log = LOG.replace("\n0,", "\n1700000000000000000,").replace("\n2,", "\n1700000000002000128,")
@@ -142,6 +131,7 @@ BAD_MAPS = [
     ("log", {"skip": -1}, ["log.skip"]),
     ("log", {"encoding": "klingon"}, ["log.encoding", "utf-16"]),
     ("log", {"missing": "guess"}, ["log.missing", "leave out"]),
+    ("log", {"missing": "?"}, ["log.missing", "expected a decision", "refuse or leave out"]),
     ("log", {"disorder": "ignore"}, ["log.disorder", "sort"]),
     ("resample", {"rate": 0}, ["resample.rate", "above 0"]),
 ]
@@ -158,7 +148,7 @@ def test_wrong_maps_are_refused_by_key(tmp_path: Path, path: str, value: Any, wo
     assert all(word in line for word in words), line
     # a schema knows neither relations between values, nor the units of pint, nor the names of encodings and zones
     relation = value == {"separator": ",", "decimal": ","} or path == "columns/tendon_force[3]"
-    open_name = path.endswith("/unit") or value == "?" or "zone" in str((path, value)) or "encoding" in str(value)
+    open_name = path.endswith("/unit") or "?" in str(value) or "zone" in str((path, value)) or "encoding" in str(value)
     assert relation or open_name or "offset" in str(value) or not VALIDATOR.is_valid(document)
 
 
@@ -244,11 +234,3 @@ def test_the_schema_says_what_every_key_is() -> None:
         stamps = list(units.STAMPS) if name == "time" else []
         offered = SCHEMA["$defs"][name.replace(" ", "_")]["properties"]["unit"]["anyOf"][0]["enum"]
         assert offered == [*table, *stamps], name
-
-
-def test_an_unknown_column_lists_the_known_ones_in_order(tmp_path: Path) -> None:
-    _, wanted = written(tmp_path, wanted=edited(SMALL, "columns/tendon_position[1..4]", {"column": "x", "unit": "m"}))
-    with pytest.raises(InputError) as refused:
-        convert_table(tmp_path / "log.csv", wanted)
-    listed = str(refused.value).split("expected one of ")[1].split(", ")
-    assert listed == sorted(listed) and {"time", "contact", "tendon_position[1]"} < set(listed)

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.smoothing import FEWEST, HIGHEST, LOWEST, OF_RATE, Signals, smoothing_of, zero_phase
+from tendonfmu.recordings.smoothing import FEWEST, HIGHEST, LOWEST, OF_RATE, Signals, smoothing_of
 
 Numbers = NDArray[np.float64]
 RATE = 1000.0
@@ -106,11 +106,6 @@ def test_descriptions_for_estimating_and_back() -> None:
     assert Signals(20.0, 4).restored(Signals(20.0, 4).description({"name": "x"}), {"name": "x"}) == {"name": "x"}
 
 
-def test_noise_with_a_memory_is_not_scaled() -> None:
-    bias = {"noise_std": 0.004, "noise_time": 0.02}
-    assert Signals(20.0, 4).description({"bias": bias})["bias"] == bias
-
-
 @pytest.mark.parametrize("noise", [0.003, 0.03, 0.3])
 def test_the_cutoff_is_where_the_torque_meets_its_noise(noise: float) -> None:
     """A torque that falls with the square of the frequency."""
@@ -136,15 +131,3 @@ def test_slow_or_short_recordings_are_not_smoothed() -> None:
     found = smoothing_of([recording(seconds=20.0, rate=50.0)], DATA)
     assert found is not None and found.cutoff is not None
     assert found.cutoff == pytest.approx(OF_RATE * 50.0) and found.every == 1
-
-
-def test_short_pieces_can_be_smoothed() -> None:
-    values = np.random.default_rng(3).standard_normal((10, 2))
-    assert zero_phase(values, 5.0, 100.0).shape == (10, 2)
-
-
-@pytest.mark.parametrize(("rate", "every"), [(1000.0, 3), (500.0, 1), (250.0, 1)])
-def test_samples_are_dropped_where_the_signals_are_slow_and_enough_are_left(rate: float, every: int) -> None:
-    found = smoothing_of([recording(noise=0.0, rate=rate)], DATA)
-    assert found is not None and found.cutoff == pytest.approx(min(HIGHEST, OF_RATE * rate))
-    assert found.every == every

@@ -17,6 +17,7 @@ from map_cases import LOG, SMALL, VALIDATOR, edited, written
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_blocks, write_table
 from tendonfmu.recordings.converters import text_log, units
+from tendonfmu.recordings.converters.inspection import inspect_log
 from tendonfmu.recordings.converters.table import Conversion, convert_table
 
 # --- several clocks ---------------------------------------------------------------------------------------------------
@@ -75,14 +76,6 @@ def test_topics_come_onto_the_clock_of_the_time(tmp_path: Path, plugin: str) -> 
     assert found["tendon_force[1]"] == pytest.approx(10 + found["time"] / 0.005)
     assert found["joint_position[1]"] == pytest.approx(0.001 * found["time"] / 0.005, abs=1e-12)
     assert any("interpolated onto one clock; its largest gap is 10 ms" in note for note in log.notes)
-
-
-def test_topics_with_the_same_stamps_are_not_interpolated(tmp_path: Path) -> None:
-    bag = two_topics(tmp_path, late=0, every=1)
-    log = convert_table(bag, with_map(tmp_path, bag_map()))
-    (note,) = [each for each in log.notes if "largest gap" in each]
-    assert "joint_states: has a sample at each time, none is interpolated; its largest gap is 5 ms" in note
-    assert log.columns["joint_position[1]"] == pytest.approx(0.001 * (np.arange(400) + 0.4), abs=1e-12)
 
 
 def test_gaps_are_refused_or_left_out(tmp_path: Path) -> None:
@@ -199,6 +192,65 @@ def test_wrong_stamps_are_refused_by_row(tmp_path: Path, stamp: str, unit: str, 
     with pytest.raises(InputError) as refused:
         convert_table(*written(tmp_path, log, edited(SMALL, "columns/time", {"column": "t", "unit": unit})))
     assert all(word in str(refused.value) for word in words), refused.value
+
+
+# --- a time in two columns, as ROS writes it into tables --------------------------------------------------------------
+
+FIRST, STEP, ROWS = 1_727_769_340_123_456_789, 33_333_331, 400  # ns
+
+
+def split_log(folder: Path, suffix: str, names: tuple[str, str] = ("header.stamp.sec", "header.stamp.nanosec")) -> Path:
+    stamps = FIRST + STEP * np.arange(ROWS)
+    bend = np.sin(0.05 * np.arange(ROWS))
+    table = pd.DataFrame(
+        {names[0]: stamps // 10**9, names[1]: stamps % 10**9, "force [N]": 10 + bend, "spool [mm]": bend}
+    )
+    file = folder / f"log{suffix}"
+    if suffix == ".csv":
+        table.to_csv(file, index=False, sep=";", decimal=",")
+    else:
+        table.to_parquet(file)
+    return file
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_inspect_proposes_the_joined_time_and_the_nanoseconds_stay(call: Call, tmp_path: Path, suffix: str) -> None:
+    file = split_log(tmp_path, suffix)
+    answer = call("convert", "inspect", file, "-o", "map.json")
+    assert answer.status == 0, answer.err
+    proposed = json.loads((tmp_path / "map.json").read_text(encoding="utf-8"))
+    time = proposed["columns"]["time"]
+    assert (time["column"], time["unit"]) == ("header.stamp.sec+nanosec", "datetime")
+    assert suffix != ".csv" or proposed["log"]["separator"] == ";"
+    made = convert_table(file, tmp_path / "map.json").columns
+    np.testing.assert_allclose(made["time"], 1e-9 * STEP * np.arange(ROWS), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(made["tendon_position[1]"], 1e-3 * np.sin(0.05 * np.arange(ROWS)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("names", [("secs", "nsecs"), ("stamp_sec", "stamp_nsec"), ("t.seconds", "t.nanos")])
+def test_other_names_of_both(tmp_path: Path, names: tuple[str, str]) -> None:
+    (topic,) = inspect_log(split_log(tmp_path, ".csv", names)).topics
+    assert topic.clock is not None and topic.clock.name.startswith(f"{names[0]}+") and topic.clock.step == STEP
+
+
+def test_columns_that_do_not_belong_together_stay_apart(tmp_path: Path) -> None:
+    (topic,) = inspect_log(split_log(tmp_path, ".csv", ("left.sec", "right.nanosec"))).topics
+    assert not any("+" in field.field.name for field in topic.fields)
+
+
+def test_a_part_that_is_missing_is_named_by_row(tmp_path: Path) -> None:
+    file = split_log(tmp_path, ".csv")
+    table = pd.read_csv(file, sep=";", decimal=",").astype({"header.stamp.nanosec": float})
+    table.loc[7, "header.stamp.nanosec"] = np.nan
+    table.to_csv(file, index=False)
+    columns = {
+        "time": {"column": "header.stamp.sec+nanosec", "unit": "datetime"},
+        "tendon_force[1]": {"column": "force [N]", "unit": "N"},
+        "tendon_position[1]": {"column": "spool [mm]", "unit": "mm"},
+    }
+    (tmp_path / "map.json").write_text(json.dumps({"format": "tendonfmu-map-1", "columns": columns}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"column header\.stamp\.nanosec, row 8: nan; expected a part of a time"):
+        convert_table(file, tmp_path / "map.json")
 
 
 # --- units ------------------------------------------------------------------------------------------------------------

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +11,11 @@ import pytest
 
 from command import Call
 from map_cases import TURNING, VALIDATOR, edited, written
-from optional_parts import DATA, needs
-from repository_paths import ROOT
 from tendonfmu.errors import InputError
-from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger
-from tendonfmu.recordings.converters.column_map import read_map
 from tendonfmu.recordings.converters.one_joint import central_velocity, starting_numbers
 from tendonfmu.recordings.converters.table import convert_table
-
-EXAMPLE = ROOT / "examples" / "one_joint"
-EMPS = DATA / "emps"
 
 COULOMB, VISCOUS, INERTIA, OFFSET = 0.8, 0.3, 0.05, 0.1
 
@@ -117,6 +108,9 @@ def test_what_does_not_move_is_refused(tmp_path: Path) -> None:
         convert_table(*machine_log(tmp_path, {name: values[:19] for name, values in machine(rest=0.0).items()}))
 
 
+# --- the example ------------------------------------------------------------------------------------------------------
+
+
 def test_no_filter_passes_over_a_gap() -> None:
     """A joint that is elsewhere after the log was interrupted: no velocity comes of the jump."""
     time = np.r_[np.arange(0.0, 1.0, 0.002), np.arange(5.0, 6.0, 0.002)]
@@ -174,58 +168,3 @@ def test_a_description_from_a_recording_is_that_of_convert(call: Call, tmp_path:
         answer = call("describe", *arguments, "-o", "new.json")
         assert answer.status == 2 and len(answer.err.splitlines()) == 1, answer
         assert all(word in answer.err for word in words) and not (tmp_path / "new.json").exists()
-
-
-# --- the example ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-def test_the_example_finds_what_was_changed(call: Call, tmp_path: Path) -> None:
-    """Week 5 has 20 % more Coulomb friction than week 1, week 3 has what week 1 had; every week moves differently.
-
-    The first 30 s of each, for speed.
-    """
-    script = EXAMPLE / "make_logs.py"
-    subprocess.run([sys.executable, str(script), "-o", "logs"], cwd=tmp_path, check=True, capture_output=True)
-    assert read_map(EXAMPLE / "map.json").joint is not None
-    for week in (1, 3, 5):
-        made = f"week_{week}.parquet"
-        extra = ["--finger", "servo.json"] if week == 1 else []
-        log = f"logs/week_{week}.csv"
-        assert call("convert", "table", log, "--map", EXAMPLE / "map.json", "-o", made, *extra).status == 0
-        table = read_table(tmp_path / made, lambda *_: None)
-        write_table(tmp_path / made, {name: values[table["time"] < 30.0] for name, values in table.items()})
-    assert call("fit", "servo.json", "week_1.parquet", "--kinematics", "3", "-o", "fitted.json").status == 0
-    causes = {}
-    for week in (3, 5):
-        now = ["diagnose", "fitted.json", f"week_{week}.parquet", "--reference", "week_1.parquet", "--kinematics", "3"]
-        assert call(*now, "-o", f"diagnosis_{week}").status == 0
-        report = json.loads((tmp_path / f"diagnosis_{week}" / "diagnosis.json").read_text(encoding="utf-8"))
-        causes[week] = report["causes"]
-    assert causes[3] == []
-    # in a machine with one rigid tendon these two are one friction
-    assert len(causes[5]) == 1 and causes[5][0]["effect"] in ("joint_friction", "preload_friction")
-
-
-# --- measured ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-@needs("emps data")
-def test_a_measured_machine_from_its_owners_log(call: Call, tmp_path: Path) -> None:
-    """The carriage in halves: nothing has changed; 2 N put in by hand are found, to 10 %."""
-    script = EXAMPLE / "make_carriage.py"
-    subprocess.run([sys.executable, script, EMPS], cwd=tmp_path, check=True)
-    for part in ("then", "now", "worn"):
-        convert = f"convert table {part}.csv --map {EXAMPLE}/carriage_map.json -o {part}.parquet"
-        assert call(*convert.split(), *(("--finger", "carriage.json") if part == "then" else ())).status == 0
-    assert call(*["fit", "carriage.json", "then.parquet", "--kinematics", "3", "-o", "fitted.json"]).status == 0
-    found = {}
-    for name in ("now", "worn"):
-        diagnose = f"diagnose fitted.json {name}.parquet --reference then.parquet --kinematics 3 -o {name}"
-        assert call(*diagnose.split()).status == 0
-        found[name] = json.loads((tmp_path / name / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
-        shutil.rmtree(tmp_path / name)
-    assert found["now"] == []
-    assert len(found["worn"]) == 1 and found["worn"][0]["effect"] in ("joint_friction", "preload_friction")
-    assert found["worn"][0]["now"] - found["worn"][0]["reference"] == pytest.approx(2.0, rel=0.1)

@@ -90,23 +90,18 @@ def test_sound_recordings_have_no_findings(description: Path, name: str) -> None
     assert belongs(read_finger(description), [recording, without_angles(recording)]) == []
 
 
-def test_rest_and_few_samples_have_no_findings(finger: Finger, sound: Recording) -> None:
-    """Noise alone, and too little of anything, says nothing of signs and units."""
+def test_rest_few_samples_and_slack_tendons_have_no_findings(finger: Finger, sound: Recording) -> None:
+    """Noise alone, and too little of anything, says nothing; a slack tendon does not follow its joints."""
     rng = np.random.default_rng(3)
     groups = {name: np.tile(values[:1], (len(sound), 1)) for name, values in sound.groups.items()}
     groups["tendon_force"] = groups["tendon_force"] + 0.02 * rng.standard_normal(groups["tendon_force"].shape)
     rest = dataclasses.replace(sound, groups=groups)
-    assert belongs(finger, [rest, part_of(sound, slice(0, 30)), part_of(sound, slice(0, 1))]) == []
-
-
-def test_slack_tendons_are_no_misfit(finger: Finger, sound: Recording) -> None:
-    """A slack tendon does not follow its joints."""
     force, position = (sound.groups[name].copy() for name in ("tendon_force", "tendon_position"))
     slack = (sound.time > 4.0) & (sound.time < 7.0)
     force[slack, 0] = 0.0
     position[slack, 0] += 0.005 * np.sin(3.0 * sound.time[slack]) ** 2
     spoilt = with_group(with_group(sound, "tendon_force", force), "tendon_position", position)
-    assert belongs(finger, [spoilt]) == []
+    assert belongs(finger, [rest, part_of(sound, slice(0, 30)), part_of(sound, slice(0, 1)), spoilt]) == []
 
 
 # --- signs, order, units ----------------------------------------------------------------------------------------------
@@ -236,41 +231,46 @@ def test_clock(finger: Finger, sound: Recording) -> None:
     assert [finding.kind for finding in belongs(finger, [uneven])] == ["jitter"]
 
 
-def test_saturated_force(finger: Finger, sound: Recording) -> None:
-    force = sound.groups["tendon_force"].copy()
-    limit = np.quantile(force[:, 4], 0.97)
-    force[:, 4] = np.minimum(force[:, 4], limit)
-    [finding] = belongs(finger, [with_group(sound, "tendon_force", force)])
-    assert (finding.severity, finding.kind, finding.columns) == ("warning", "clipped", ("tendon_force[5]",))
-    assert f"{limit:.6g}" in finding.seen
+def clipped(values: Numbers) -> None:
+    values[:, 1] = np.minimum(values[:, 1], np.quantile(values[:, 1], 0.97))
 
 
-@pytest.mark.parametrize("group", ["tendon_force", "tendon_position", "joint_position"])
-def test_held_sensor(finger: Finger, sound: Recording, group: str) -> None:
-    for until, severity in ((9.0, "warning"), (1e9, "error")):
-        values = sound.groups[group].copy()
-        held = (sound.time > 3.0) & (sound.time < until)
-        values[held, 1] = values[held.argmax(), 1]
-        findings = belongs(finger, [with_group(sound, group, values)])
-        assert [(each.severity, each.kind, each.columns) for each in findings] == [(severity, "held", (f"{group}[2]",))]
+def coarse(values: Numbers) -> None:
+    step = np.ptp(values[:, 1]) / 20
+    values[:, 1] = np.round(values[:, 1] / step) * step
 
 
-def test_coarse_sensor(finger: Finger, sound: Recording) -> None:
-    position = sound.groups["tendon_position"].copy()
-    step = np.ptp(position[:, 7]) / 20
-    position[:, 7] = np.round(position[:, 7] / step) * step
-    findings = belongs(finger, [with_group(sound, "tendon_position", position)])
-    assert ("warning", "coarse", ("tendon_position[8]",)) in [
-        (each.severity, each.kind, each.columns) for each in findings
-    ]
-    assert all(each.severity == "warning" for each in findings)
+def pushing(values: Numbers) -> None:
+    values[:, 1] -= values[:, 1].mean()
 
 
-def test_pushing_tendon_and_zero_of_a_sensor(finger: Finger, sound: Recording) -> None:
-    force = sound.groups["tendon_force"].copy()
-    force[:, 2] -= force[:, 2].mean()
-    [finding] = belongs(finger, [with_group(sound, "tendon_force", force)])
-    assert finding.kind == "pushing" and "zeroed under load" in finding.line() and not finding.entries
+def held(values: Numbers) -> None:
+    values[1500:4500, 1] = values[1500, 1]
+
+
+def held_to_the_end(values: Numbers) -> None:
+    values[1500:, 1] = values[1500, 1]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "group", "kind", "severity"),
+    [
+        (clipped, "tendon_force", "clipped", "warning"),
+        (coarse, "tendon_position", "coarse", "warning"),
+        (pushing, "tendon_force", "pushing", "error"),
+        *((held, group, "held", "warning") for group in ("tendon_force", "tendon_position", "joint_position")),
+        *((held_to_the_end, group, "held", "error") for group in ("tendon_force", "tendon_position", "joint_position")),
+    ],
+)
+def test_a_sensor_that_fails_is_named(
+    finger: Finger, sound: Recording, spoil: Callable[[Numbers], None], group: str, kind: str, severity: str
+) -> None:
+    values = sound.groups[group].copy()
+    spoil(values)
+    findings = belongs(finger, [with_group(sound, group, values)])
+    assert (severity, kind, (f"{group}[2]",)) in [(each.severity, each.kind, each.columns) for each in findings]
+    assert len(findings) == 1 or ({each.severity for each in findings} == {"warning"} and kind == "coarse")
+    assert kind != "pushing" or "zeroed under load" in findings[0].line()
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
@@ -284,35 +284,24 @@ def written(recording: Recording, file: Path) -> Path:
     return file
 
 
-def test_check_says_that_a_recording_belongs(call: Call) -> None:
-    answer = call("check", INDEX, FREE)
-    assert answer.status == 0 and answer.err == ""
-    assert f"{FREE}: belongs to this finger: 30000 samples, 60 s; nothing found" in answer.out
-
-
-def test_check_says_what_to_write(call: Call, tmp_path: Path, sound: Recording) -> None:
+def test_check_says_what_belongs_and_what_to_write(call: Call, tmp_path: Path, sound: Recording) -> None:
+    """Warnings alone are sound."""
     spoilt = written(scaled(sound, "tendon_force", at(8, 2)), tmp_path / "spoilt.parquet")
     answer = call("check", INDEX, spoilt, FREE)
     assert answer.status == 1
     assert f"error: {spoilt}: tendon_force[2]: " in answer.out and 'at "tendon_force[2]": "sign": -1' in answer.out
-    assert f"{FREE}: belongs" in answer.out
+    assert f"{FREE}: belongs to this finger: 30000 samples, 60 s; nothing found" in answer.out
     assert answer.err.count("\n") == 1 and "1 of 2 recordings" in answer.err
-
-
-def test_check_of_warnings_alone_is_sound(call: Call, tmp_path: Path, sound: Recording) -> None:
     gap = written(part_of(sound, (sound.time < 8.0) | (sound.time > 9.5)), tmp_path / "gap.parquet")
     answer = call("check", INDEX, gap)
     assert answer.status == 0 and f"warning: {gap}: time: 1 gap, " in answer.out
-
-
-def test_check_refuses_bad_recordings(call: Call, tmp_path: Path) -> None:
     answer = call("check", INDEX, "absent.csv")
     assert answer.status == 2 and "absent.csv" in answer.err
     answer = call("check", EXAMPLES / "rigs" / "index_finger.json", FREE)
     assert answer.status == 2 and "a rig" in answer.err
 
 
-@pytest.mark.parametrize("name", repeated(SPOILT, 1, 3, 6, 8))
+@pytest.mark.parametrize("name", repeated(SPOILT, 3, 6))
 def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound: Recording, name: str) -> None:
     """The words name keys and values of a map; with these, the recording is converted, and belongs."""
     spoilt = written(SPOILT[name][0](sound), tmp_path / "spoilt.parquet")
@@ -342,7 +331,7 @@ def test_the_advice_can_be_written_into_a_map(call: Call, tmp_path: Path, sound:
         ("fit", FREE, "?", "-o", "f.json"),
         pytest.param(("diagnose", FREE, "?", "-o", "out"), marks=pytest.mark.long),
         pytest.param(("tune", FREE, "?", "-o", "t.json"), marks=pytest.mark.long),
-        ("calibrate", FREE, "?", "-o", "out"),
+        pytest.param(("calibrate", FREE, "?", "-o", "out"), marks=pytest.mark.long),
         pytest.param(("fit", FREE, "--compare", "?", "-o", "f.json"), marks=pytest.mark.long),
         pytest.param(("diagnose", FREE, "--test", "?", "-o", "out"), marks=pytest.mark.long),
     ],

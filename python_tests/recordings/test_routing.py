@@ -7,12 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
 from command import Call
-from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.files import write_table
@@ -106,12 +104,6 @@ def test_a_finger_begun_wrong_gets_its_routing_back(index: tuple[Finger, Recordi
     assert all(abs(tendon.get("zero") or 0.0) < 3.0 * STEP for tendon in found.data["tendons"])
 
 
-def test_what_is_right_stays(index: tuple[Finger, Recording]) -> None:
-    finger, recording = index
-    assert routed(finger, learn_routing(finger, [recording])) == (finger, [])
-    assert not belongs(finger, [recording])
-
-
 def test_a_zero_is_found_and_said(index: tuple[Finger, Recording]) -> None:
     finger, recording = index
     position = recording.groups["tendon_position"] + np.where(np.arange(8) == 2, 0.0125, 0.0)
@@ -166,34 +158,7 @@ def test_an_arm_that_varies_is_seen_and_no_other() -> None:
     assert findings[0].severity == "warning" and "tendon 1: moment arm at joint near changes" in findings[0].line()
 
 
-def test_reversed_columns_are_not_taken_for_the_routing(index: tuple[Finger, Recording]) -> None:
-    finger, recording = index
-    flipped = {
-        **recording.groups,
-        "tendon_position": recording.groups["tendon_position"] * np.where(np.arange(8), 1, -1),
-    }
-    wrong = replace(recording, groups=flipped)
-    assert routed(finger, learn_routing(finger, [wrong])) == (finger, [])
-    assert [finding.kind for finding in belongs(finger, [wrong])] == ["sign"]
-
-
 # --- the commands -----------------------------------------------------------------------------------------------------
-
-
-def test_fit_learns_the_routing_and_reports_it(tmp_path: Path, call: Call, index: tuple[Finger, Recording]) -> None:
-    given, fitted, report = (tmp_path / f"{name}.json" for name in ("given", "fitted", "report"))
-    given.write_text(json.dumps(dict(changed(index[0], arms=0.2).data)), encoding="utf-8")
-    said = call(
-        "fit", given, FREE, "-o", fitted, "--report", report, "--routing", "--only", "joints[1].friction.coulomb"
-    )
-    assert said.status == 0 and "routing: tendon mcp_flexor_radial: moment arm at joint mcp_abduction" in said.out
-    np.testing.assert_allclose(read_finger(fitted).moment_arms, index[0].moment_arms, rtol=0.01)
-    document = json.loads(report.read_text(encoding="utf-8"))
-    schema = json.loads((ROOT / "python/tendonfmu/schema/fit_report.schema.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, schema)
-    assert sum(number["changed"] for number in document["routing"]["numbers"]) == int(
-        np.count_nonzero(index[0].moment_arms)
-    )
 
 
 def test_fit_without_joint_positions_says_so(tmp_path: Path, call: Call) -> None:
@@ -227,32 +192,14 @@ def test_redundant_tendons_show_their_stiffness() -> None:
     assert len(covered) == 30 and np.mean(covered) >= 0.85
 
 
-def test_at_one_joint_arms_are_known_against_each_other() -> None:
-    finger, recording = made_up(2)
-    recording.groups.update({name: values[:, :2] for name, values in recording.groups.items() if "tendon" in name})
-    recording.groups["tendon_position"] -= recording.groups.pop("joint_position")[:, 1:] @ ARMS[:2, 1:].T
-    data = json.loads(json.dumps(dict(finger.data)))
-    data["joints"], data["contact"] = data["joints"][:1], {"threshold": [0.1]}
-    data["tendons"] = [
-        {**tendon, "moment_arms": [factor * tendon["moment_arms"][0]]}
-        for tendon, factor in zip(data["tendons"][:2], (1.1, 1.0), strict=True)
-    ]
-    given = finger_from_data(data)
-    first, second = learn_routing(given, [recording])
-    assert (first.seen_from, second.seen_from) == ([1], [0])
-    assert not first.arms[0].is_known and second.arms[0].differs
-    assert second.arms[0].value == pytest.approx(1.1 * ARMS[1, 0], abs=3.0 * second.arms[0].half)
-    lines = [finding.line() for finding in belongs(given, [recording])]
-    assert "10 % larger than described (seen from tendon 1)" in lines[-1], lines
-
-
 def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:
-    given = tmp_path / "given.json"
+    given, free = tmp_path / "given.json", tmp_path / "free.parquet"
     given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")
-    case = _read(given, None, [[FREE], [], []], Options())
+    index[1][:30.0].write(free)
+    case = _read(given, None, [[free], [], []], Options())
     np.testing.assert_allclose(case.finger.moment_arms, index[0].moment_arms, rtol=0.01)
     assert case.routing is not None and len(case.routing["sentences"]) == 8
-    assert _read(INDEX, None, [[FREE], [], []], Options()).routing is None
+    assert _read(INDEX, None, [[free], [], []], Options()).routing is None
 
 
 def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:

@@ -1,4 +1,4 @@
-"""Noise of joint positions, estimated from made signals whose noise is known."""
+"""Noise of joint positions of made signals whose noise is known, and statistics of residuals against scipy."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import consistency, whiteness
 from tendonfmu.recordings.signal_noise import joint_position_noise, white_noise
 
 Array = NDArray[Any]
@@ -82,15 +83,6 @@ def test_of_encoders_with_quantisation() -> None:
     np.testing.assert_allclose(joint_position_noise(DATA, made, 2), expected, rtol=0.1)
 
 
-@pytest.mark.parametrize("step", [1e-4, 1e-3])
-def test_of_quantisation_alone(step: float) -> None:
-    """Also where the finger rests or is slow against the steps: never below that of the rounding, nor far above."""
-    rng = np.random.default_rng(4)
-    made = recording(rng, 0.0, 1e-6, angle_noise=0.0, angle_step=step)
-    found = joint_position_noise(DATA, made, 2) / (step / np.sqrt(12.0))
-    assert (found >= 0.999).all() and (found < 1.4).all(), found
-
-
 def test_impacts_and_gaps_do_not_count() -> None:
     rng = np.random.default_rng(5)
     time = times(rng)
@@ -101,16 +93,6 @@ def test_impacts_and_gaps_do_not_count() -> None:
     np.testing.assert_allclose(white_noise(time, values), 5e-4, rtol=0.1)
 
 
-def test_what_it_finds_is_a_description() -> None:
-    rng = np.random.default_rng(6)
-    made = recording(rng, 0.0, 1e-9, angle_noise=0.0, angle_step=1e-12)
-    noise = joint_position_noise(DATA, made)
-    assert (noise >= 1e-6).all()
-    finger = Instance.from_description(DATA | {"position_filter": {"noise": noise.tolist()}})
-    assert finger.get("position_filter.noise[2]") == noise[1]
-    assert finger.get("position_filter.jerk_density") == 1.0
-
-
 def test_refuses_what_says_nothing() -> None:
     with pytest.raises(InputError, match="recording of 20 samples: expected at least 60"):
         white_noise(np.arange(20.0), np.zeros((20, 1)))
@@ -119,3 +101,23 @@ def test_refuses_what_says_nothing() -> None:
     bare = Recording(made.path, made.time, {k: v for k, v in made.groups.items() if k != "joint_position"})
     with pytest.raises(InputError, match=r"no column joint_position\[1\]"):
         joint_position_noise(DATA, bare, 2)
+
+
+# --- residuals of a consistent filter ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [40, 1000, 100000])
+def test_the_interval_of_the_nis_is_that_of_chi_square(count: int) -> None:
+    low, high = consistency([np.ones((count, 1))])["interval"]
+    expected = stats.chi2.ppf([0.025, 0.975], count) / count
+    assert [low, high] == pytest.approx(list(expected), rel=1e-9)
+
+
+def test_whiteness_tells_white_from_coloured() -> None:
+    white = np.random.default_rng(1).standard_normal((5000, 2))
+    white[1000:1500] = np.nan
+    coloured = white.copy()
+    coloured[1:, 1] += 0.2 * np.nan_to_num(white[:-1, 1])
+    found = whiteness([coloured])
+    assert abs(found["lag_one"][0]) < 0.04 and found["ljung_box_p"][0] > 0.01
+    assert found["lag_one"][1] == pytest.approx(0.2 / 1.04, abs=0.04) and found["ljung_box_p"][1] < 1e-6

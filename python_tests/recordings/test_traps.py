@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from command import Call
-from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.arrays import Numbers
 from tendonfmu.model import Finding, Finger, finger_from_data, read_finger
@@ -32,10 +31,6 @@ def sound() -> tuple[Finger, Recording]:
 def found(sound: tuple[Finger, Recording], **groups: Numbers) -> list[Finding]:
     finger, recording = sound
     return belongs(finger, [replace(recording, groups={**recording.groups, **groups})])
-
-
-def test_a_sound_recording_has_none(sound: tuple[Finger, Recording]) -> None:
-    assert found(sound) == []
 
 
 def test_signed_numbers_stored_as_unsigned(sound: tuple[Finger, Recording]) -> None:
@@ -231,12 +226,6 @@ def test_lists_of_another_length_are_named(tmp_path: Path, call: Call) -> None:
     (tmp_path / "log.csv").write_text('t,q\n0.0,"[1, 2]"\n0.1,"[1, 2]"\n0.2,"[1]"\n', encoding="utf-8")
     answer = call("convert", "inspect", tmp_path / "log.csv")
     assert answer.status == 2 or "q" in answer.out
-
-
-def test_the_servo_arm_s_currents_are_named(call: Call) -> None:
-    folder = require("so101 data") / "friction_gravity"
-    answer = call("convert", "inspect", folder / "state_motor.csv")
-    assert "torques[1], torques[2], torques[3]" in answer.err and "a magnitude" in answer.err
 
 
 def test_a_load_that_friction_nearly_balances_one_way_is_no_magnitude() -> None:

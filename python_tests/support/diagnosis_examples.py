@@ -6,7 +6,6 @@ Every one is complete: what a page leaves out must be left out by the page, not 
 from __future__ import annotations
 
 import copy
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -55,34 +54,13 @@ def finger_of(joints: Sequence[str], tendons: Sequence[str]) -> dict[str, Any]:
 # --- series -----------------------------------------------------------------------------------------------------------
 
 
-def _noise(name: str, size: int, scale: float) -> Numbers:
-    """The same for the same name."""
-    return np.random.default_rng(zlib.crc32(name.encode())).normal(scale=scale, size=size)
-
-
-def _coloured(name: str, size: int, scale: float, memory: float = 0.9) -> Numbers:
-    white = _noise(name, size, scale * np.sqrt(1 - memory**2))
-    series, last = np.empty(size), 0.0
-    for k, value in enumerate(white):
-        last = series[k] = memory * last + value
-    return series
-
-
 def evidence(joint: int, label: str, unit: str, span: tuple[float, float], shape: Shape) -> Evidence:
     """shape: mean residual before (N·m) over the coordinate."""
     bins, floor = 24, 4e-4
-    x = np.linspace(*span, bins)
-    spread = np.full(bins, floor) * (1 + 0.3 * np.abs(_noise(f"{label}{joint}spread", bins, 1.0)))
-    return Evidence(
-        joint=joint,
-        label=label,
-        unit=unit,
-        coordinate=x,
-        before=shape(x) + _noise(f"{label}{joint}before", bins, floor),
-        after=_noise(f"{label}{joint}after", bins, floor),
-        before_std=spread,
-        after_std=0.8 * spread,
-    )
+    x, rng = np.linspace(*span, bins), np.random.default_rng(joint)
+    spread = np.full(bins, floor)
+    before, after = rng.normal(scale=floor, size=(2, bins))
+    return Evidence(joint, label, unit, x, shape(x) + before, after, spread, 0.8 * spread)
 
 
 _BINNED = (
@@ -100,22 +78,18 @@ def views_of(joint: int, size: float, shapes: Mapping[str, Shape], white: float 
     size: N·m of what no model explains. shapes: kind → mean residual before. white: correlation after 10 ms of what is
     left.
     """
+    rng = np.random.default_rng(joint)
     time, lag, frequency = np.linspace(0.0, 60.0, 1200), np.linspace(0.01, 1.0, 100), np.geomspace(0.05, 50.0, 120)
-    before = _coloured(f"before{joint}", len(time), size)
-    if shapes:
-        before += 1.8 * size * np.sin(2.1 * time + joint) * (1 + 0.4 * np.sin(0.31 * time))
-    found = [ResidualView(joint, "time", "time", "s", time, before, _coloured(f"before{joint}", len(time), 0.9 * size))]
+    after = size * rng.standard_normal(len(time))
+    found = [ResidualView(joint, "time", "time", "s", time, after + size * np.sin(2.1 * time) * bool(shapes), after)]
     for kind, label, unit, span in _BINNED:
         x = np.linspace(*span, 30)
-        mean = shapes.get(kind, np.zeros_like)(x) + _noise(f"{kind}{joint}", 30, 0.2 * size)
-        after, std = _noise(f"{kind}{joint}after", 30, 0.15 * size), np.full(30, 1.3 * size)
-        found.append(ResidualView(joint, kind, label, unit, x, mean, after, std))
-    power = size**2 / 50.0 * (1 + 6.0 / (1 + (frequency / 1.5) ** 2)) * np.exp(_noise(f"spectrum{joint}", 120, 0.25))
-    hump = 40.0 * np.exp(-(((np.log(frequency) - np.log(0.33)) / 0.25) ** 2)) if shapes else np.zeros_like(frequency)
-    found.append(ResidualView(joint, "spectrum", "frequency", "Hz", frequency, power * (1 + hump), power))
+        mean, left = shapes.get(kind, np.zeros_like)(x), 0.15 * size * rng.standard_normal(30)
+        found.append(ResidualView(joint, kind, label, unit, x, mean + left, left, np.full(30, 1.3 * size)))
+    power = size**2 / 50.0 * (1 + 6.0 / (1 + (frequency / 1.5) ** 2))
     decay = white ** (lag / 0.01)
-    longer = 0.7 * np.cos(2.1 * lag) + 0.3 * decay if shapes else decay
-    found.append(ResidualView(joint, "autocorrelation", "lag", "s", lag, longer, decay))
+    found.append(ResidualView(joint, "spectrum", "frequency", "Hz", frequency, (2 if shapes else 1) * power, power))
+    found.append(ResidualView(joint, "autocorrelation", "lag", "s", lag, np.cos(2.1 * lag), decay))
     return tuple(found)
 
 
@@ -355,37 +329,6 @@ def three_causes() -> Diagnosis:
     )
 
 
-def unexplained() -> Diagnosis:
-    """Something is there that no effect is."""
-    found = adequate()
-    return replace(
-        found,
-        verdict="unexplained",
-        nominal=ModelErrors((4.1e-3, 1.0e-3), (4.3e-3, 1.0e-3)),
-        extended=ModelErrors((4.1e-3, 1.0e-3), (4.3e-3, 1.0e-3)),
-        noise_floor=(1.29e-3, 0.99e-3),
-        steps=(3.12e-3,),
-        unexplained=Unexplained(
-            share=0.88,
-            description="at joint 1 (mcp), a line at 1.7 Hz that does not depend on the motion",
-            by_joint=(0.91, 0.02),
-            p_value=5e-4,
-            unknown=True,
-            gain=Interval(0.65, 0.6, 0.69),
-        ),
-        experiment=replace(
-            NO_EXPERIMENT,
-            sentence="Hold joint 1 (mcp) still for 30 s at a pretension of 10 N: what goes on without motion is a "
-            "disturbance from outside.",
-        ),
-        views=(
-            *views_of(1, 1.5e-3, {"time": np.zeros_like}, 0.93),
-            *views_of(2, 0.98e-3, {}),
-        ),
-        whiteness=((0.93, 0.93), (0.05, 0.05)),
-    )
-
-
 def changed() -> Diagnosis:
     """What is different since a reference: a number that grows over three recordings, a term, and a load."""
     found = one_cause()
@@ -450,6 +393,5 @@ ALL: dict[str, Callable[[], Diagnosis]] = {
     "adequate": adequate,
     "one_cause": one_cause,
     "three_causes": three_causes,
-    "unexplained": unexplained,
     "changed": changed,
 }
