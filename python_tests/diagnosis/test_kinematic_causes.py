@@ -137,5 +137,5 @@ def test_the_command_says_what_slipped(tmp_path: Path, call: Call, monkeypatch: 
     np.testing.assert_allclose(zeros[0] - zeros[1], [3e-4, 0.0, 0.0, 0.0], atol=5e-6)
     page = Path("out/diagnosis.html").read_text(encoding="utf-8")
     assert "The joint&#39;s encoder is off" in page or "The joint's encoder is off" in page
-    assert "less error of the tendons" in page
+    assert "error of the tendon positions" in page
     assert page.count("Its number in extended.json;") == page.count("Its number;") == 1  # of the zero; of the encoder
