@@ -1,4 +1,4 @@
-// docs/reference/semantics.md#position-filter: what it estimates, its gate, its memory, its derivatives.
+// docs/reference/semantics/position_filter.md: what it estimates, its gate, its memory, its derivatives.
 #include <gtest/gtest.h>
 
 #include <cmath>
