@@ -296,7 +296,7 @@ def test_the_demo_tuned_and_drawn(tuned: tuple[Path, str, str]) -> None:
     as_chosen = next(each for each in report["tail"] if each["factor"] == 1.0)
     assert (as_chosen["in_sample"], as_chosen["held_out"]) == (report["in_sample"], report["held_out"])
     assert report["in_sample"]["alarms"] == 0 < report["held_out"]["alarms"], "chosen on the one, not on the other"
-    assert "as it runs" in out and "at most" in out
+    assert "run with detection on" in out and "at most" in out
     drawn = {file.name: file.read_bytes() for file in (folder / "fig").iterdir()}
     assert set(drawn) == {"tail.png", "bounds.png", "worst.png"}
     assert all(content.startswith(b"\x89PNG") and len(content) > 10_000 for content in drawn.values())

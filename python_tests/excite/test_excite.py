@@ -380,7 +380,7 @@ def test_command(run: Call, small_file: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(table[name], column)
     written = json.loads(found.read_text())
     assert written["format"] == "tendonfmu-excitation-1" and written["seed"] == 4 and "--seed 4" in written["command"]
-    assert "warning: joint tip: nothing is known: 0.5 rad either side" in done.err
+    assert "warning: joint tip: its range is unknown: 0.5 rad either side" in done.err
     assert "tendons[1].edge_friction[2]" in done.out and "numbers can be identified" in done.out
     assert f"{written['identifiable']} of {written['numbers']} numbers" in done.out
 
@@ -398,7 +398,7 @@ def test_command_with_varied_tensions(run: Call, small_file: Path, tmp_path: Pat
     written = json.loads(found.read_text())
     assert written["vary_tension"] == {"lowest": 5.0, "highest": 25.0, "every": 4.0}
     assert written["pretension"] is None and written["max_acceleration"] == 15.0
-    assert "tensions of 5 to 25 N, other ones every 4 s" in done.out
+    assert "tensions of 5 to 25 N, changed every 4 s" in done.out
     assert "a higher lowest tension of --vary-tension keeps it taut" in done.out or not any(written["slack"])
     assert "loads the tendons in turn" not in done.out
 

@@ -361,7 +361,7 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
         yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
-    yield f"estimated from {diagnosis.signals}"
+    yield f"numbers estimated from {diagnosis.signals}"
     yield f"next: {next_sentence(diagnosis)}"
 
 
