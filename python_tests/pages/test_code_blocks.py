@@ -66,6 +66,17 @@ LONG = (
     *(Page(f"guide/{name}") for name in ("calibrate", "fit", "diagnose", "change", "detect", "from_python")),
     *(Page(f"guide/{name}") for name in ("in_your_simulator", "fit_my_hand")),
     Page("guide/your_recording", before="guide/your_finger", outcome=("my_log.parquet",)),
+    Page(
+        "reference/commands/fit",
+        given={
+            "finger.json": FINGER,
+            "monday.parquet": TRAINING,
+            "tuesday.parquet": UNSEEN,
+            "wednesday.parquet": UNSEEN,
+        },
+        left_out="PKG_CONFIG_PATH",
+        outcome=("figures/report.html",),
+    ),
     Page("reference/python", outcome=("two_joints.fmu",)),
     Page("reference/commands/build", outcome=("two_joints.fmu",)),
     Page("reference/commands/convert", left_out="pick_and_place", outcome=("week_5/diagnosis.html",)),

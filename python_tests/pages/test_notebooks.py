@@ -1,8 +1,7 @@
-"""examples/notebooks: stored without outputs, and run; they show what their texts claim."""
+"""examples/notebooks: they run, and show what their texts claim."""
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -42,16 +41,6 @@ def run_notebook() -> Any:
     from run_notebooks import run_notebook
 
     return run_notebook
-
-
-@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_a_notebook_is_stored_without_outputs_and_uses_public_names(file: Path) -> None:
-    notebook = json.loads(file.read_text(encoding="utf-8"))
-    assert set(notebook["metadata"]) == {"kernelspec", "language_info"}
-    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
-    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
-    source = "".join("".join(cell["source"]) for cell in code)
-    assert "from tendonfmu" not in source and not re.search(r"\btf\.\w+\._|\btf\._", source)
 
 
 @pytest.mark.long

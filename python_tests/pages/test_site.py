@@ -9,9 +9,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 
 from optional_parts import require
 from repository_paths import ROOT
+from tendonfmu.cli.program import app
+from tendonfmu.diagnosis.effects.table import CANDIDATES
 
 sys.path.append(str(ROOT / "tools"))
 
@@ -65,3 +68,12 @@ def test_the_c_reference_has_every_declaration(header: Path) -> None:
     assert names and {name for name in names if name not in shown} == set()
     headings = re.findall(r"^#### `(\w+)`", text, re.MULTILINE)
     assert len(set(headings)) == len(headings)
+
+
+def test_every_option_and_every_effect_is_in_the_reference() -> None:
+    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "reference" / "commands").glob("*.md"))
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    options = {option for command in commands.values() for each in command.params for option in each.opts}
+    named = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", pages))
+    assert {option for option in options if option.startswith("-")} - named == set()
+    assert [each.name for each in CANDIDATES if f"| `{each.name}` | {each.title} |" not in pages] == []

@@ -1,4 +1,4 @@
-"""Numbers that pages show, and signals that their examples give, against what is computed another way."""
+"""What the examples of pages give: a rig's balance of torques, and layouts of viewers for what `run` writes."""
 
 from __future__ import annotations
 
@@ -7,49 +7,24 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 from mcap.reader import make_reader
-from test_code_blocks import BLOCK, DEMO, Page, follow, run
+from test_code_blocks import BLOCK, DEMO, Page, run
 
 from command import Call
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 from rig_cases import written
-from tendonfmu.excite.excitation import Plan, plan_excitation
-from tendonfmu.excite.training_motion import as_array, find_ranges, read_subject
 from tendonfmu.files.tables import read_table, write_table
-from tendonfmu.recordings.recording import read_recording
 from tendonfmu.simulate.rig import read_rig
 from tendonfmu.simulate.simulation import simulate
-from tendonfmu.statistics.quintic import evaluate
 
-INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 VIEWERS = ROOT / "docs" / "reference" / "viewers"
 SHOWN = ("joint_torque", "friction_torque", "compensated_torque", "joint_contact", "joint_angle", "joint_speed")
 
 
 def code_of(page: str, language: str) -> str:
     return next(code for found, code in BLOCK.findall(Page(page).text) if found == language)
-
-
-@pytest.mark.long
-def test_the_small_recording_gives_the_angles_it_was_made_of(tmp_path: Path) -> None:
-    follow(Page("guide/your_recording", before="guide/your_finger"), tmp_path)
-    time = read_recording(tmp_path / "two_joints.csv").time
-    found = read_table(tmp_path / "two_joints_out.csv", lambda *_: None)
-    assert np.allclose(found["joint_angle[1]"], 0.3 * np.sin(3 * time), atol=1e-12)
-    assert np.allclose(found["joint_angle[2]"], 0.2 * np.sin(2 * time), atol=1e-12)
-
-
-@pytest.mark.long
-def test_the_example_of_excite_interpolates_the_motion(tmp_path: Path) -> None:
-    run(["tendonfmu", "excite", str(INDEX), "--duration", "30", "-o", "motion.csv"], tmp_path)
-    printed = run([sys.executable, "-c", code_of("reference/commands/excite", "python")], tmp_path)
-    subject = read_subject(INDEX)
-    motion = plan_excitation(subject.finger.data, Plan(as_array(find_ranges(subject, [])), duration=30))
-    expected = [float(values[0]) for values in evaluate(motion.knots[0], np.array([12.3456]))[:2]]
-    np.testing.assert_allclose([float(word) for word in printed.split()], expected, atol=1e-10)
 
 
 @needs_plant
