@@ -1,27 +1,62 @@
-"""The documentation site: every page is in its menu, and the C reference has every declaration of the headers."""
+"""The documentation: code cites pages and sections that exist, links lead to files, the C reference is whole."""
 
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 
+from optional_parts import require
 from repository_paths import ROOT
+from tendonfmu.cli.program import app
+from tendonfmu.diagnosis.effects.table import CANDIDATES
 
-DOCS = ROOT / "docs"
 sys.path.append(str(ROOT / "tools"))
 
-from c_reference import header_markdown  # noqa: E402
+from c_reference import header_markdown
 
 HEADERS = sorted((ROOT / "runtime" / "include").glob("*.h"))
+SOURCES = re.compile(r"^(runtime|fmu_src|python)/.*\.(c|h|cpp|hpp|py|json)$")
+CITED = re.compile(r"(docs/[\w/]+\.md)(?:#([\w-]+))?")
 
 
-def test_every_page_is_in_the_menu() -> None:
-    menu = set(re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8")))
-    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
-    assert menu == pages | {f"notebooks/{path.stem}.md" for path in (ROOT / "examples/notebooks").glob("*.ipynb")}
+@cache
+def tracked() -> list[str]:
+    require("git")
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+
+
+@cache
+def anchors(page: str) -> set[str]:
+    """Of the headings, as GitHub and MkDocs make them."""
+    text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_page_and_section_that_code_cites_is_there() -> None:
+    cited = {match for name in tracked() if SOURCES.match(name) for match in CITED.findall((ROOT / name).read_text())}
+    assert len(cited) > 20
+    missing = [
+        page for page, anchor in cited if not (ROOT / page).is_file() or (anchor and anchor not in anchors(page))
+    ]
+    assert missing == []
+
+
+def test_links_lead_to_files_that_git_knows() -> None:
+    known = {Path(name) for name in tracked()}
+    known |= {parent for name in known for parent in name.parents}
+    for page in (ROOT / name for name in tracked() if re.match(r"(README|docs/.*|examples/.*)\.md$", name)):
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                path = (page.parent / target).resolve().relative_to(ROOT)
+                assert path in known, f"{page.relative_to(ROOT)}: {target}"
 
 
 @pytest.mark.parametrize("header", HEADERS, ids=lambda header: header.stem)
@@ -30,17 +65,15 @@ def test_the_c_reference_has_every_declaration(header: Path) -> None:
     names = set(re.findall(r"\b(tendonfmu_\w+)\(", code)) | set(re.findall(r"^} (\w+);", code, re.MULTILINE))
     text = header_markdown(header)
     shown = "".join(re.findall(r"```c\n(.*?)```", text, re.DOTALL))
-    assert names
-    assert {name for name in names if name not in shown} == set()
+    assert names and {name for name in names if name not in shown} == set()
     headings = re.findall(r"^#### `(\w+)`", text, re.MULTILINE)
     assert len(set(headings)) == len(headings)
 
 
-def test_the_page_has_every_call_of_the_cpp_interface() -> None:
-    header = (ROOT / "runtime" / "include" / "tendonfmu.hpp").read_text(encoding="utf-8")
-    page = (DOCS / "reference" / "c.md").read_text(encoding="utf-8")
-    public = header[header.index("class finger {") :].split(" private:")[0]
-    calls = set(re.findall(r"^  (?! )(?:static |const )*[\w:<>]+[ *]+(\w+)\(", public, re.MULTILINE)) - {"finger"}
-    assert {"step", "get_outputs", "last_error", "handle", "place"} <= calls
-    assert {name for name in calls if not re.search(rf"`(finger::)?{name}\(", page)} == set()
-    assert all(f"`{path.name}`" in page for path in (ROOT / "runtime" / "include").glob("*.hpp"))
+def test_every_option_and_every_effect_is_in_the_reference() -> None:
+    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "reference" / "commands").glob("*.md"))
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    options = {option for command in commands.values() for each in command.params for option in each.opts}
+    named = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", pages))
+    assert {option for option in options if option.startswith("-")} - named == set()
+    assert [each.name for each in CANDIDATES if f"| `{each.name}` | {each.title} |" not in pages] == []

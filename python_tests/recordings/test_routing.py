@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from command import Call
+from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.files import write_table

@@ -1,4 +1,4 @@
-"""The agreement rule of docs/reference/semantics.md#agreement.
+"""The agreement rule of docs/reference/semantics/README.md#agreement.
 
 Two implementations agree when, sample by sample and for every output, the difference is at most
 1e-9 * (largest value of that output's series) + 1e-12; for `compensated_torque[j]` the largest value is
@@ -26,7 +26,7 @@ REAL_OUTPUTS = (
     "joint_angle",
     "joint_speed",
 )
-# of docs/reference/semantics.md#outputs; the FMU gives the first alone, so what a candidate has of them is compared
+# of docs/reference/semantics/outputs.md; the FMU gives the first alone, so what a candidate has of them is compared
 DETECTION_OUTPUTS = (
     "compensated_torque_std",
     "residual",

@@ -1,4 +1,4 @@
-"""Named cases of `extensions` (docs/reference/semantics.md#extensions) with results known by hand.
+"""Named cases of `extensions` (docs/reference/semantics/effects.md) with results known by hand.
 
 Friction laws are dry (F = ±0.1 at any speed) where a case is not about the law, and lengths, times and speeds are
 chosen so that exponentials are powers of 1/2.

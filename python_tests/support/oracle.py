@@ -1,4 +1,4 @@
-"""Naive numpy implementation of docs/reference/semantics.md, used by tests alone.
+"""Naive numpy implementation of docs/reference/semantics/README.md, used by tests alone.
 
 Written from that text and the paper, sharing no code with the runtime. It favours reading over
 speed: one plain loop over samples, and one small object per friction effect.

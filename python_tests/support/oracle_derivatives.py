@@ -1,4 +1,4 @@
-"""Derivatives of the oracle's outputs by the inputs (docs/reference/semantics.md#directional-derivatives).
+"""Derivatives of the oracle's outputs by the inputs (docs/reference/semantics/outputs.md#directional-derivatives).
 
 All that is remembered is held and every branch decision is frozen, so a central difference of one step from
 a copied state is the derivative; one Richardson extrapolation removes its error of second order.

@@ -1,4 +1,4 @@
-"""The oracle's detector: docs/reference/semantics.md#friction-bounds, #contact-detector, #bias-tracker, #outputs.
+"""The oracle's detector: detection.md, bias.md and outputs.md of docs/reference/semantics.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
 """

@@ -1,4 +1,4 @@
-"""The oracle's `extensions`: effects beyond the paper, from the text of docs/reference/semantics.md#extensions alone.
+"""The oracle's `extensions`: effects beyond the paper, from the text of docs/reference/semantics/effects.md alone.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints and tendons are
 counted from 0. An object of this file remembers what the text says an effect remembers; copying it copies that.

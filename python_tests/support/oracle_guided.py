@@ -1,4 +1,4 @@
-"""The oracle's run in which the caller says what the bias learns from: docs/reference/semantics.md#guided-runs.
+"""The oracle's run in which the caller says what the bias learns from: docs/reference/semantics/bias.md#guided-runs.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
 """

@@ -1,4 +1,4 @@
-"""The oracle's `position_filter`, from docs/reference/semantics.md#position-filter alone (see oracle.py)."""
+"""The oracle's `position_filter`, from docs/reference/semantics/position_filter.md alone (see oracle.py)."""
 
 from __future__ import annotations
 

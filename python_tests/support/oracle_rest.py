@@ -1,4 +1,4 @@
-"""The oracle's contact at rest: step 5a, docs/reference/semantics.md#contact-at-rest.
+"""The oracle's contact at rest: step 5a, docs/reference/semantics/rest.md.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Joints are counted from 0.
 """

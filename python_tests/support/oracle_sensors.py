@@ -1,4 +1,4 @@
-"""The oracle's watch over the sensors: step 0, docs/reference/semantics.md#sensor-faults.
+"""The oracle's watch over the sensors: step 0, docs/reference/semantics/sensors.md.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime. Tendons and joints are
 counted from 0.

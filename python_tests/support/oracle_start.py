@@ -1,4 +1,4 @@
-"""The oracle's friction as it stood before the first sample: docs/reference/semantics.md#unlearned-start.
+"""The oracle's friction as it stood before the first sample: docs/reference/semantics/bias.md#unlearned-start.
 
 Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with the runtime.
 """

@@ -1,6 +1,6 @@
 """Seeded random `extensions` of any finger: every effect, every kind of place, several of a kind, some at their least.
 
-Sizes are chosen so that each term matters in the outputs; rows are valid by docs/reference/semantics.md#extensions.
+Sizes are chosen so that each term matters in the outputs; rows are valid by docs/reference/semantics/effects.md.
 """
 
 from __future__ import annotations

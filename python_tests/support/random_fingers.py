@@ -1,4 +1,4 @@
-"""Seeded random fingers and recordings that take every branch of docs/reference/semantics.md.
+"""Seeded random fingers and recordings that take every branch of docs/reference/semantics/README.md.
 
 The recordings are not a simulation: motions and forces are chosen so that the rules are exercised
 (jumps, slow reversals, rests held to the last bit, pushes, slack), and they share no code with any law.
@@ -374,7 +374,7 @@ def random_detection(seed: int, finger: Description) -> Description:
 
 
 def random_extended(seed: int, finger: Description) -> Description:
-    """The finger with any of docs/reference/semantics.md#extensions, a few of them with axes of the joints."""
+    """The finger with any of docs/reference/semantics/effects.md, a few of them with axes of the joints."""
     rng = np.random.default_rng([seed, 7])
     joints, tendons = len(finger["joints"]), len(finger["tendons"])
     thresholds = all(finger.get("velocity_threshold", {}).get(key) != 0.0 for key in ("tendon", "joint"))

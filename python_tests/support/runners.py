@@ -2,7 +2,7 @@
 
 A runner is called as `runner(description, recording, kinematics_source)`: description is the parsed JSON,
 recording a dict of arrays (`time` [N], `tendon_force` [N, m], ...; absent inputs left out), the result a dict
-of all outputs of docs/reference/semantics.md#outputs ([N, n], [N, m]; `contact` [N]).
+of all outputs of docs/reference/semantics/outputs.md#outputs ([N, n], [N, m]; `contact` [N]).
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 /* Where a finger is touched, as far as the torques show it: the force at the tip and the least link that explains them
- * (docs/reference/semantics.md#link-geometry). */
+ * (docs/reference/semantics/contact_place.md#link-geometry). */
 #pragma once
 
 #include "finger_memory.h"

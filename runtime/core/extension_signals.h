@@ -1,5 +1,5 @@
 /* What the effects beyond the paper do to the signals of a sample, and the derivatives of all that follows by their
- * numbers (docs/reference/semantics.md#signals-of-extensions). */
+ * numbers (docs/reference/semantics/effects.md#signals-of-extensions). */
 #pragma once
 
 #include "extensions.h"

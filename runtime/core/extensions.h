@@ -1,5 +1,5 @@
 /* The effects beyond the paper that a finger carries: what they remember, what they do to signals, friction and torques
- * of a sample (docs/reference/semantics.md#extensions). */
+ * of a sample (docs/reference/semantics/effects.md). */
 #pragma once
 
 #include "finger_memory.h"

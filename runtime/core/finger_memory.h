@@ -22,7 +22,7 @@ enum { ERROR_BYTES = 400 };
 /* Beyond this, in magnitude, no input is a measurement; below it no product in a step overflows for sane parameters. */
 #define LARGEST_INPUT  1e12
 #define LARGEST_TIME   1e15 /* s */
-#define CLOCK_ROUNDING 0.01 /* of a step: times so near are equal (docs/reference/semantics.md#clocks) */
+#define CLOCK_ROUNDING 0.01 /* of a step: times so near are equal (docs/reference/semantics/README.md#clocks) */
 
 /* Numbers of the description that are neither per joint nor per tendon. */
 typedef struct finger_settings {

@@ -1,4 +1,4 @@
-/* Runs in which the caller says what the bias learns from (docs/reference/semantics.md#guided-runs). */
+/* Runs in which the caller says what the bias learns from (docs/reference/semantics/bias.md#guided-runs). */
 #include "floating_point.h"
 
 #include "finger_memory.h"

@@ -1,5 +1,5 @@
 /* Where the links of a finger are: a chain of joints that turn about axes
- * (docs/reference/semantics.md#link-geometry). */
+ * (docs/reference/semantics/contact_place.md#link-geometry). */
 #pragma once
 
 #include <stddef.h>
@@ -13,7 +13,7 @@ typedef struct link_geometry {
 /* Scales a vector that is not zero to length 1, however long or short it is. */
 void make_unit(double vector[3]);
 
-/* The levers of a force at the tip, J of docs/reference/semantics.md#force-at-the-fingertip:
+/* The levers of a force at the tip, J of docs/reference/semantics/contact_place.md#force-at-the-fingertip:
  * a force F turns joint j with lever_j · F.
  *   angle   [joints] rad
  *   lever   [joints × 3] m, base frame */

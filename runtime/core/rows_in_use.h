@@ -1,5 +1,5 @@
 /* The rows of R whose tendons give the joint angles: all but those of failing sensors
- * (docs/reference/semantics.md#sensor-faults). */
+ * (docs/reference/semantics/sensors.md). */
 #pragma once
 
 #include "finger_memory.h"

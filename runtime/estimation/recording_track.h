@@ -96,7 +96,7 @@ class recording_track {
   int source_;
 };
 
-/* What the bias filter (docs/reference/semantics.md#bias-tracker) does at every sample; the same for all joints
+/* What the bias filter (docs/reference/semantics/bias.md#bias-tracker) does at every sample; the same for all joints
  * and all parameters. */
 struct bias_gains {
   /* stride: only every stride-th sample is looked at, for `stride` of them */

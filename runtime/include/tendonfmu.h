@@ -17,7 +17,7 @@
  *              says why in one line in tendonfmu_last_error().
  *   Host       Floating-point mode, locale, signals and working directory are neither changed nor relied on.
  *
- * The equations are those of the paper; the rules of a sample are docs/reference/semantics.md. */
+ * The equations are those of the paper; the rules of a sample are docs/reference/semantics/README.md. */
 #ifndef TENDONFMU_H
 #define TENDONFMU_H
 

@@ -1,5 +1,7 @@
 """Writes every file that follows from the tables of facts in runtime/description: keys, effects and outputs.
 
+The page of a rig follows from its JSON Schema.
+
     python tools/tables/generate.py          writes the files that differ, and names them
     python tools/tables/generate.py --check  writes nothing; exit code 1 where a file differs
 
@@ -18,6 +20,7 @@ from typing import Any
 from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, read_facts, symbol
 from finger_schema import documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
+from rig_keys import rig_sections
 
 COMMAND = "python tools/tables/generate.py"
 NOTICE = f"Generated from the tables in runtime/description by `{COMMAND}`: do not edit."
@@ -34,6 +37,7 @@ TEMPLATES = {
     "output_names.py.jinja": "python/tendonfmu/model/output_names.py",
     "description_keys.md.jinja": "docs/reference/description_keys.md",
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",
+    "rig.md.jinja": "docs/reference/rig.md",
 }
 
 
@@ -217,6 +221,7 @@ def environment(facts: Facts) -> Environment:
         "documented": documented,
         "units_of": units_of,
         "tables": pages(facts),
+        "rig_sections": rig_sections(),
     }
     return made
 

@@ -146,7 +146,7 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     yield (
         mnm(least),
         "mN·m",
-        f"smallest sudden change of torque that is reported, half of the time, at {joint}, the worst",
+        f"sudden change of torque that is reported in 1 of 2 cases, at {joint}, the least sensitive joint",
     )
     pushes = report["pushes"]
     if pushes is not None and pushes["events"]:
@@ -181,12 +181,12 @@ def error_caption(report: Report) -> str:
     data = "a fifth of the recordings" if error["held_out"] else "the test recordings"
     return (
         f"Error: rms of compensated_torque, what {FMU} feels although nothing touches the finger. Before is "
-        f"{MODELS[_first(report)]}. Both run over {data}, {_long(error['minutes'])} that chose no number, no structure "
-        "and no threshold."
+        f"{MODELS[_first(report)]}. Both run over {data} ({_long(error['minutes'])}), which were not used to choose "
+        "numbers, structure or thresholds."
     )
 
 
-TORQUE_HEADINGS = ("sudden, half of the time", "sudden, 9 of 10 times", "over seconds")
+TORQUE_HEADINGS = ("sudden, in 1 of 2 cases", "sudden, in 9 of 10 cases", "over seconds")
 
 
 def torque_rows(report: Report) -> list[Row]:
@@ -296,7 +296,7 @@ def tables(report: Report) -> Iterator[Table]:
     if report["structure"]["causes"]:
         yield (
             "built into the model",
-            ("cause", "place", "size", "less error, without the bias"),
+            ("cause", "place", "size", "gain on unseen data"),
             cause_rows(report),
         )
     yield (

@@ -1,7 +1,7 @@
 """Bounds of contact detection that free motion stays within: their shape by tails, their level by a number of alarms.
 
-A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics.md#contact-detector). Among
-the bounds with at most the allowed alarms, the best is the one that the lightest push exceeds (`least_load`).
+A bound of joint j is base_j + per_force_j·f + c_H·H_j + c_J·J_j (docs/reference/semantics/detection.md). Among the
+bounds with at most the allowed alarms, the best is the one that the lightest push exceeds (`least_load`).
 
 The shape of a bound is chosen on all cells, and on each half of them to be counted on the other half. A bound looks
 better than it is on the data that it was chosen on.
@@ -33,7 +33,7 @@ _NEAR = 0.4  # of a bound: cells below it cannot exceed a refined bound
 _FEW_ROUNDS, _ROUNDS = 2, 4  # rounds over all joints, the second time near the bound found by the first
 SECOND_SHARE = 4  # the residual, as second signal, gets one in so many of the allowed alarms
 _SCALES = np.geomspace(0.15, 3.0, 48)  # scales of a bound at which evidence is computed
-_FASTEST = 10.0  # growth of g: docs/reference/semantics.md#contact-detector
+_FASTEST = 10.0  # growth of g: docs/reference/semantics/detection.md#contact-detector
 
 
 @dataclass(frozen=True)
@@ -320,7 +320,7 @@ def _sample_steps(cells: Cells, parts: Sequence[FreePart]) -> tuple[Numbers, Num
 
 
 def _evidence(search: Search, bound: Bound, step: Numbers, force: Numbers, start: Index) -> Signal:
-    """Compute [c] the largest g of each cell over all joints (s; docs/reference/semantics.md#contact-detector)."""
+    """Compute [c] the largest g of each cell over all joints (s; docs/reference/semantics/detection.md)."""
     largest = np.zeros(len(search.cells.order))
     for j in range(len(search.signal)):
         whole = bound.base[j] + bound.per_force[j] * force

@@ -1,4 +1,4 @@
-"""The rule for contact at rest, learned from the rests in free motion (docs/reference/semantics.md#contact-at-rest).
+"""The rule for contact at rest, learned from the rests in free motion (docs/reference/semantics/rest.md).
 
 The positions show how far a standing motor moves. The runtime decides what a rest is, and shows how much the torques
 change at rest. Bounds are fitted to some of the rests, and scaled until the other rests keep the rate.

@@ -1,4 +1,4 @@
-"""The residual of a finger over a recording, and the bound that it exceeds in contact (semantics.md, step 5)."""
+"""The residual of a finger over a recording, and the bound that it exceeds in contact (semantics/detection.md)."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ class Deviation:
 
 
 def deviation(runs: Sequence[FreeRun], cells: Cells, bound: Bound) -> Deviation:
-    """Choose the deviation for which r²/std² is 1 on average (docs/reference/semantics.md#outputs)."""
+    """Choose the deviation for which r²/std² is 1 on average (docs/reference/semantics/outputs.md#outputs)."""
     left = cells.mean(rows_of([run.residual for run in runs], cells) ** 2)
     other = cells.mean(rows_of([run.known for run in runs], cells) ** 2)
     for share, name in ((bound.stuck_share, "stuck"), (bound.jump_share, "jump")):

@@ -1,4 +1,4 @@
-"""The rule for failing sensors, learned from free motion (docs/reference/semantics.md#sensor-faults).
+"""The rule for failing sensors, learned from free motion (docs/reference/semantics/sensors.md).
 
 The resolutions are those of the sensors. The margin is twice the largest difference between a force and its spring in
 free motion, due to noise, sampling and springs that differ from their description. The finger as it runs must find no

@@ -33,7 +33,7 @@ from tendonfmu.statistics import BlockSums, SampleBlocks
 Single = NDArray[np.float32]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
 
-_LARGEST = 1e9  # largest non-linear number in any unit: docs/reference/semantics.md#extensions
+_LARGEST = 1e9  # largest non-linear number in any unit: docs/reference/semantics/effects.md
 _MOST_MEMORY = 8.0  # GB, for all columns
 Stretch = tuple[int, Numbers, Numbers]  # first sample; derivatives of T and of the jumps there, [K, n, u]
 Direction = Mapping[str, float]  # path -> share; the description may be coarser than the merged one

@@ -1,7 +1,7 @@
 """How uncertain the modelled friction torque is after a fit, in the form of `contact.uncertainty`.
 
 The form has at most four directions per joint, each a relative error of every part of the joint's friction (tendons,
-joint friction, joint load friction, cover; docs/reference/semantics.md#uncertainty).
+joint friction, joint load friction, cover; docs/reference/semantics/detection.md#uncertainty).
 
 With g the derivative of T_j by the unknowns and C their covariance, T_j has the variance gᵀ C g. C is that of the fit,
 with the information of the data reduced by the factor by which the residuals vary more than white noise

@@ -30,7 +30,7 @@ FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NOTE = "documentation/fmi-ls-ref.txt"
 VERSION = "1.0.0-beta.1"  # of fmi-ls-ref
 
-# The agreement that the semantics ask of two implementations (docs/reference/semantics.md).
+# The agreement that the semantics ask of two implementations (docs/reference/semantics/README.md).
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
 UNEVEN = 1e-6  # share of a step by which a sample may be off the grid before it is interpolated
 GAP = 1.5  # median steps; in a longer step samples were lost

@@ -160,7 +160,7 @@ def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -
     seen = _of_tendon(finger, learned)
     write = "tendonfmu calibrate learns them"
     if not learned.differs:
-        write = "nothing; the angle that the FMU computes and the friction at that joint are off by part of this"
+        write = "nothing into the map; angle and friction that the FMU computes there have part of this error"
     return Finding(
         severity,
         "routing",
@@ -169,7 +169,7 @@ def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -
         seen,
         "numbers of the description that nobody measured, or that have changed"
         if learned.differs
-        else "a pulley that is not round",
+        else "a pulley that is out of round, or a tendon that lifts off it",
         write,
     )
 
@@ -213,7 +213,7 @@ def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str,
         shown = "the stiffness of every tendon" + ", and arms and zeros of one against the other" * (finger.joints == 1)
         sentences.append(f"routing: without joint positions, redundant tendons show {shown}; the others stay")
     elif unknown := [path for each in learned for path in each.unknown]:
-        sentences.append(f"routing: the motion does not tell {', '.join(unknown)}; the described values stay")
+        sentences.append(f"routing: this motion does not determine {', '.join(unknown)}; the described values stay")
     numbers = [
         {
             "path": number.path,

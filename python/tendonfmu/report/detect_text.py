@@ -127,9 +127,9 @@ def _bounds(tuning: ContactTuning) -> Table:
     headings += ["deviation\nmN·m", "+ per N\nmN·m/N"]
     columns += [tuning.deviation_.base, tuning.deviation_.per_force]
     main = list(tuning.bounds_.values())[-1]
-    also = f" + {main.stuck_share:g} of what sticks + {main.jump_share:g} of what jumped" if main.stuck_share else ""
+    also = f" + {main.stuck_share:g} stuck friction + {main.jump_share:g} friction jump" if main.stuck_share else ""
     if main.jump_share and not main.stuck_share:
-        also = f" + {main.jump_share:g} of what jumped"
+        also = f" + {main.jump_share:g} friction jump"
     rows = [
         (joint, *(f"{1e3 * column[j]:.3g}" for column in columns))
         for j, joint in enumerate(tuning.description_.joint_names)
@@ -159,7 +159,7 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
     percent = 100 * tuning.confidence
     held, limit = tuning.held_out_
     yield (
-        f"as it runs: {counted(alarms, 'false alarm')} in {60 * tuning.hours_:.1f} min, at most "
+        f"run with detection on: {counted(alarms, 'false alarm')} in {60 * tuning.hours_:.1f} min, at most "
         f"{rate_limit(alarms, tuning.hours_, tuning.confidence):.3g} per hour ({percent:g} %)"
     )
     if alarms:
@@ -167,7 +167,7 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
         share = sum(loop.alarm_seconds for loop in tuning.loop_) / sum(loop.seconds for loop in tuning.loop_)
         yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
     yield (
-        f"held out: {held} in blocks that the bounds were not chosen on, at most {limit:.3g} per hour; "
+        f"held out: {held} in blocks that did not choose the bounds, at most {limit:.3g} per hour; "
         f"{tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g}"
     )
     low, high = tuning.forces_
@@ -187,4 +187,4 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
         )
     levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
     if levels.max() > 1:
-        yield f"held-out halves need bounds {levels.max():.2f} times those that the data themselves need"
+        yield f"on held-out halves bounds have to be {levels.max():.2f} times as large as on the halves that chose them"

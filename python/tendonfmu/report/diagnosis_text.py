@@ -149,7 +149,7 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     left, (_, unit) = left_of(diagnosis), unit_of(diagnosis)
     if left is None:
         return ""
-    noise = f"although it is correlated over {left.memory}" if left.memory else "so it is noise to these sensors"
+    noise = f"although it is correlated over {left.memory}" if left.memory else "so for these sensors it is noise"
     if left.predictable <= 0.0:
         return f"{left.text(left.whole)} {unit} remain. No recorded signal predicts any of it, {noise}."
     little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else "; it is too small to matter"
@@ -269,14 +269,14 @@ def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
     words = words_of(diagnosis.kind)
     if cause.where.effect == CONTACT:
         return (
-            "less error about the level of the new recordings than about that of the reference"
+            "error removed by using the level of the new recordings instead of the level of the reference"
             if cause.changed
-            else "less error on the training recordings without these stretches"
+            else "error removed on the training recordings by leaving out these stretches"
         )
     if cause.where.effect == UNKNOWN:
-        return "less error if the predictable part were known"
+        return "error that would be removed if the predictable part were known"
     if cause.gain_unit == "m":
-        return "less error of the tendons' positions, all tendons together, on unseen data"
+        return "error of the tendon positions that the cause removes on unseen data, all tendons together"
     return words.own_gain + (f", with the other {words.one}s in the model" if len(diagnosis.torque_causes) > 1 else "")
 
 
@@ -356,12 +356,12 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
         small = dict.fromkeys(at_place(each.title, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
     for cause in diagnosis.uncertain:
-        less = f"less error {percent_interval(cause.gain)}"
-        yield f"uncertain: {at_place(cause.title, cause.where, names)}, {less}; to settle it: {cause.experiment}"
+        less = f"gain {percent_interval(cause.gain)}"
+        yield f"uncertain: {at_place(cause.title, cause.where, names)}, {less}; to decide: {cause.experiment}"
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
         yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
-    yield f"estimated from {diagnosis.signals}"
+    yield f"numbers estimated from {diagnosis.signals}"
     yield f"next: {next_sentence(diagnosis)}"
 
 

@@ -65,9 +65,9 @@ MODEL = Words(
     },
     error="",
     no_name="follows the recorded signals in a way that no known effect explains",
-    left="remains: follows the signals, not explained",
+    left="remains: predictable from the signals, not explained",
     small="These effects are in the recordings, but on test data each lowers the error by less than {least}, or, if "
-    "friction builds up over a way, by no more than a friction law of another form would. They are not in the model.",
+    "friction builds up gradually, by no more than another friction law would. They are not in the model.",
     uncertain="These effects are in the recordings, but test data do not show whether they matter: their gain may be "
     "0. They are not in the extended model.",
     source="Where the error comes from",
@@ -81,7 +81,7 @@ MODEL = Words(
     "flexible regression without physics measures it.",
     views="The residual at each joint, of the refitted given model{and_extended}.",
     hidden="Nothing: these recordings show every effect that was tested, and no cause can be mistaken for another.",
-    own_gain="less error (means of 10 ms, without the slow bias)",
+    own_gain="error that the cause removes on unseen data (means of 10 ms, slow bias excluded)",
     taken="removed by a cause",
     refitted="given model, refitted",
 )
@@ -89,9 +89,9 @@ MODEL = Words(
 CHANGE = Words(
     one="change",
     nominal="model of the reference",
-    extended="model of now",
-    nominal_column="reference's",
-    extended_column="of now",
+    extended="changed model",
+    nominal_column="reference",
+    extended_column="changed",
     headlines={
         "adequate": (
             "Nothing has changed: the model of the reference holds for the new recordings.",
@@ -118,10 +118,10 @@ CHANGE = Words(
     no_name="the model gets wrong in the reference as well",
     left="remains: wrong in the reference as well",
     small="These changes are in the new recordings, but on test data each lowers the error by less than {least}. They "
-    "are not in the model of now.",
+    "are not in the changed model.",
     uncertain="These changes are in the new recordings, but test data do not show whether they matter: their gain may "
-    "be 0. They are not in the model of now.",
-    source="What the change is worth",
+    "be 0. They are not in the changed model.",
+    source="How much of the error the change explains",
     cause="What has changed",
     causes="What has changed, in order of gain",
     method="The model was fitted to the reference. Errors that the reference and the new recordings share are not "
@@ -134,7 +134,7 @@ CHANGE = Words(
     "share, in means of 10 ms.",
     views="The residual of the new recordings at each joint, of the model of the reference{and_extended}.",
     hidden="Nothing: these recordings show every change that was tested, and none can be mistaken for another.",
-    own_gain="less of the error that only the new recordings have",
+    own_gain="share that the change removes of the error that only the new recordings have",
     taken="removed by a change",
     refitted="model of the reference",
 )

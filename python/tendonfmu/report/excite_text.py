@@ -50,7 +50,7 @@ def _load(result: ExciteResult) -> str:
     plan = result.plan
     if plan.vary is None:
         return f"pretension {', '.join(f'{level:g}' for level in plan.pretensions)} N"
-    return f"tensions of {plan.vary.lowest:g} to {plan.vary.highest:g} N, other ones every {plan.vary.every:g} s"
+    return f"tensions of {plan.vary.lowest:g} to {plan.vary.highest:g} N, changed every {plan.vary.every:g} s"
 
 
 def _effect_row(cover: EffectCoverage, verdicts: list[Verdict]) -> Row:
@@ -96,7 +96,7 @@ def lines(result: ExciteResult) -> Iterator[str]:
         f"{counted(judgement.directions, 'independent combination')} of them; each joint's bias is tracked as well"
     )
     for cause, count in identifiability.causes(verdicts).items():
-        yield f"  {count} not: {identifiability.CAUSES[cause]}"
+        yield f"  {count} not identified: {identifiability.CAUSES[cause]}"
     tendons, joints = len(result.subject.finger.tendon_names), len(result.ranges)
     if result.plan.vary is None and "combination" in identifiability.causes(verdicts) and tendons > joints + 1:
         yield "  --vary-tension LOW:HIGH loads the tendons in turn and identifies more of those combinations"

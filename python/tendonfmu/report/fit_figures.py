@@ -44,8 +44,8 @@ _TORQUE_KEYS = (
     ("bias", "the bias's part of it"),
 )
 _RESIDUAL_CAPTION = (
-    "Residual before the bias has seen the sample: measured minus modelled torque. A median away from 0 over the angle "
-    "or the velocity is friction that the model lacks; a wide band is noise or stick-slip."
+    "Residual before the bias learns from the sample: measured minus modelled torque. A median away from 0 over the "
+    "angle or the velocity is friction that the model lacks; a wide band is noise or stick-slip."
 )
 _RESIDUAL_KEYS = (("median", "median"), ("spread", "10 to 90 % of the samples"), ("held_out", "held out of training"))
 
@@ -73,7 +73,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
     """Show the torque over time, ten seconds of each set of data."""
     first = BEGIN
     explanation = (
-        " The residual is taken before the bias has seen the sample. Its share is that of the rms in the time shown."
+        " The residual is taken before the bias learns from the sample. Its share is that of the rms in the time shown."
     )
     if any(recording.get("external_torque") for recording in picture.report["recordings"]):
         explanation += " A measured external torque is subtracted from the torque shown."

@@ -256,7 +256,7 @@ def _residuals(report: Report, joints: Sequence[str]) -> Table:
             share = f"{100 * left / torque:.0f} %" if left is not None and torque else "-"
             rows.append((label if j == 0 else "", joint, *(_milli(data[name][j]) for name in names), share))
     headings = ("", "joint", "torque", "bias only", "model only", "before", "fitted", "left")
-    return f"{report['finger']}: residual before the bias learns from it, rms in mN·m", headings, rows
+    return f"{report['finger']}: residual before the bias learns from the sample, rms in mN·m", headings, rows
 
 
 def _milli(value: float | None) -> str:
@@ -320,6 +320,6 @@ def _uncertainty(uncertainty: Report) -> str:
     times = ", ".join(f"{value:.3g}" for value in uncertainty["inflation"])
     left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
     return (
-        f"uncertainty of the modelled friction torque: {size} mN·m rms, the residuals counting as {times} times the "
+        f"uncertainty of the modelled friction torque: {size} mN·m rms, residuals {times} times the "
         f"noise settings; contact.uncertainty reproduces it within {left} % rms"
     )

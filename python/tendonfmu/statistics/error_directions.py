@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from tendonfmu.arrays import Numbers
 
-MOST = 4  # directions; docs/reference/semantics.md#uncertainty
+MOST = 4  # directions; docs/reference/semantics/detection.md#uncertainty
 _UNSEEN = 1e-12  # of the largest second moment; the motion does not show combinations of parts with less
 _NOTHING = 1e-12  # of the variance; directions with less are left out
 _ROUNDS = 40  # of the least squares

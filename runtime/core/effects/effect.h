@@ -1,5 +1,5 @@
 /* A term beyond the paper: one file each, one row each in effect_table.c
- * (docs/reference/semantics.md#extensions has the text they follow).
+ * (docs/reference/semantics/effects.md has the text they follow).
  *
  * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
  * places, or as a torque. It says what it remembers and which numbers it has; the finger does the rest.

@@ -1,5 +1,5 @@
 /* Contact while the motors stand: a joint torque that has changed since they came to rest by more than noise and creep
- * make of it (docs/reference/semantics.md#contact-at-rest). */
+ * make of it (docs/reference/semantics/rest.md). */
 #pragma once
 
 #include "friction_bound.h"

@@ -1,5 +1,5 @@
 /* Contact: a joint whose residual exceeds its threshold (paper VI), or whose innovation exceeds what noise and friction
- * can make of it (docs/reference/semantics.md#contact-detector). */
+ * can make of it (docs/reference/semantics/detection.md#contact-detector). */
 #pragma once
 
 #include "contact_at_rest.h"

@@ -1,5 +1,5 @@
 /* Contact that rises slowly: what the modelled friction leaves drifts away from where it was
- * (docs/reference/semantics.md#contact-detector). */
+ * (docs/reference/semantics/detection.md#contact-detector). */
 #pragma once
 
 #include "bias_tracker.h"

@@ -1,5 +1,5 @@
 /* How far the friction may be from what is modelled: what stiction can hold, and what the errors of the parameters make
- * (docs/reference/semantics.md#friction-bounds). */
+ * (docs/reference/semantics/detection.md#friction-bounds). */
 #pragma once
 
 #include "force_propagation.h"

@@ -1,6 +1,6 @@
 /* Joint angles with known noise: a Kalman filter over angle, velocity and acceleration of each joint, driven by white
  * jerk, and a gate that holds the angle while the velocity cannot be distinguished from 0
- * (docs/reference/semantics.md#position-filter). */
+ * (docs/reference/semantics/position_filter.md). */
 #pragma once
 
 #include "kinematics.h"

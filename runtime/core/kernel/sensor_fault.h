@@ -1,5 +1,5 @@
 /* Sensors that fail: a tendon force or position that contradicts the spring between them, as the other tendons (or the
- * measured angles) have it (docs/reference/semantics.md#sensor-faults). */
+ * measured angles) have it (docs/reference/semantics/sensors.md). */
 #pragma once
 
 #include "kinematics.h"

@@ -294,7 +294,7 @@ COLD_STATIC void track_guided(tendonfmu_finger* f, double step, double mean_forc
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
 }
 
-/* steps 4 to 6 (docs/reference/semantics.md#order-of-the-steps) for every later sample */
+/* steps 4 to 6 (docs/reference/semantics/README.md#order-of-the-steps) for every later sample */
 HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
   const finger_state* s = &f->remembered;
   const finger_settings* settings = &f->derived.settings;

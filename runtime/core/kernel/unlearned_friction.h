@@ -1,5 +1,5 @@
 /* What the bias has not learned yet: how friction stood before the first sample shows in the residual as motion turns
- * it over (docs/reference/semantics.md#unlearned-start). */
+ * it over (docs/reference/semantics/bias.md#unlearned-start). */
 #pragma once
 
 #include "bias_tracker.h"

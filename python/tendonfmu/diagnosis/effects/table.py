@@ -28,7 +28,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="stribeck",
-        title="friction is different when slow",
+        title="friction differs at low speed",
         explanation=(
             "Friction falls as motion gets faster, before it stays level: the lubricant film builds up, and slow "
             "motion is jerky. Or it rises from standstill, as in rolling screws. Look at slow motion for stick "
@@ -116,7 +116,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="preload_friction",
-        title="a tendon rubs however little it pulls",
+        title="friction of a tendon that does not depend on its force",
         explanation=(
             "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. "
             "Look at whether friction remains without pretension."
@@ -190,8 +190,8 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="inertia",
         title="the link's inertia",
         explanation=(
-            "A torque in proportion to the joint's acceleration: the link's mass, or a motor's that is geared to "
-            "it. It is negative if too much inertia was subtracted with a known load."
+            "A torque in proportion to the joint's acceleration: the link's mass, or that of a motor behind a "
+            "gear. It is negative if too much inertia was subtracted with a known load."
         ),
         excited_by="fast starts and stops of this joint, with the same travel at different accelerations",
         coordinate="acceleration",
@@ -214,7 +214,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="presliding",
-        title="friction builds up over a short way after each reversal",
+        title="friction builds up gradually after each reversal",
         explanation=(
             "After a reversal friction does not jump but grows over a short travel, because the surfaces and the "
             "tendon deform before they slide. Look at the torque against the travel since the reversal."
@@ -229,7 +229,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="friction_drift",
-        title="friction changes as time goes by",
+        title="friction changes over time",
         explanation=(
             "All friction here grows or fades by a share in the course of the recording: warming up, running in, "
             "or lubricant that is squeezed out. Compare the same motion at the start and at the end."
@@ -286,7 +286,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="time_delay",
-        title="forces and positions are not of the same time",
+        title="forces and positions are measured at different times",
         explanation=(
             "The measured forces come later than the positions, or earlier where the delay is negative: filters, "
             "bus cycles, or clocks that differ. Look at how the two signals are sampled and filtered."
@@ -361,7 +361,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="joint_coupling",
-        title="this joint and the next pull at each other",
+        title="a spring couples this joint and the next",
         explanation=(
             "A spring between this joint and the next one, which pulls when their angles differ: a shared cover, "
             "a cable or a linkage. Below 0 it pulls at the sum of the angles, as a strap across both joints does. "
@@ -380,7 +380,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     ),
     Candidate(
         name="backlash",
-        title="play before motion passes on",
+        title="play between drive and joint",
         explanation=(
             "After a reversal the measured position moves on for a short way before the joint follows: a loose "
             "gear, coupling or tendon fixing. Rock the drive back and forth by a little and see whether the joint "

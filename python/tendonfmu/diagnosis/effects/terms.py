@@ -1,6 +1,6 @@
 """How an effect is added to a description: as a friction law, as a change of one, or as a row of `extensions`.
 
-The numbers of each row are in docs/reference/semantics.md#extensions. Each function here, or the one that it returns,
+The numbers of each row are in docs/reference/semantics/effects.md. Each function here, or the one that it returns,
 takes the effect's name, the description, the place and the shape, and returns the variant.
 """
 
