@@ -1,4 +1,4 @@
-"""Who may know whom: Python packages by contracts of import-linter in pyproject.toml, C and C++ by the lists of sources."""
+"""Who may know whom: Python packages by contracts of import-linter (pyproject.toml), C and C++ by lists of sources."""
 
 from __future__ import annotations
 
