@@ -15,7 +15,8 @@ from fit_data import make_recording, wavy_motion
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import FrictionFit, known_numbers
-from tendonfmu.estimate.structure import get_number, set_number
+from tendonfmu.estimate.estimates import with_estimates
+from tendonfmu.estimate.structure import estimable_numbers, get_number, set_number
 from tendonfmu.model import native, read_finger
 from tendonfmu.recordings import Recording
 
@@ -45,6 +46,23 @@ def test_replacing_a_number_makes_it_a_guess() -> None:
     finger = read_finger(finger_with([small_finger()["joints"][0]["friction"]["coulomb"], 1e-4]))
     assert set(known_numbers(finger.data)) == {COULOMB}
     assert not known_numbers(finger.replace({COULOMB: 0.9 * finger.data["joints"][0]["friction"]["coulomb"]}).data)
+
+
+def test_friction_that_only_shows_together_is_known_as_the_sum_over_its_tendon() -> None:
+    """Two places that always slide together: what one takes, the other may have taken."""
+    data = copy.deepcopy(small_finger())
+    for tendon in data["tendons"]:
+        tendon |= {"pulley_friction": None, "edge_friction": None}
+    law = {"static": 0.02, "coulomb": 0.02, "stribeck_velocity": 0.01, "viscous": 0.0}
+    data["tendons"][0] |= {"pulley_friction": [law, None], "edge_friction": [None, law]}
+    finger = read_finger(data)
+    numbers = estimable_numbers(finger.data)
+    size = np.array([number.value for number in numbers])
+    covariance = np.diag(size**2)
+    pair = [k for k, number in enumerate(numbers) if number.path.startswith("tendons[1]")]
+    covariance[np.ix_(pair, pair)] = 0.01**2 * np.array([[1.0, -0.99], [-0.99, 1.0]])
+    known = with_estimates(finger, numbers, covariance, size)
+    assert set(known_numbers(known.data)) == {"tendons[1]"}
 
 
 # --- fits -------------------------------------------------------------------------------------------------------------

@@ -53,7 +53,7 @@ def excess(found: Array, expected: Array) -> float:
     return float((np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
 
 
-@pytest.mark.parametrize("seed", repeated(range(FINGERS), *range(3, FINGERS, 8)))
+@pytest.mark.parametrize("seed", repeated(range(FINGERS), 0, 3, 7, 10, 13, 20, 26, 29))
 def test_torques_jumps_and_their_derivatives(seed: int) -> None:
     each = case(seed)
     torque, jump, d_torque, d_jump = (rows[each.compared] for rows in each.rows)

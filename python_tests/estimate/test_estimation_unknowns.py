@@ -138,3 +138,20 @@ def test_a_small_drop_moves_static_as_a_large_one_does() -> None:
     z = np.array([unknown.lower if unknown.role == "drop" else unknown.start for unknown in estimator.unknowns])
     k = [unknown.role for unknown in estimator.unknowns].index("drop")
     assert slopes(estimator, z)[INDEX[path], k] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_fixed_static_bounds_the_coulomb_friction() -> None:
+    static, coulomb, _, _ = law_paths("joints[1].friction")
+    (unknown,) = estimator_of(SMALL, {coulomb: 0}).unknowns
+    assert unknown.upper == VALUES[INDEX[static]]
+
+
+def test_scale_in_the_numbers_of_the_description() -> None:
+    static, coulomb, velocity, viscous = law_paths("tendons[2].edge_friction[1]")
+    scale = {static: 0.09, coulomb: 0.05, velocity: 0.01, viscous: 2.0}
+    estimator = estimator_of(SMALL, {static: 0, coulomb: 1, velocity: 2, viscous: 3}, scale)
+    found = {unknown.role: unknown.scale for unknown in estimator.unknowns}
+    assert found == pytest.approx({"drop": 0.04, "coulomb": 0.05, "rate": 100.0, "viscous": 2.0}, rel=1e-12)
+    lower = {unknown.role: unknown.lower for unknown in estimator.unknowns}
+    expected = {"drop": 0.04e-6, "coulomb": 0.05e-6, "rate": 0.1, "viscous": 2e-6}
+    assert lower == pytest.approx(expected, rel=1e-12)

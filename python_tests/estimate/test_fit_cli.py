@@ -19,6 +19,9 @@ from fit_finger import made_recording, moved_start, write_recording
 from repository_paths import ROOT
 from tendonfmu.estimate.structure import get_number
 
+needs_proc = pytest.mark.skipif(
+    not Path("/proc/self").is_dir(), reason="SKIPPED: no folder here that nobody may write into"
+)
 FIT = ("--share", "tendons", "--kinematics", "3")
 
 
@@ -97,10 +100,11 @@ def test_a_fit_writes_a_parameter_set_that_an_fmu_carries(call: Call, files: tup
         (("-o", "f.json", "--resume", "left.json"), "the interrupted fit has 1 unknowns, this fit has 70"),
         (("./rec.parquet", "-o", "f.json"), "rec.parquet: given twice; expected each recording once"),
         (("-o", "f.json", "--compare", "rec.parquet"), "rec.parquet: compared with, but trained on as well"),
+        pytest.param(("-o", "/proc/f.json"), "/proc/f.json: cannot be written", marks=needs_proc),
         pytest.param(
-            ("-o", "/proc/f.json"),
-            "/proc/f.json: cannot be written",
-            marks=pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="SKIPPED: all folders here are writable"),
+            ("-o", "f.json", "--figures", "/proc/figures/new"),
+            "/proc/figures/new: cannot be written",
+            marks=needs_proc,
         ),
     ],
 )

@@ -123,3 +123,14 @@ def test_directions_of_an_earlier_fit_do_not_stay(fit: FrictionFit) -> None:
     assert again["uncertainty_level"] == 2.0 and again["uncertainty"] != before["contact"]["uncertainty"]
     stopped = FrictionFit(before, **SHARED, progress=lambda _: False).fit(recording)
     assert stopped.unfinished_ is not None and "uncertainty" not in json.dumps(stopped.unfinished_.description)
+
+
+def test_the_report_says_how_well_the_directions_tell_it(fit: FrictionFit) -> None:
+    entry = fit.report_["uncertainty"]
+    assert entry["blocks"] >= 10 and entry["block_time"] >= 1.0
+    for which in ("train", "held_out", "loaded"):
+        std, error, worst = (np.array(entry[which][key]) for key in ("std", "error_rms", "error_worst"))
+        assert (std > 0).all() and (error < (0.4 if which != "loaded" else 0.8) * std).all() and (worst >= error).all()
+    assert entry["directions"] == [len(each) for each in fit.description_.data["contact"]["uncertainty"]]
+    # white noise of the settings' size: nothing to inflate but by chance (16 blocks)
+    assert all(0.5 < each < 1.8 for each in entry["inflation"])

@@ -403,3 +403,11 @@ def test_a_stopped_fit_is_marked_and_goes_on(tmp_path: Path, method: str) -> Non
     assert np.abs(away).max() < (0.1 if method == "batch" else 2.0)
     with pytest.raises(InputError, match="the interrupted fit has 25 unknowns, this fit has 70"):
         shared(moved_start(), method=method, start=file, share=[]).fit(recording)
+
+
+def test_numbers_that_wander_are_known_less() -> None:
+    recording = made_recording()
+    still, wandering = (shared(method="ekf", parameter_drift=drift).fit(recording) for drift in (0.0, 1e-2))
+    linear = np.array([unknown.role != "rate" for unknown in still.unknowns_])
+    ratio = np.diag(wandering.z_covariance_) / np.diag(still.z_covariance_)
+    assert np.median(ratio[linear]) > 1.3

@@ -122,3 +122,10 @@ def small_report(small_file: Path, *ranges: str, **plan: Any) -> dict[str, Any]:
     subject = read_subject(small_file)
     found = find_ranges(subject, ranges)
     return report(excite(subject, found, Plan(as_array(found), **{"duration": 60, **plan})), "tendonfmu excite")
+
+
+def test_asymmetric_laws_have_numbers_for_each_side(small_file: Path) -> None:
+    paths = {e["path"] for e in small_report(small_file)["parameters"]}
+    assert {f"tendons[1].edge_friction[1].{side}.coulomb" for side in ("positive", "negative")} <= paths
+    assert "tendons[1].edge_friction[1].negative.viscous" in paths
+    assert "tendons[1].edge_friction[1].positive.viscous" not in paths

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fit_cases import small_finger
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
+from tendonfmu.estimate.files import read_previous_fit
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.files import report_text
 from tendonfmu.recordings.recording import Recording
@@ -154,3 +155,32 @@ def test_what_is_no_previous_fit_of_this_finger_is_refused(
         file.write_text(json.dumps(content), encoding="utf-8")
         with pytest.raises(InputError, match=rf"previous\.json.*{words}"):
             fitted(TRUTH, made_recording(), previous=file)
+
+
+def test_from_a_description_numbers_count_as_known_to_within_the_change(
+    previous: tuple[FrictionFit, Path, Path],
+) -> None:
+    first, _, description = previous
+    still = made_recording(seed=5, still=1)
+    found = fitted(moved_start(), still, previous=description, prior=0.03)
+    for path, value in first.parameters_.items():
+        if path.startswith("joints[2].load_friction"):  # that joint never moves
+            assert found.parameters_[path] == pytest.approx(value, rel=1e-3)
+    coulomb = "joints[2].load_friction.coulomb"
+    if coulomb in found.parameters_:
+        expected = np.hypot(first.standard_errors_[coulomb], 0.03 * found.parameters_[coulomb])
+        assert found.standard_errors_[coulomb] == pytest.approx(expected, rel=0.02)
+
+
+def test_a_previous_fit_is_read_with_its_covariance(previous: tuple[FrictionFit, Path, Path]) -> None:
+    first, report, description = previous
+    found = read_previous_fit(report)
+    assert found.values == first.parameters_ and found.share == 1.0
+    root = np.sqrt(np.diag(first.z_covariance_))
+    assert found.covariance / np.outer(root, root) == pytest.approx(
+        first.z_covariance_ / np.outer(root, root), abs=1e-3
+    )
+    bare = read_previous_fit(description)
+    known = [entry for entry in first.report_["parameters"] if entry["standard_error"] <= 0.3 * entry["value"]]
+    assert set(first.parameters_) <= set(bare.values)
+    assert len(bare.names) == len(known) and np.isfinite(bare.covariance).all()

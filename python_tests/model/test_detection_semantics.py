@@ -149,6 +149,19 @@ def test_innovation_decides_and_contact_holds_its_filter(runner: Runner) -> None
     close(out["innovation"][1:, 0], 0.05)
 
 
+def test_methods_keep_the_threshold_of_the_residual(runner: Runner) -> None:
+    """A slow push passes the innovation and is found by |r|; without a method there is no innovation at all."""
+    force = 10.0 + np.arange(30) * 0.2
+    contact = {"threshold": [0.041], "method": "innovation", "innovation": {"time": 0.01, "threshold": [0.02]}}
+    out = run(runner, free_joint(**contact), force)
+    assert contact_of(out) == [int(0.002 * k > 0.041) for k in range(30)]
+    assert np.abs(out["innovation"][:20]).max() < 0.003
+    plain = run(runner, free_joint(threshold=[0.041]), force)
+    assert contact_of(plain) == contact_of(out)
+    close(plain["innovation"], 0.0)
+    close(plain["residual"][:, 0], np.arange(30) * 0.002)
+
+
 def cusum(threshold: float, evidence_time: float, **contact: Any) -> Any:
     innovation = {"time": 1e9, "threshold": [threshold], "evidence_time": evidence_time}
     return free_joint(method="cusum", innovation=innovation, **contact)
@@ -339,6 +352,18 @@ def test_uncertainty_weighs_the_parts_of_the_model(runner: Runner) -> None:
     without = run(runner, uncertain(**NEVER), force, [1.0, 1.0, 0.0], **options)
     close(without["friction_parts"], 0.0)
     close(without["compensated_torque_std"], 0.0)
+
+
+def test_a_joint_may_have_no_uncertainty(runner: Runner) -> None:
+    """null and an empty list both: u = 0; the parts of every joint are shown all the same."""
+    joints = [{"name": f"j{j}", "cover": {"stiffness": 0.02}} for j in range(3)]
+    tendons: list[Any] = [{"moment_arms": np.eye(3)[i].tolist()} for i in range(3)]
+    contact = {"threshold": [1e6] * 3, "uncertainty": [None, [], [[0.0, 0.0, 0.0, 0.0, 0.0, 0.5]]]}
+    out = run(
+        runner, finger(tendons, joints, contact=contact), 10.0, 0.0, angle=np.full((2, 3), 0.3), tendons=3, joints=3
+    )
+    close(out["compensated_torque_std"], [[0.0, 0.0, 0.003]] * 2)
+    close(out["friction_parts"][..., 5], 0.006)
 
 
 def test_standard_deviation_adds_variances(runner: Runner) -> None:
