@@ -143,4 +143,4 @@ def _cells(rows: Sequence[Row]) -> list[str]:
 
 
 HEAD = ["finger", "motion", "faults", "wrong by ≥ 1 N", "reported, no contact", "as contact", "at another tendon"]
-fault_table = table.of_cells("lines", [*HEAD, "as contact without the key", "median delay, ms"], 2)
+fault_table = table.of_cells("sensor_faults.lines", [*HEAD, "as contact without the key", "median delay, ms"], 2)
