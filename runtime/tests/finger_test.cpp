@@ -193,6 +193,8 @@ TEST(Motion, MovesRestsTouchesReversesAndLetsEveryKeyAct) {
   }
   EXPECT_GT(count(o.whole.at("contact_link"), 0), 1000u);
   EXPECT_LT(count(o.whole.at("contact_link"), 0), samples);
+  EXPECT_EQ(tendonfmu_watches_sensors(Finger(image_of(test_finger::detecting))), 0);
+  EXPECT_EQ(tendonfmu_watches_sensors(Finger(image_of(test_finger::watching))), 1);
   const Outputs watched = Finger(image_of(test_finger::watching)).run(failing());
   EXPECT_EQ(watched.flag.at("sensor_fault")[1200 * tendons + 1], 1);
   EXPECT_EQ(watched.flag.at("contact_observable")[1200], 0);

@@ -29,6 +29,7 @@ TEST(JsonSyntax, ErrorsNameLineAndColumn) {
   expect_start("{\"a\": 1,\n \"b\": [1,, 2]}", "JSON, line 2, column 10: ");
   expect_start("{} {}", "JSON, line 1, column 4: ");
   expect_start("{\"a\": 01}", "JSON, line 1, column 8: ");
+  EXPECT_NE(refusal("{\"a\": 1,}").find("unexpected '}'"), std::string::npos) << refusal("{\"a\": 1,}");
   expect_start("{ // a finger\n}", "JSON, line 1, column 3: ");
   expect_start("/* a finger */ {}", "JSON, line 1, column 1: ");
   expect_start(std::string("{}\0", 3), "JSON, line 1, column 3: ");
