@@ -24,7 +24,7 @@ TEST_SECONDS = 30.0
 class Truth:
     """What a case hides, and where."""
 
-    hidden: str  # one of docs/reference/semantics.md#names-of-effects, `none`, or `unknown_*` for what is on no list
+    hidden: str  # one of docs/reference/commands/diagnose.md#the-effects, `none`, or `unknown_*` for what is on no list
     joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
     tendon: int | None = None
     also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them

@@ -23,7 +23,7 @@ from tendonfmu.recordings.recording import read_recording
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
 PUSHES, FREE_X4 = DEMO / "index_finger_pushes.parquet", DEMO / "index_finger_free_x4.parquet"
-# docs/reference/semantics.md#score-report
+# docs/reference/commands/score.md#report
 LITERAL = {"format", "events", "found", "false_alarms", "free_minutes", "median_delay_s", "free_rms"}
 LITERAL |= {"contact_torque_rms_error"}
 

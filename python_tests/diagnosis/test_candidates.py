@@ -38,7 +38,7 @@ from tendonfmu.statistics.blocks import SampleBlocks, regular_blocks
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]
 
-# docs/reference/semantics.md#names-of-effects, without `contact` and `unknown`, which are no terms of a model, and
+# docs/reference/commands/diagnose.md#the-effects, without `contact` and `unknown`, which are no terms of a model, and
 # `calibration`, which is several
 CONTRACT = (
     "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",

@@ -193,7 +193,7 @@ def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
 
 @pytest.mark.parametrize("seed", repeated(range(9), 0, 1, 2))
 def test_innovations_are_the_contracts_residuals(seed: int) -> None:
-    """r and b_eff of docs/reference/semantics.md#bias-tracker, with contact detection out of reach."""
+    """r and b_eff of docs/reference/semantics/bias.md#bias-tracker, with contact detection out of reach."""
     description, recording, source = random_fit_case(seed, 200)
     group = groups(description)
     estimator = estimation.Estimator(image_of(description), group)

@@ -142,7 +142,7 @@ def test_gravity_is_what_holds_the_links_at_any_angles(tmp_path: Path) -> None:
 
 
 def test_links_place_the_tip_where_mujoco_has_it(tmp_path: Path) -> None:
-    """The product of rotations of docs/reference/semantics.md#link-geometry, at angles that are not 0."""
+    """The product of rotations of docs/reference/semantics/contact_place.md#link-geometry, at angles that are not 0."""
     finger = imported(tmp_path, fixed_model(), tip="tip")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
     data = mujoco.MjData(model)

@@ -1,4 +1,4 @@
-"""Contact at rest (docs/reference/semantics.md#contact-at-rest): by hand, and random fingers against the oracle.
+"""Contact at rest (docs/reference/semantics/rest.md): by hand, and random fingers against the oracle.
 
 By hand: one joint, one tendon of arm 0.01 m without friction, τ = 0.01 m · f0. Times are multiples of 1/8 s.
 """

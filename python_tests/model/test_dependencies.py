@@ -72,8 +72,8 @@ def outputs_of(finger: Instance, state: bytes, sample: Sample) -> dict[str, Any]
 def steps_apart(finger: Instance, state: bytes, sample: Sample) -> Influence:
     """Outputs whose bits change when one input of the next sample does, by little and by much.
 
-    Branch decisions are frozen (docs/reference/semantics.md#directional-derivatives): where contact itself turns, and
-    with it the bias of every joint stays or moves, only the decisions are looked at.
+    Branch decisions are frozen (docs/reference/semantics/outputs.md#directional-derivatives): where contact itself
+    turns, and with it the bias of every joint stays or moves, only the decisions are looked at.
     """
     found: Influence = set()
     plain = outputs_of(finger, state, sample)

@@ -206,7 +206,7 @@ def test_the_index_finger_has_the_papers_472_numbers() -> None:
 
 
 def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
-    """viscous 0 and static = coulomb are docs/reference/semantics.md#absent-structure; each side counts."""
+    """viscous 0 and static = coulomb are docs/reference/commands/fit.md#absent-structure; each side counts."""
     description = with_everything()
     description["joints"][0]["friction"] = {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1.0, "viscous": 0.0}
     (tmp_path / "finger.json").write_text(json.dumps(description))

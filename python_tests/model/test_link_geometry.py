@@ -1,4 +1,4 @@
-"""Link geometry (docs/reference/semantics.md#link-geometry): tip force and link in contact, against a numpy twin.
+"""Tip force and link in contact (docs/reference/semantics/contact_place.md#link-geometry), against a numpy twin.
 
 The twin turns vectors about axes from the tip to the base and solves by singular values; it shares no formula with the
 C core, which goes from the base to the tip and diagonalises the normal equations.

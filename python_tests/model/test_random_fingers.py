@@ -1,4 +1,4 @@
-"""Random fingers take every branch of docs/reference/semantics.md; every implementation agrees with the oracle."""
+"""Random fingers take every branch of docs/reference/semantics; every implementation agrees with the oracle."""
 
 from __future__ import annotations
 

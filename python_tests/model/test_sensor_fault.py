@@ -1,4 +1,4 @@
-"""Sensor faults (docs/reference/semantics.md#sensor-faults): by hand, and random fingers against the oracle.
+"""Sensor faults (docs/reference/semantics/sensors.md): by hand, and random fingers against the oracle.
 
 By hand: one joint between two tendons of arms ±0.01 m and k = 1000 N/m without friction, 20 N each, in steps of 1/8 s.
 A motion turns the joint by q and stretches both springs by c: x0 = ±0.01·q + (20 N + c)/k, f0 = 20 N + c.

@@ -1,6 +1,6 @@
 """Friction of a tendon finger in numpy, over all samples at once: what the matched rig is made of.
 
-Written from the texts alone (the paper's equations, docs/reference/semantics.md); it shares no code with the runtime,
+Written from the texts alone (the paper's equations, docs/reference/semantics); it shares no code with the runtime,
 the package or the oracle. What moves and what sticks follows from the velocities alone, so that every bias jump can be
 placed at once. Indices start at 0 here.
 """
@@ -93,7 +93,7 @@ def contacts_of(velocity: Array, threshold: float) -> Contacts:
 
 
 def build_up(velocity: Array, time: Array, distance: float) -> Array:
-    """ζ of docs/reference/semantics.md#friction-of-extensions, closed over every stretch of one direction.
+    """ζ of docs/reference/semantics/presliding.md, closed over every stretch of one direction.
 
     1 - s·ζ decays by exp(-travel/distance) within such a stretch, so only the turns need a loop.
     """
@@ -197,7 +197,7 @@ class Values:
 
 
 def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
-    """Friction over the whole series by docs/reference/semantics.md#friction-effects (`entry_load`), or presliding."""
+    """Friction over the whole series by docs/reference/semantics/friction_law.md (`entry_load`), or presliding."""
     v = velocity_seen(effect, motion)
     threshold = finger.tendon_threshold if effect.kind in ("edge", "pulley") else finger.joint_threshold
     contacts = contacts_of(v, threshold)
@@ -220,7 +220,7 @@ def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
 
 
 def jumps(values: Values, load: Array) -> Array:
-    """[N] cumulated Δb of one effect, its loads [N] multiplied in (docs/reference/semantics.md#entry-load)."""
+    """[N] cumulated Δb of one effect, its loads [N] multiplied in (semantics/friction_law.md#entry-load)."""
     contacts, total = values.contacts, np.zeros(len(load))
     if contacts is None:
         return total
@@ -268,7 +268,7 @@ def torque_of(finger: Finger, motion: Motion, force: Array) -> Array:
 
 
 def filtered_velocity(angle: Array, step: float, cutoff: float) -> Array:
-    """[N, n] by docs/reference/semantics.md#velocity-filter; 0 at the first sample."""
+    """[N, n] by docs/reference/semantics/kinematics.md#velocity-filter; 0 at the first sample."""
     from scipy.signal import lfilter
 
     raw = np.zeros_like(angle)

@@ -368,7 +368,7 @@ def measure(rng: np.random.Generator, signals: dict[str, Array], noise: Noise) -
 
 
 def columns_of(signals: dict[str, Array], source: int) -> dict[str, Array]:
-    """Columns of docs/reference/semantics.md#recordings; joint sensors only where these kinematics use them."""
+    """Columns of docs/reference/recordings.md; joint sensors only where these kinematics use them."""
     groups = ["tendon_force", "tendon_position"]
     groups += ["joint_position"] * (source >= 2) + ["joint_velocity"] * (source == 3)
     columns = {"time": signals["time"]}

@@ -43,7 +43,7 @@ def group(columns: dict[str, Array], name: str) -> Array:
 
 
 def kinematics(hand: Hand, finger: Finger, columns: dict[str, Array]) -> tuple[Motion, Array]:
-    """Joint angles and velocities by docs/reference/semantics.md#kinematics, and the measured forces [N, m]."""
+    """Joint angles and velocities by docs/reference/semantics/kinematics.md, and the measured forces [N, m]."""
     force, time = group(columns, "tendon_force"), columns["time"]
     if hand.source == 1:
         positions = group(columns, "tendon_position") - force / finger.stiffness
