@@ -11,7 +11,6 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from c_reference import header_markdown
 from mkdocs.structure.files import File, Files
 from site_notebooks import SOURCES, notebook_pages, page_of
 
@@ -42,7 +41,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def headers() -> str:
-    return "\n".join(header_markdown(ROOT / "runtime" / "include" / f"{name}.h") for name in HEADERS)
+    texts = {name: (ROOT / "runtime" / "include" / f"{name}.h").read_text(encoding="utf-8") for name in HEADERS}
+    return "\n".join(f"### `{name}.h`\n\n```c\n{text}```\n" for name, text in texts.items())
 
 
 def shown(link: re.Match[str], page: Any) -> str:

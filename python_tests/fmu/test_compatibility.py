@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
-import numpy as np
 import pytest
-from fmpy.util import read_csv
 
 from command import run_script
 from optional_parts import is_there
@@ -22,13 +19,11 @@ PARTS = {"ecos": "ecos", "libcosim": "libcosim", "FMU Manipulation Toolbox": "fm
 
 
 @pytest.mark.long
-def test_the_importers_that_are_here_agree(tmp_path: Path) -> None:
-    """Its cells are the largest deviation, over that of the output: below 1e-9; in contact and out of it."""
-    answer = run_script(ROOT / "tools" / "compatibility.py", "-o", tmp_path / "made")
+def test_the_importers_that_are_here_agree() -> None:
+    """Its cells are the largest deviation, over that of the output: below 1e-9."""
+    answer = run_script(ROOT / "tools" / "compatibility.py")
     assert answer.status == 0, answer.out + answer.err
-    lines = re.findall(r"^\| (.+) \|$", (tmp_path / "made" / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
-    rows = [line.split(" | ") for line in lines[2:]]
-    rows = [row for row in rows if len(row) == len(lines[0].split(" | "))]
+    rows = [line.split(" | ") for line in re.findall(r"^\| (.+) \|$", answer.out, re.MULTILINE)[2:]]
     assert [[row[0], row[2]] for row in rows] == [
         [importer.name, version] for importer in importers.IMPORTERS for version in ("2.0", "3.0")
     ]
@@ -38,5 +33,3 @@ def test_the_importers_that_are_here_agree(tmp_path: Path) -> None:
         if name == "libcosim" and fmi == "3.0" and not is_missing:
             expected = r"– \(no FMI 3\.0\)"
         assert all(re.fullmatch(expected, cell) for cell in cells), (name, cells)
-    for results in (tmp_path / "made").glob("*/*/*_ref.csv"):
-        assert np.ptp(read_csv(results)["contact"]) == 1
