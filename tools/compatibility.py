@@ -93,9 +93,8 @@ def main() -> int:
                 lines.append([importer.name, importer.version() or "", version, *cells, today])
                 all_agree &= all(agreements)
     print("\n".join(f"| {' | '.join(line)} |" for line in lines))
-    print(
-        f"\nAn importer agrees up to {RELATIVE:g} of an output's largest. Made on {platform.system()} {platform.machine()}."
-    )
+    system = f"{platform.system()} {platform.machine()}"
+    print(f"\nAn importer agrees up to {RELATIVE:g} of an output's largest. Made on {system}.")
     return 0 if all_agree else 1
 
 

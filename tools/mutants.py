@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import filecmp
+import itertools
 import json
 import os
 import random
@@ -25,6 +26,8 @@ from collections import defaultdict, deque
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+
+import coverage
 
 ROOT = Path(__file__).resolve().parent.parent
 LIMIT = 40.0  # s, of the tests of one mutant, by their time without it
@@ -122,27 +125,23 @@ def draw(number: int, seed: int) -> list[Mutant]:
 
 @dataclass(frozen=True)
 class Tests:
-    """What coverage knows: which tests reach a line, and how long each takes."""
+    """What coverage knows: how long each test takes, and which reach a line of a file of the package."""
 
-    seconds: dict[str, float]  # of every test
-    reaching: dict[str, dict[int, set[str]]]  # file of the package -> line -> tests
+    seconds: dict[str, float]
+    reaching: dict[str, dict[int, set[str]]]
 
     def of(self, mutant: Mutant) -> list[str]:
-        if not is_compiled(mutant):
+        """The tests that reach it, the quickest first, LIMIT seconds of them."""
+        if is_compiled(mutant):
+            names = {name for name in self.seconds if name.split("/")[1] in SHARE[mutant.group][1]}
+        else:
             lines = self.reaching.get(mutant.file.removeprefix("python/"), {})
             inside = range(mutant.line, mutant.line + mutant.old.count("\n") + 1)
             names = set().union(*(lines.get(line, set()) for line in inside))
             names = names or set().union(*lines.values())  # run at import: the tests that reach the file
-        else:
-            folders = SHARE[mutant.group][1]
-            names = {name for name in self.seconds if name.split("/")[1] in folders}
-        chosen, time_left = [], LIMIT
-        for name in sorted(names, key=lambda name: self.seconds.get(name, 0.0)):
-            time_left -= self.seconds.get(name, 0.0)
-            if time_left < 0.0:
-                break
-            chosen.append(name)
-        return chosen
+        ordered = sorted(names, key=self.seconds.__getitem__)
+        until = itertools.accumulate(self.seconds[name] for name in ordered)
+        return [name for name, end in zip(ordered, until, strict=True) if end < LIMIT]
 
 
 def measure_tests(folder: Path) -> Tests:
@@ -151,33 +150,19 @@ def measure_tests(folder: Path) -> Tests:
     if not kept.is_file():
         settings = folder / "coveragerc"
         settings.write_text(f"[run]\nsource_pkgs = tendonfmu\ndata_file = {kept}\nparallel = True\n", encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-n2",
-            "--dist=loadfile",
-            "--durations=0",
-            "-vv",
-            "--cov=tendonfmu",
-        ]
-        command += [f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
+        options = "-q -n2 --dist=loadfile --durations=0 -vv --cov=tendonfmu --cov-context=test --cov-report="
         with log.open("w", encoding="utf-8") as output:
+            command = [sys.executable, "-m", "pytest", *options.split(), f"--cov-config={settings}"]
             subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, check=False)
-    import coverage
-
     data = coverage.CoverageData(str(kept))
     data.read()
     reaching: dict[str, dict[int, set[str]]] = {}
+    seconds: dict[str, float] = {}
     for file in data.measured_files():
-        lines = {
-            line: {name.rpartition("|")[0] for name in names if name}
-            for line, names in data.contexts_by_lineno(file).items()
-        }
-        reaching["tendonfmu" + file.rpartition("/tendonfmu")[2]] = lines
-    every = {name for lines in reaching.values() for names in lines.values() for name in names}
-    seconds = dict.fromkeys(every, 0.005)  # pytest names those that take longer
+        lines = reaching["tendonfmu" + file.rpartition("/tendonfmu")[2]] = {}
+        for line, contexts in data.contexts_by_lineno(file).items():
+            lines[line] = {name.rpartition("|")[0] for name in contexts if name}  # NODE|run
+            seconds |= dict.fromkeys(lines[line], 0.005)  # pytest names those that take longer
     for taken, name in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(\S.*)$", log.read_text("utf-8"), re.M):
         seconds[name] = seconds.get(name, 0.0) + float(taken)
     return Tests(seconds, reaching)
