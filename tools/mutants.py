@@ -240,10 +240,10 @@ class Workshop:
         ran = self.call(*command, "-p", "no:cacheprovider", f"@{listed}", seconds=10.0 * LIMIT) if chosen else None
         if ran is None or ran.returncode == 0 or (ran.returncode == 4 and len(chosen) == 1):  # 4: no such test
             return ""
-        if ran.returncode not in (1, 2):
+        if ran.returncode in (3, 4, 5):  # no fault of the mutant
             raise RuntimeError(f"pytest ended with {ran.returncode}: {ran.stdout[-500:]}")
         found = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", ran.stdout, re.M)
-        return found[1] if found else "pytest"
+        return found[1] if found else f"pytest ended with {ran.returncode}"
 
 
 def nearest(text: str, mutant: Mutant) -> int | None:
