@@ -409,13 +409,13 @@ class ContactTuning(Configured):
         sentences = []
         least = least_hours(self.rate_, self.confidence)
         short = [
-            f"{60 * each.hours:.1f} min at {each.force:.3g} N: at most "
-            f"{rate_limit(0, each.hours, self.confidence):.0f} per hour ({60 * (least - each.hours):.1f} min more)"
+            f"{rate_limit(0, each.hours, self.confidence):.0f} per hour with {60 * each.hours:.1f} min at "
+            f"{each.force:.3g} N (record {60 * (least - each.hours):.1f} min more)"
             for each in self.pretensions_
             if each.hours < least and len(self.pretensions_) > 1
         ]
         if short:
-            sentences.append(f"the rate holds for all pretensions together; each by itself allows: {', '.join(short)}")
+            sentences.append(f"the rate holds for all pretensions together; at one alone it may be {', '.join(short)}")
         if len(self.pretensions_) == 1:
             low, high = self.forces_
             sentences.append(

@@ -138,7 +138,7 @@ def _bounds(tuning: ContactTuning) -> Table:
 
 
 def _pretensions(tuning: ContactTuning) -> Table:
-    headings: Row = ("mean force, N", "minutes", "residual rms\nmN·m", "false alarms", "at most,\nper hour", "(r/σ)²")
+    headings: Row = ("mean force, N", "minutes", "residual rms\nmN·m", "false alarms", "at most,\nper hour", "(r/std)²")
     rows: list[Row] = [
         (
             f"{pretension.force:.3g}",
