@@ -1,4 +1,4 @@
-"""A part of the evidence: what is measured, what it needs, what is said of it.
+"""A part of the evidence: what is measured, what it needs, what is reported about it.
 
 Each file of evidence/ asks one question and has PARTS, by name. `python -m evidence fit.recalibration` runs one.
 """

@@ -85,7 +85,7 @@ def test_a_sensor_that_fails_in_free_motion_leaves_the_key_out() -> None:
 
 def test_springs_that_are_not_as_described_leave_the_key_out() -> None:
     rule = learn_sensors(FINGER, [part(1, softer=0.2)])
-    assert rule.keys is None and rule.why.startswith("forces differ from their springs by up to")
+    assert rule.keys is None and rule.why.startswith("forces differ from those of their springs by up to")
 
 
 @pytest.mark.parametrize(

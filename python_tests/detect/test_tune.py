@@ -297,7 +297,7 @@ def test_little_motion_is_tuned_for_the_rate_that_it_supports(call: Call) -> Non
     hours = report["minutes"] / 60
     assert report["tuned_for_per_hour"] == pytest.approx(rate_limit(0, hours, 0.9)) and report["allowed_alarms"] == 0
     assert report["more_minutes"] == pytest.approx(60 * (least_hours(6.0, 0.9) - hours))
-    assert "at most 143 false alarms an hour with 90 % confidence; 22." in answer.err
+    assert "at most 143 false alarms an hour with 90 % confidence; for 6 an hour record 22." in answer.err
     assert report["closed_loop"]["alarms"] == 0 and report["held_out"]["alarms"] == 0
     held = report["holds_for"]
     assert held["pretensions"] == 1 and 9 < held["lowest_force"] < held["highest_force"] < 11

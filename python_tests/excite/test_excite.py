@@ -287,7 +287,7 @@ def test_command(run: Call, small_file: Path, tmp_path: Path, words: list[Any], 
     written = json.loads(report.read_text())
     assert written["format"] == "tendonfmu-excitation-1"
     assert all(f"{words[k]} {words[k + 1]}" in written["command"] for k in range(0, len(words), 2))
-    assert "warning: joint tip: its range is unknown: 0.5 rad either side" in done.err
+    assert "warning: joint tip: range unknown, moves 0.5 rad to either side" in done.err
     assert f"{written['identifiable']} of {written['numbers']} numbers" in done.out
 
 

@@ -77,7 +77,7 @@ def test_diagnose_and_extend(run_notebook: Any, tmp_path: Path) -> None:
 def test_detect_and_tune(run_notebook: Any, tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[2], tmp_path))
     assert len(figures_of(found["plot"])[0]["layout"]["shapes"]) >= 4 * 2 * 11
-    assert any("21.1 min more for 6" in each.get("text", "") for each in found["tune"])
+    assert any("for 6 an hour record 21.1 min more" in each.get("text", "") for each in found["tune"])
     rows = table_of(found["compare"])
     assert [row[0] for row in rows.values()] == ["8 of 11", "11 of 11", "11 of 11"]
     delays = [int(row[2].split()[0]) for row in rows.values()]

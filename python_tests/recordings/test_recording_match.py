@@ -290,7 +290,7 @@ def test_check_says_what_belongs_and_what_to_write(call: Call, tmp_path: Path, s
     answer = call("check", INDEX, spoilt, FREE)
     assert answer.status == 1
     assert f"error: {spoilt}: tendon_force[2]: " in answer.out and 'at "tendon_force[2]": "sign": -1' in answer.out
-    assert f"{FREE}: belongs to this finger: 30000 samples, 60 s; nothing found" in answer.out
+    assert f"{FREE}: belongs to this finger: 30000 samples, 60 s; no problem found" in answer.out
     assert answer.err.count("\n") == 1 and "1 of 2 recordings" in answer.err
     gap = written(part_of(sound, (sound.time < 8.0) | (sound.time > 9.5)), tmp_path / "gap.parquet")
     answer = call("check", INDEX, gap)

@@ -141,7 +141,7 @@ def test_a_size_is_told_in_units_that_suit(effect: str, numbers: dict[str, tuple
     [
         ("preload_friction", [(0.2, "N"), (0.5, "N"), (0.1, "N")], "0.5 N of friction at the largest of 3 places"),
         ("preload_friction", [(0.2, "N"), (0.2, "N")], "0.2 N of friction, at each of 2 places"),
-        ("presliding", [(0.03, "s"), (1.3e-3, "rad")], "15 µm at tendons, 0.3 mrad at joints; other at 1 place"),
+        ("presliding", [(0.03, "s"), (1.3e-3, "rad")], "15 µm at tendons, 0.3 mrad at joints; different at 1 place"),
     ],
 )
 def test_the_size_of_several_places(effect: str, numbers: list[tuple[float, str]], words: str) -> None:

@@ -298,7 +298,7 @@ def three_causes() -> Diagnosis:
         noise_floor=(2.2e-3, 2.08e-3),
         gain=Interval(0.577, 0.54, 0.61),
         steps=(5.677e-3, 3.9e-3, 2.55e-3, 2.408e-3),
-        signals="signals smoothed at 19.6 Hz, without lag",
+        signals="signals smoothed at 19.6 Hz, without delay",
         causes=causes,
         too_small=(SMALL,),
         uncertain=(UNCERTAIN,),

@@ -104,7 +104,8 @@ def alarms(report: Report) -> str:
 def tuned_for(report: Report) -> str:
     """Say for which rate of false alarms the thresholds were chosen, and on how much motion."""
     detection = report["detection"]
-    return f"tuned for {detection['tuned_for_per_hour']:.3g} an hour on {_long(detection['minutes'])} of other motion"
+    rate = f"{detection['tuned_for_per_hour']:.3g} false alarms an hour"
+    return f"tuned for {rate} on {_long(detection['minutes'])} of other motion"
 
 
 def _first(report: Report) -> str:
@@ -180,7 +181,7 @@ def error_caption(report: Report) -> str:
     error = report["error"]
     data = "a fifth of the recordings" if error["held_out"] else "the test recordings"
     return (
-        f"Error: rms of compensated_torque, what {FMU} feels although nothing touches the finger. Before is "
+        f"Error: rms of compensated_torque, what {FMU} reports although nothing touches the finger. Before is "
         f"{MODELS[_first(report)]}. Both run over {data} ({_long(error['minutes'])}), which were not used to choose "
         "numbers, structure or thresholds."
     )
@@ -241,8 +242,9 @@ def sensor_sentence(report: Report) -> str:
     if found["keys"] is None:
         return f"Sensor faults are not watched: {found['left_out']}."
     return (
-        f"A tendon sensor that contradicts its spring by more than {found['keys']['jump_margin']:.2g} N is reported as "
-        f"a sensor fault, not as contact; free motion shows differences of up to {found['largest_difference']:.2g} N."
+        f"A tendon force that differs from that of its spring by more than {found['keys']['jump_margin']:.2g} N is "
+        "reported as a sensor fault, not as contact; free motion shows differences of up to "
+        f"{found['largest_difference']:.2g} N."
     )
 
 

@@ -299,6 +299,6 @@ def alarms(score: DetectionScore) -> str:
     if not score.false_alarms:
         return "none"
     begin, end = max(score.false_alarms, key=lambda alarm: alarm[1] - alarm[0])
-    many = f"{len(score.false_alarms)}, {100 * score.free_alarm_share:.1f} % of the time"
-    feeds = " (in contact the bias is frozen: an alarm can feed itself)" if end - begin > 1.0 else ""
-    return f"{many}, the longest {end - begin:.1f} s from {begin:.1f} s on{feeds}"
+    many = f"{len(score.false_alarms)}, {100 * score.free_alarm_share:.1f} % of the time;"
+    feeds = " (the bias is frozen in contact, so an alarm can keep itself on)" if end - begin > 1.0 else ""
+    return f"{many} the longest lasts {end - begin:.1f} s, from {begin:.1f} s on{feeds}"

@@ -248,13 +248,13 @@ def supported(cells: Cells, hours: float, wished: float, confidence: float, stri
     if strict:
         raise NotEnough(
             f"{60 * hours:.1f} min of free motion: even without any alarm the rate may be {rate:.3g} per hour "
-            f"at confidence {confidence:g}; expected {60 * needed:.1f} min for {wished:g} per hour, {more:.1f} min "
-            f"more (evenly: {evenly})",
+            f"at confidence {confidence:g}; expected {60 * needed:.1f} min for {wished:g} per hour: record {more:.1f} "
+            f"min more ({evenly})",
             more,
         )
     sentence = (
         f"{60 * hours:.1f} min of free motion: at most {rate:.3g} false alarms an hour with {100 * confidence:g} % "
-        f"confidence; {more:.1f} min more for {wished:g} (evenly: {evenly})"
+        f"confidence; for {wished:g} an hour record {more:.1f} min more ({evenly})"
     )
     return Support(rate, 0, more, (sentence,))
 

@@ -64,7 +64,7 @@ def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
     why = f"a sensor seems to fail in free motion, by more than {widest:.2g} N"
     if AMPLE * largest > widest:
         why = (
-            f"forces differ from their springs by up to {largest:.2g} N in free motion; expected at most "
+            f"forces differ from those of their springs by up to {largest:.2g} N in free motion; expected at most "
             f"{widest / AMPLE:.2g} N if springs and moment arms are as described"
         )
     return SensorRule(None, largest, why)

@@ -409,19 +409,19 @@ class ContactTuning(Configured):
         sentences = []
         least = least_hours(self.rate_, self.confidence)
         short = [
-            f"{60 * each.hours:.1f} min at {each.force:.3g} N no rate below "
-            f"{rate_limit(0, each.hours, self.confidence):.3g} per hour ({60 * (least - each.hours):.1f} min more)"
+            f"{rate_limit(0, each.hours, self.confidence):.0f} per hour with {60 * each.hours:.1f} min at "
+            f"{each.force:.3g} N (record {60 * (least - each.hours):.1f} min more)"
             for each in self.pretensions_
             if each.hours < least and len(self.pretensions_) > 1
         ]
         if short:
-            sentences.append(f"each pretension alone supports less: {', '.join(short)}")
+            sentences.append(f"the rate holds for all pretensions together; at one alone it may be {', '.join(short)}")
         if len(self.pretensions_) == 1:
             low, high = self.forces_
             sentences.append(
                 f"one pretension, {self.pretensions_[0].force:.3g} N: the growth with the force is not known, so "
-                f"thresholds are constants and hold for mean tendon forces of {low:.3g} to {high:.3g} N; below they "
-                "miss more, above they raise more false alarms; expected recordings at several pretensions"
+                f"thresholds are constants and hold for mean tendon forces of {low:.3g} to {high:.3g} N; at "
+                "lower forces they miss more, at higher ones there are more false alarms; record several pretensions"
             )
         start = sum(loop.at_start for loop in self.loop_)
         if start:

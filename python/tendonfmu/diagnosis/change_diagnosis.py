@@ -263,8 +263,8 @@ class _Changes:
         # a motion that the reference has exactly is compared with it sample by sample
         if now < 4 or (folds.folds - now < 4 and not self._search.repeated):
             warnings.append(
-                "less than 16 s then or now can be compared, without contact and at like loads: a change has to be "
-                "large to be certain; record a minute of the same motion then and now"
+                "less than 16 s of the reference or of the new recordings can be compared (free of contact, similar "
+                "loads), so only a large change can be certain; record a minute of the same motion for both"
             )
         return warnings
 
@@ -317,8 +317,8 @@ class _Changes:
         pulls = any(not tendon.get("bidirectional") for tendon in self._given.finger.data["tendons"])
         if any(cause.confusable_with for cause in causes) and pulls:
             return (
-                f"{REPEAT} Then repeat them at half and at twice the pretension: what grows with the tendon force "
-                "differs there from what does not."
+                f"{REPEAT} Then repeat them at half and at twice the pretension: effects that grow with the tendon "
+                "force then differ from those that do not."
             )
         if not search.repeated and (causes or absorbed_effects(search.selection, REPEAT)):
             return f"{REPEAT} Then their difference shows the change alone."

@@ -11,13 +11,13 @@ from tendonfmu.diagnosis.names import ENCODER, ZERO
 
 EXPLANATIONS = {
     ENCODER: (
-        "All tendons of this joint agree that it stands elsewhere than its encoder reads: the encoder's disc or its "
-        "coupling has slipped, or it was set to zero in another pose. No number of a description holds it: set the "
+        "All tendons of this joint agree on another angle than its encoder reads: the encoder's disc or its coupling "
+        "has slipped, or it was set to zero in another pose. A description has no number for this: set the "
         'encoder to zero again, or write its offset into the map of columns ("offset" at joint_position).'
     ),
     ZERO: (
         "This tendon's motor reads another position than the joints and the other tendons show: the tendon has "
-        "slipped on its drum, was hung in anew, or its motor lost its count. The extended model has its zero."
+        "slipped on its drum, was attached again, or its motor lost its count. The extended model has its zero."
     ),
     "moment_arm": (
         "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius and add "
@@ -28,7 +28,7 @@ EXPLANATIONS = {
         "gain of its force sensor. The extended model has the stiffness."
     ),
     "joint_coupling": (
-        "The tendon moves with a joint that it does not pass in the description: it is led beside the joint's axis. "
+        "The tendon moves with a joint that it does not pass in the description: it passes beside the joint's axis. "
         "The extended model has the moment arm."
     ),
 }

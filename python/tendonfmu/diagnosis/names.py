@@ -14,9 +14,9 @@ CONTACT, UNKNOWN = "contact", "unknown"
 ENCODER, ZERO = "encoder_offset", "zero"  # without a term in a model of torques
 LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
 TITLES = {
-    LOAD: "a load on the finger that was not there, or a sensor's zero that has moved",
+    LOAD: "a new load on the finger, or a sensor's zero that has moved",
     CONTACT: "something touches the finger, or stops it",
-    UNKNOWN: "something that no effect on the list explains",
+    UNKNOWN: "something that no known effect explains",
     ENCODER: "the joint's encoder is off",
     ZERO: "the zero of a tendon's position is off",
 }

@@ -59,7 +59,7 @@ GROUPS = {
     "acceleration": "acceleration or products of velocities (inertial torques)",
     "travel": "the travel since the last reversal (hysteresis)",
     "memory of direction": "the directions of motion of the last seconds (a long hysteresis)",
-    "memory of speed": "how fast the hand moved in the last seconds (friction that remembers)",
+    "memory of speed": "how fast the finger moved in the last seconds (friction with memory)",
     "memory of angle": "where the joint was in the last seconds (creep)",
     "rest": "the time at rest before the motion",
     "time": "the time since the start, with the direction of motion (slow change of friction)",

@@ -14,11 +14,11 @@ from tendonfmu.diagnosis.result import Diagnosis
 
 _EXPLANATIONS = {
     LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
-    "cannot cause that. Look whether something touches or pulls the finger, and what the sensors show without a "
-    "tendon. At run time the bias follows it.",
+    "cannot cause that. Check whether something touches or pulls the finger, and what the sensors read without a "
+    "tendon. At run time the bias compensates it.",
     CONTACT: "In some stretches a torque appears and disappears that no friction explains. They are left out of the "
     "fit. The gain is the share of the error on the training recordings that leaving them out removes.",
-    UNKNOWN: "Part of the remaining error follows the recorded signals, but no effect on the list has its shape. The "
+    UNKNOWN: "Part of the remaining error follows the recorded signals, but no known effect has its shape. The "
     "gain is how much smaller the error on test data would be without it.",
 }
 LEAST_GAIN = 0.1  # lower end of a contact's gain: contact is judged on the recordings in which it was found

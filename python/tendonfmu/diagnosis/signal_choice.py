@@ -89,7 +89,7 @@ class Estimation:
     def words(self) -> str:
         """Which signals are used, for the report."""
         filtered = "position_filter" in self.given
-        return f"{self.signals.words}; the finger runs with the {'position' if filtered else 'velocity'} filter"
+        return f"{self.signals.words}; at run time the finger uses its {'position' if filtered else 'velocity'} filter"
 
 
 def choose(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings) -> Estimation:

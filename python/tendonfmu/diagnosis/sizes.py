@@ -42,7 +42,7 @@ def size_of(effect: str, places: Sequence[CausePlace], thresholds: Thresholds) -
         return f"{sizes[0]}, at each of {len(sized)} places"
     units = {_first(place)[1] for place in sized}
     if len(units) > 1:  # for example everywhere and at a joint
-        return f"{sizes[0]}; other at {counted(len(sized) - 1, 'place')}"
+        return f"{sizes[0]}; different at {counted(len(sized) - 1, 'place')}"
     largest = max(sized, key=lambda place: abs(_first(place)[0]))
     return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(sized)} places"
 
@@ -151,7 +151,7 @@ def _other_number(search: ChangeSearch, change: Cause, then: Data, now: Data, un
     name, unit = main.rsplit(".", 1)[-1], units[main]
     if change.effect == "asymmetric_friction":
         before, after = _difference(then, main), _difference(now, main)
-        name = f"{name}, positive less negative"
+        name = f"{name}, positive minus negative direction"
     error = abs(after - before) * _relative_error(change)
     has_share = abs(before) >= LEAST_OF_NOW * abs(after) and change.effect != "asymmetric_friction"
     share = (after - before) / before if has_share and before else math.nan
@@ -163,7 +163,7 @@ def _other_number(search: ChangeSearch, change: Cause, then: Data, now: Data, un
 
 
 def _difference(data: Data, path: str) -> float:
-    """Return the difference between the two sides of a law in a number, positive less negative."""
+    """Return the difference between the two sides of a law in a number, positive minus negative direction."""
     for side, other in _OTHER_SIDE.items():
         if f".{side}." in path:
             sign = 1.0 if side == "positive" else -1.0

@@ -131,7 +131,7 @@ def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
     if nis is not None and not LEAST_NIS <= nis <= MOST_NIS:
         sentences.append(
             f"the residuals' variance is {times} times that of bias.noise_std, noise_std_per_force, noise_time and "
-            "drift_variance: standard errors are those of these settings, not of the data"
+            "drift_variance: standard errors follow these settings, not the data"
         )
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
     if far > MOST_LAG_ONE:

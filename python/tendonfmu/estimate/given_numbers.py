@@ -51,12 +51,12 @@ def _far(moved: Sequence[Fitted]) -> list[str]:
 
 def _sentences(moved: int, stayed: Sequence[Fitted], estimated: bool, kept: bool) -> list[str]:
     if kept:
-        return ["The given numbers are kept: fitted ones leave more of the samples that were held out."]
+        return ["The given numbers are kept: fitted ones leave a larger error on the held-out samples."]
     sentences = ["The given numbers were estimated before."] if estimated else []
-    sentences.append(f"{counted(moved, 'number')} moved by more than the standard error")
+    sentences.append(f"{counted(moved, 'number')} moved by more than their standard errors")
     reasons = Counter(number.cause for number in stayed)
-    why = [f"{count} {CAUSES[cause]}" for cause, count in reasons.most_common() if cause]
+    why = [f"{count}: {CAUSES[cause]}" for cause, count in reasons.most_common() if cause]
     if reasons[""]:
-        why.append(f"{reasons['']} agrees with the data" if reasons[""] == 1 else f"{reasons['']} agree with the data")
+        why.append(f"{reasons['']}: the data agree with the given value{'s' * (reasons[''] > 1)}")
     sentences[-1] += f"; {len(stayed)} stayed ({'; '.join(why)})." if stayed else "."
     return sentences

@@ -23,7 +23,7 @@ CAUSES = {
     **CAUSES_OF_A_MOTION,
     "never_moves": "never slides at all",
     "side": "never slides to that side",
-    "kept": "known from the earlier estimate more than from these recordings",
+    "kept": "better known from the earlier fit than from these recordings",
 }
 NARROWED = 0.5  # of the prior's standard deviation: what data identify, they know at least so much better
 _INSIDE = 1e-6  # step of the finite differences of `slopes`, relative to the size of an unknown

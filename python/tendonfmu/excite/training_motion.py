@@ -217,7 +217,7 @@ def _default_range(data: Data, j: int, name: str, limits: tuple[float, float] | 
     if len(set(angles)) > 1:
         return Range(name, min(angles), max(angles), "working points of the edges behind it")
     rest = float((data["joints"][j].get("cover") or {}).get("rest_angle") or 0.0)
-    source = f"its range is unknown: {UNKNOWN_RANGE:g} rad either side of the rest angle {rest:g}"
+    source = f"range unknown, moves {UNKNOWN_RANGE:g} rad to either side of the rest angle {rest:.3g} rad"
     return Range(name, rest - UNKNOWN_RANGE, rest + UNKNOWN_RANGE, source, guessed=True)
 
 

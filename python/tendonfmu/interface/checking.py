@@ -37,7 +37,7 @@ class CheckResult:
         return all(finding.severity != "error" for finding in self.findings)
 
     def __repr__(self) -> str:
-        lines = [f"{finding.severity}: {finding.line()}" for finding in self.findings] or ["nothing found"]
+        lines = [f"{finding.severity}: {finding.line()}" for finding in self.findings] or ["no problem found"]
         return "\n".join([*self.finger.summary(), *lines])
 
     def _repr_html_(self) -> str:

@@ -160,7 +160,7 @@ def routing(path: Path, finger: Finger, learned: TendonRouting, severity: str) -
     seen = _of_tendon(finger, learned)
     write = "tendonfmu calibrate learns them"
     if not learned.differs:
-        write = "nothing into the map; angle and friction that the FMU computes there have part of this error"
+        write = "nothing to change in the map; the FMU's angle and friction there have part of this error"
     return Finding(
         severity,
         "routing",
@@ -239,7 +239,7 @@ def _off(number: Learned) -> str:
 def force_unit(path: Path, columns: Sequence[str], factor: float, unit: str) -> Finding:
     """Describe forces whose unit the stretch of the springs contradicts."""
     correction = Correction("scale", tuple(columns), factor, unit)
-    seen = "the springs stretch as if all of them were by the same factor stiffer or softer than described"
+    seen = "the springs stretch as if all were stiffer or softer than described by the same factor"
     return _of_correction(path, correction, seen, f"{_cause(correction)}, or stiffness in another unit than N/m")
 
 
@@ -462,6 +462,6 @@ def verdict(recording: Recording, findings: Sequence[Finding]) -> str:
     severities = [finding.severity for finding in findings]
     errors, warnings = severities.count("error"), severities.count("warning")
     words = "does not belong to this finger as it is" if errors else "belongs to this finger"
-    counts = f"{counted(errors, 'error')}, {counted(warnings, 'warning')}" if findings else "nothing found"
+    counts = f"{counted(errors, 'error')}, {counted(warnings, 'warning')}" if findings else "no problem found"
     length = recording.time[-1] - recording.time[0]
     return f"{recording.path}: {words}: {counted(len(recording), 'sample')}, {length:.4g} s; {counts}"

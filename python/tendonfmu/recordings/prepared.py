@@ -26,7 +26,7 @@ from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
 
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
-_LOOKED_AT = 50_000  # samples, about, of which is said where the motion has been
+_LOOKED_AT = 50_000  # about so many samples are used to describe the motion
 SHORTEST_BLOCK = 1.0  # s; of a held-out block
 
 

@@ -43,7 +43,7 @@ class Signals:
     @property
     def words(self) -> str:
         """The signals in words, for a report."""
-        return "raw signals" if self.cutoff is None else f"signals smoothed at {self.cutoff:.3g} Hz, without lag"
+        return "raw signals" if self.cutoff is None else f"signals smoothed at {self.cutoff:.3g} Hz, without delay"
 
     def recording(self, recording: Recording) -> Recording:
         """Return the recording from which is estimated."""

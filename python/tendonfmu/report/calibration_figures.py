@@ -70,8 +70,8 @@ def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
             ("after", "left of it, calibrated"),
         ),
         panels=panels,
-        caption="A stretch with a typical error, which nothing was chosen on. What is left is what the finger feels "
-        "although nothing touches it.",
+        caption="A stretch with a typical error; nothing was tuned on it. What is left is the torque that the finger "
+        "reports although nothing touches it.",
     )
 
 

@@ -53,14 +53,14 @@ def score_lines(scored: Scored) -> Iterator[str]:
     yield (
         f"false alarms: {summary.false_alarms}{soon} in {summary.free_minutes:.3g} min of free time, "
         f"{_estimate(summary.false_alarms_per_minute)} per minute; "
-        f"in alarm {_estimate(summary.free_alarm_share, 100.0)} % of it"
+        f"in alarm {_estimate(summary.free_alarm_share, 100.0)} % of the free time"
     )
     shown = [point for point in scored.roc or [] if any(math.isclose(point.factor, factor) for factor in SHOWN)]
     if shown and summary.free_minutes:
         factors = ", ".join(f"{point.factor:g}" for point in shown)
         some = ", ".join(f"{point.found}" for point in shown)
         per_hour = ", ".join(_rate(point.false_alarms_per_hour.value) for point in shown)
-        hit = f"{some} of {summary.events} found, " if summary.events else ""
+        hit = f"{some} of {summary.events} found; " if summary.events else ""
         yield f"thresholds × {factors}: {hit}{per_hour} false alarms per hour"
     if scored.no_roc:
         yield f"no ROC: {scored.no_roc}"
@@ -68,9 +68,9 @@ def score_lines(scored: Scored) -> Iterator[str]:
 
 def _event_lines(summary: Summary) -> Iterator[str]:
     missed = summary.events - summary.found
-    why = f", {summary.masked} of them in an alarm from before" if summary.masked else ""
+    why = f", {summary.masked} of them in an alarm that had begun before" if summary.masked else ""
     share = _estimate(summary.found_share, 100.0)
-    late = f", {summary.released} of them only as the load goes" if summary.released else ""
+    late = f", {summary.released} of them only as the load ends" if summary.released else ""
     yield f"events: {summary.found} of {summary.events} found{late}, {share} %; {missed} missed{why}"
     if not summary.found:
         return
@@ -84,7 +84,7 @@ def _event_lines(summary: Summary) -> Iterator[str]:
     yield (
         f"held to their end: {summary.held} of {summary.found}; "
         f"alarms that outlast an event: {summary.overhang_events}, "
-        f"{summary.overhang_seconds:.3g} s, the longest {summary.longest_overhang:.3g} s{felt}"
+        f"{summary.overhang_seconds:.3g} s in all, the longest {summary.longest_overhang:.3g} s{felt}"
     )
 
 
@@ -127,14 +127,14 @@ def _bounds(tuning: ContactTuning) -> Table:
     headings += ["deviation\nmN·m", "+ per N\nmN·m/N"]
     columns += [tuning.deviation_.base, tuning.deviation_.per_force]
     main = list(tuning.bounds_.values())[-1]
-    also = f" + {main.stuck_share:g} stuck friction + {main.jump_share:g} friction jump" if main.stuck_share else ""
+    also = f" + {main.stuck_share:g} · stuck friction + {main.jump_share:g} · friction jump" if main.stuck_share else ""
     if main.jump_share and not main.stuck_share:
-        also = f" + {main.jump_share:g} friction jump"
+        also = f" + {main.jump_share:g} · friction jump"
     rows = [
         (joint, *(f"{1e3 * column[j]:.3g}" for column in columns))
         for j, joint in enumerate(tuning.description_.joint_names)
     ]
-    return f"{tuning.description_.name}: {tuning.method}, bounds{also}", tuple(headings), rows
+    return f"{tuning.description_.name}: {tuning.method}, bound = base + per N · force{also}", tuple(headings), rows
 
 
 def _pretensions(tuning: ContactTuning) -> Table:
@@ -167,8 +167,8 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
         share = sum(loop.alarm_seconds for loop in tuning.loop_) / sum(loop.seconds for loop in tuning.loop_)
         yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
     yield (
-        f"held out: {held} in blocks that did not choose the bounds, at most {limit:.3g} per hour; "
-        f"{tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g}"
+        f"held out: {counted(held, 'false alarm')} in blocks that the bounds were not chosen on, at most {limit:.3g} "
+        f"per hour; {tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g} per hour"
     )
     low, high = tuning.forces_
     yield f"chosen at mean tendon forces of {low:.3g} to {high:.3g} N; beyond them thresholds are extrapolated"
@@ -182,9 +182,9 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
         yield f"sensor faults are not watched: {sensors.why}"
     else:
         yield (
-            f"sensor faults: forces differ from their springs by up to {sensors.largest:.2g} N in free motion, "
-            f"{sensors.keys['jump_margin']:.3g} N are allowed"
+            f"sensor faults: forces differ from those of their springs by up to {sensors.largest:.2g} N in free "
+            f"motion, {sensors.keys['jump_margin']:.3g} N are allowed"
         )
     levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
     if levels.max() > 1:
-        yield f"on held-out halves bounds have to be {levels.max():.2f} times as large as on the halves that chose them"
+        yield f"held-out halves need bounds {levels.max():.2f} times as large as the halves they were chosen on"

@@ -126,7 +126,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     """Write all files to an empty folder."""
     write_text(folder / PAGE, diagnosis_page(diagnosis))
     causes = len(diagnosis.causes)
-    added = "nothing added" if causes == 0 else "its cause" if causes == 1 else f"its {causes} causes"
+    added = "no cause added" if causes == 0 else "its cause added" if causes == 1 else f"its {causes} causes added"
     for name, data in ((NOMINAL, diagnosis.nominal_data), (EXTENDED, diagnosis.extended_data)):
         write_text(folder / name, description_text(dict(data)))
     build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # drawing takes longer than all the rest

@@ -149,7 +149,7 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     left, (_, unit) = left_of(diagnosis), unit_of(diagnosis)
     if left is None:
         return ""
-    noise = f"although it is correlated over {left.memory}" if left.memory else "so for these sensors it is noise"
+    noise = f"but it is correlated over {left.memory}, not white" if left.memory else "so for these sensors it is noise"
     if left.predictable <= 0.0:
         return f"{left.text(left.whole)} {unit} remain. No recorded signal predicts any of it, {noise}."
     little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else "; it is too small to matter"
@@ -236,7 +236,7 @@ def hidden_sentences(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
     """Describe what these data cannot show: what refitting absorbs, and what would have to be larger than usual."""
     effects = hidden(diagnosis, names)
     change = diagnosis.kind == "change"
-    hides = "what both recordings share hides" if change else "other numbers of the model imitate"
+    hides = "the errors that both recordings share hide" if change else "other numbers of the model imitate"
     absorbed = [effect for effect in effects if effect.absorbed]
     small = [effect for effect in effects if not effect.absorbed]
     if absorbed:

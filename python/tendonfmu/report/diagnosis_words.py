@@ -115,8 +115,8 @@ CHANGE = Words(
         ),
     },
     error=" of the model of the reference",
-    no_name="the model gets wrong in the reference as well",
-    left="remains: wrong in the reference as well",
+    no_name="is in the reference as well",
+    left="remains: in the reference as well",
     small="These changes are in the new recordings, but on test data each lowers the error by less than {least}. They "
     "are not in the changed model.",
     uncertain="These changes are in the new recordings, but test data do not show whether they matter: their gain may "

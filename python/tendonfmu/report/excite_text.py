@@ -19,7 +19,7 @@ def tables(result: ExciteResult) -> Iterator[Table]:
     motion = result.motion
     yield (
         f"{result.subject.finger.name}: {motion.time[-1]:g} s of motion, {_load(result)}",
-        ("joint", "range, rad", "fastest, rad/s", "strokes", "reversals", "slow ones", "rests", "resting, s"),
+        ("joint", "range, rad", "fastest, rad/s", "strokes", "reversals", "slow reversals", "rests", "resting, s"),
         [
             (
                 span.name,
@@ -32,8 +32,8 @@ def tables(result: ExciteResult) -> Iterator[Table]:
         ],
     )
     yield (
-        "friction effects: time on each side and below v_min",
-        ("effect", "positive, s", "negative, s", "still, s", "cannot be identified"),
+        "friction effects: time of sliding in each direction, and below v_min",
+        ("effect", "positive, s", "negative, s", "below v_min, s", "cannot be identified"),
         [_effect_row(cover, result.judgement.verdicts) for cover in result.effects],
     )
     yield (

@@ -40,8 +40,8 @@ _ORDER = ("static", "coulomb", "stribeck_velocity", "viscous")
 _FEWEST = 8  # samples in a bin; emptier bins are left out
 _TORQUE_KEYS = (
     ("measured", "measured joint torque"),
-    ("predicted", "model with bias, before it sees the sample"),
-    ("bias", "the bias's part of it"),
+    ("predicted", "model with bias, before the bias learns from the sample"),
+    ("bias", "bias alone"),
 )
 _RESIDUAL_CAPTION = (
     "Residual before the bias learns from the sample: measured minus modelled torque. A median away from 0 over the "

@@ -19,7 +19,7 @@ _HEADROOM = 2.5  # the axis ends at this times the highest curve, even if a band
 _LAW_KEYS = (
     ("confidence", "95 % confidence"),
     ("start", "start"),
-    ("data", "where the training's samples are"),
+    ("data", "range of the training samples"),
 )
 
 
@@ -70,7 +70,7 @@ def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str]
     if not all(is_known(effect, picture) for effect in drawn):
         first += [("unknown", "not identified")]
     still = any(not effect.angles and velocity_threshold(picture.fitted.data, effect) for effect in drawn)
-    rest = [("standstill", "below v_min: no friction acts, the bias takes its part")] if still else []
+    rest = [("standstill", "below v_min: no friction is modelled, the bias replaces it")] if still else []
     return (*first, *_LAW_KEYS, *rest)
 
 

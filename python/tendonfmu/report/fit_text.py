@@ -116,7 +116,7 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
         "their values, and at most half of what was known before."
     )
     if kept:
-        yield f"{counted(kept, 'number')} {are(kept)} known from the earlier estimate more than from these recordings."
+        yield f"{counted(kept, 'number')} {are(kept)} better known from the earlier fit than from these recordings."
     if count + kept < of:
         yield f"What would identify the other {of - count - kept} is listed below."
     yield from sums_known(picture.fitted)
@@ -145,8 +145,8 @@ def _what(picture: FitPicture) -> Iterator[str]:
         f"{counted(len(picture.fitted.joint_names), 'joint')}, {counted(len(picture.fitted.tendon_names), 'tendon')}"
     )
     sentence = (
-        f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated at once "
-        f"from {source}: {_thousands(used)} samples"
+        f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated "
+        f"together from {source}: {_thousands(used)} samples"
     )
     yield sentence + (f"; {_thousands(held)} more were held out to judge the result." if held else ".")
     out = sum(recording.get("contact_left_out") or 0 for recording in recordings)
@@ -293,7 +293,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
     if innovations["nis"]["mean"] is not None:
         lags = ", ".join("-" if value is None else f"{value:.2f}" for value in innovations["whiteness"]["lag_one"])
         yield (
-            f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} where the noise settings "
+            f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} if the noise settings "
             f"hold), autocorrelation at lag one {lags}"
         )
     samples, worth = (innovations["effective"][key] for key in ("samples", "worth"))
@@ -320,6 +320,6 @@ def _uncertainty(uncertainty: Report) -> str:
     times = ", ".join(f"{value:.3g}" for value in uncertainty["inflation"])
     left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
     return (
-        f"uncertainty of the modelled friction torque: {size} mN·m rms, residuals {times} times the "
-        f"noise settings; contact.uncertainty reproduces it within {left} % rms"
+        f"uncertainty of the modelled friction torque by joint: {size} mN·m rms; residuals {times} times as large "
+        f"as the noise settings say; contact.uncertainty reproduces the uncertainty within {left} % rms"
     )

@@ -88,7 +88,7 @@ def headline(history: History) -> str:
 def trend_sentence(line: Line, history: History, names: Names) -> str:
     """Describe the trend of one cause."""
     what = at_place(line.title, line.where, names)
-    since = f", off the reference since {Path(line.since).name}" if line.since else ""
+    since = f", different from the reference since {Path(line.since).name}" if line.since else ""
     if line.trend is None:
         return f"{what}: {quantity(line.sizes[-1].size.now.value, line.sizes[-1].size.unit)}{since}"
     if line.trend.low <= 0.0 <= line.trend.high:

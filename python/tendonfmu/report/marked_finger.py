@@ -108,7 +108,7 @@ def friction_figure(data: Data) -> FingerFigure:
         caption.append("Only the largest are shown.")
     if unknown:
         left_out = counted(sum(unknown.values()), "place")
-        caption.append(f"Left out: {left_out} whose friction the recordings do not tell.")
+        caption.append(f"Left out: {left_out} whose friction these recordings do not determine.")
     caption += [
         f"All places of tendon {drawing.tendons[tendon - 1].name} together: {_percent(known[path][0])}."
         for tendon in sorted(unknown)

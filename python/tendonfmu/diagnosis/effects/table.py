@@ -135,8 +135,8 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="load_friction",
         title="friction grows with the force of a tendon",
         explanation=(
-            "Friction in the joint that the model has constant, or shares out among all tendons alike, grows with "
-            "the force of this tendon. Look at the bearing on the side of this tendon and at the pretension."
+            "Friction in the joint grows with the force of this tendon; the model has it constant, or growing with all "
+            "tendons alike. Look at the bearing on the side of this tendon and at the pretension."
         ),
         excited_by="strokes of this joint at two or more loads of this tendon",
         coordinate="force",
@@ -149,7 +149,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="cover_stiffness",
         title="a spring pulls at the joint",
         explanation=(
-            "A torque that grows with the joint's angle, as of a skin, a cover or a bundle of cables that bends "
+            "A torque that grows with the joint's angle, as from a skin, a cover or a bundle of cables that bends "
             "with the joint. Let the joint go without tendon forces and see where it comes to rest."
         ),
         excited_by="slow strokes of this joint over its whole range",
@@ -203,8 +203,8 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="inertia_variation",
         title="the inertia varies with the next joint's angle",
         explanation=(
-            "What this joint accelerates is nearer to its axis or farther from it as the next joint turns, whose axis "
-            "is perpendicular: the arm of a robot beyond its shoulder. The next joint feels the centrifugal torque."
+            "The mass that this joint accelerates moves towards its axis or away from it as the next joint turns, "
+            "whose axis is perpendicular, as in a robot's shoulder. The next joint feels the centrifugal torque."
         ),
         excited_by="fast starts and stops of this joint with the next one at several angles, and both in fast motion",
         coordinate="acceleration",
@@ -231,8 +231,8 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="friction_drift",
         title="friction changes over time",
         explanation=(
-            "All friction here grows or fades by a share in the course of the recording: warming up, running in, "
-            "or lubricant that is squeezed out. Compare the same motion at the start and at the end."
+            "All friction here grows or fades in proportion during the recording: warming up, running in, or "
+            "lubricant that is squeezed out. Compare the same motion at the start and at the end."
         ),
         excited_by="the same strokes at the start and at the end of a long recording, after a rest",
         coordinate="time",
@@ -331,7 +331,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         name="pulley_eccentricity",
         title="a pulley is out of round",
         explanation=(
-            "The tendon's lever varies as a sine of the pulley's angle: its centre is beside its axis. Measure "
+            "The tendon's lever varies as a sine of the pulley's angle: its centre is off its axis. Measure "
             "the run-out of the pulley."
         ),
         excited_by="slow strokes of this joint over its whole range, the wider the better, at two pretensions",
@@ -339,7 +339,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.passes,
         make=terms.row(sine=0, cosine=0),
         size=words.with_number(
-            words.wave("the arm goes up and down by {}"), "turns", ", {} times while the joint would turn once"
+            words.wave("the arm goes up and down by {}"), "turns", ", {} times per turn of the joint"
         ),
         find_shapes=shapes.pulley,
         scaling=True,
@@ -349,7 +349,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         title="a tendon's spring is not linear",
         explanation=(
             "The tendon gets stiffer as it is pulled, so the joint angles that are computed from its stretch are "
-            "off, and with them the velocity at each change of force. Pull the tendon against a stop and plot "
+            "wrong, and so is the velocity whenever the force changes. Pull the tendon against a stop and plot "
             "force over position."
         ),
         excited_by="changes of the pretension over a wide range while the joints move, with joint encoders beside them",

@@ -403,11 +403,11 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
         purpose = f"It distinguishes two causes that look alike in the present recordings: {what}."
     else:
         hides = "other numbers of the model imitate it" if first.question.absorbed else "the noise hides it"
-        purpose = f"Then this would show: {what}. In the present recordings {hides}."
+        purpose = f"That would show: {what}. In the present recordings {hides}."
     titles = dict.fromkeys(answer.question.cause.candidate.title for answer in others)
     more = [title for title in titles if title not in what]
     rest = [f"{len(more) - LISTED} more"] * (len(more) > LISTED)
-    also = f" It also helps with: {'; '.join([*more[:LISTED], *rest])}." if more else ""
+    also = f" It would also help to see: {'; '.join([*more[:LISTED], *rest])}." if more else ""
     return f"{first.entry.sentence} {purpose}{also}"
 
 

@@ -36,10 +36,10 @@ LENGTH = [
     (0.0005, 0.2, "m", "a finger's tendon moves by centimetres"),
     (0.5, 300.0, "mm", "a finger's tendon moves by centimetres"),
 ]
-ANGLE = [(0.05, 3.3, "rad", "degrees would be hardly a motion"), (10.0, 400.0, "deg", "too much for radians")]
+ANGLE = [(0.05, 3.3, "rad", "in degrees it would hardly be a motion"), (10.0, 400.0, "deg", "too much for radians")]
 TORQUE = [(0.005, 80.0, "N.m", "the usual unit")]
 ANGULAR_SPEED = [
-    (0.05, 15.0, "rad/s", "degrees per second would be hardly a motion"),
+    (0.05, 15.0, "rad/s", "in degrees per second it would hardly be a motion"),
     (40.0, 2000.0, "deg/s", "too fast for radians"),
 ]
 RANGES = {"force": FORCE, "length": LENGTH, "angle": ANGLE, "torque": TORQUE, "angular speed": ANGULAR_SPEED}

@@ -134,7 +134,7 @@ class Inspection:
     # how a text is written, as keys of `log` in a map; empty for other formats
     settings: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)  # what was recovered or could not be read
-    messages: bool = False  # whether the log holds messages, whose units are those of ROS if nothing else is said
+    messages: bool = False  # whether the log holds messages, whose units are those of ROS unless stated
 
 
 def inspect_log(file: Path, log: Log | None = None) -> Inspection:
