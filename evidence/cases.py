@@ -6,7 +6,6 @@ A row is FOLDER/rows/NAME.json (tendonfmu.tasks writes it); a case that has one 
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.util
 import json
 import math
@@ -71,11 +70,6 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def digest(*values: Any) -> str:
-    """Of all that a case depends on, for its name: what was computed with other settings is not taken for it."""
-    return hashlib.sha256(json.dumps(plain(values), sort_keys=True).encode()).hexdigest()[:12]
 
 
 def say(text: str) -> None:

@@ -65,12 +65,11 @@ JAM = {"07": 16.5}  # s; the instrument jams soon afterwards
 PRETENSION = 13.0  # N, the least whole number at which the closing cable always pulls
 
 
-def jaw_run(name: str, pretension: float | None = PRETENSION, whole: bool = False) -> tf.Recording:
+def jaw_run(name: str) -> tf.Recording:
     """A run of the jaw, up to its jam."""
     file = DATA / "davinci_tool" / "Tool_4_Maryland_L_4" / f"{name}.TXT"
-    options = {} if pretension is None else {"pretension": pretension}
-    recording = of_columns(file.with_name(name), convert_file("davinci", file, options))
-    return recording if whole or name not in JAM else recording[: JAM[name]]
+    recording = of_columns(file.with_name(name), convert_file("davinci", file, {"pretension": PRETENSION}))
+    return recording[: JAM[name]] if name in JAM else recording
 
 
 def jaw() -> Machine:

@@ -40,28 +40,25 @@ class Case:
 
 
 def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
-    """diagnosis.json of the command as a user calls it, in a folder of its own, and its processor time [s]."""
+    """diagnosis.json of the command as a user calls it, in a folder of its own, and its processor time [s].
+
+    Raises RuntimeError with the command's last line where it fails.
+    """
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        seconds = run_command(["diagnose", *case.write(folder), "-o", "report"], folder)
+        folder, before = Path(name), _seconds_of_children()
+        command = [sys.executable, "-m", "tendonfmu.cli", "diagnose", *case.write(folder), "-o", "report"]
+        ended = subprocess.run(
+            [*command, "--no-progress"],
+            cwd=folder,
+            timeout=LIMIT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        if ended.returncode:
+            raise RuntimeError((ended.stdout.strip().splitlines() or [f"exit status {ended.returncode}"])[-1])
         report = json.loads((folder / "report" / "diagnosis.json").read_text(encoding="utf-8"))
-    return report, seconds
-
-
-def run_command(arguments: list[str], folder: Path) -> float:
-    """Processor time [s] of `tendonfmu` with these arguments; raises RuntimeError with its last line where it fails."""
-    before = _seconds_of_children()
-    ended = subprocess.run(
-        [sys.executable, "-m", "tendonfmu.cli", *arguments, "--no-progress"],
-        cwd=folder,
-        timeout=LIMIT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    if ended.returncode:
-        raise RuntimeError((ended.stdout.strip().splitlines() or [f"exit status {ended.returncode}"])[-1])
-    return _seconds_of_children() - before
+    return report, _seconds_of_children() - before
 
 
 def _seconds_of_children() -> float:

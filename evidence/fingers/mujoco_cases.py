@@ -94,8 +94,8 @@ NUMBERS = range(1, len(PLANS) + 1)
 SEED = 7100
 
 
-def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS) -> Case:
-    """The case of a number (from 1); shorter recordings are beginnings of the full ones."""
+def make(number: int) -> Case:
+    """The case of a number (from 1)."""
     plan, seed = PLANS[number - 1], SEED + number
     rng = np.random.default_rng(seed)
     plain = finger(plan, rng)
@@ -103,8 +103,8 @@ def make(number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float 
     nominal = describe(plain, plan, rng)
     motions = [random_motion(plan.joints, rng, plan.speed) for _ in range(2)]
     still = dataclasses.replace(physics, pushes=())  # nobody pushes in the test recording
-    train = run(physics, motions[0], train_seconds + DELAY, plan.rate)
-    test = run(still, motions[1], test_seconds + DELAY, plan.rate)
+    train = run(physics, motions[0], TRAIN_SECONDS + DELAY, plan.rate)
+    test = run(still, motions[1], TEST_SECONDS + DELAY, plan.rate)
     frames = [record(trace, plan, np.random.default_rng((seed, k))) for k, trace in enumerate((train, test))]
     truth = Truth(plan.hidden, plan.joint, plan.tendon, also=ALSO)
     return Case(nominal, frames[0], frames[1], truth)

@@ -12,7 +12,7 @@ from evidence.fingers import numpy_capstan, numpy_karnopp, numpy_maxwell, numpy_
 from evidence.fingers.foreign import TEST_SECONDS, TRAIN_SECONDS, Array, Case, Truth, frame
 
 # What a simulator has although no description can say it in its laws; naming that is not false. Presliding is never
-# false, in any case (diagnosis/foreign_cases.py).
+# false, in any case (evidence/diagnosis).
 ALSO = {
     # Friction that fades in with tanh(v / vs) is the Stribeck effect of a negative amplitude.
     numpy_tanh: ("stribeck",),
@@ -55,26 +55,16 @@ PLANS = {  # by number; the missing ones were of a simulator that is gone
     22: Plan(numpy_capstan, "unknown_catch", joint=2),
 }
 NUMBERS = tuple(PLANS)
+SEED = 4200  # of motion and noise; the finger is that of its simulator
 
 
-SEED = 4200
-
-
-def make(
-    number: int, train_seconds: float = TRAIN_SECONDS, test_seconds: float = TEST_SECONDS, seed: int = SEED
-) -> Case:
-    """The case of a number (from 1). seed: of motion and noise; the finger is that of its simulator."""
+def make(number: int) -> Case:
+    """The case of a number (from 1)."""
     plan = PLANS[number]
     simulator = plan.simulator
-    train = simulator.simulate(plan.hidden, train_seconds, np.random.default_rng((seed, number, 1)))
-    test = simulator.simulate(plan.hidden, test_seconds, np.random.default_rng((seed, number, 2)))
-    truth = Truth(
-        plan.hidden,
-        joint=plan.joint,
-        tendon=plan.tendon,
-        also=ALSO.get(simulator, ()),
-        survives=plan.survives,
-    )
+    train = simulator.simulate(plan.hidden, TRAIN_SECONDS, np.random.default_rng((SEED, number, 1)))
+    test = simulator.simulate(plan.hidden, TEST_SECONDS, np.random.default_rng((SEED, number, 2)))
+    truth = Truth(plan.hidden, plan.joint, plan.tendon, ALSO.get(simulator, ()), plan.survives)
     return Case(simulator.describe(plan.hidden), recording(train), recording(test), truth)
 
 

@@ -7,11 +7,10 @@ import sys
 from pathlib import Path
 
 from evidence.cases import EXAMPLES
-from evidence.fit import paper_figures, recalibration, recovery
+from evidence.fit import paper_figures, recalibration
 from evidence.part import Figures, Part
 from evidence.table import of_cells, table
 
-SEEDS = (1, 2, 3, 4)  # of recordings made in MuJoCo
 HAND = ("excite, 10 N", "excite, 40 N", "strokes, 10 N", "strokes, 40 N")
 RATIOS = ("after/before: median", "90 %", "worst", "above 1.05")
 
@@ -24,24 +23,6 @@ def virtual_hand(folder: Path, workers: int) -> Figures:
     lines = [[*line[:2], *line[4:]] for line in printed if line[1] != "constant" and line[2] != "asymmetric"]
     best = next(line for line in lines if line[:2] == ["of the paper", "varied"])
     return {"lines": lines, "left": [float(cell.split()[0].strip("*")) for cell in best[2:]]}
-
-
-def written_back(folder: Path, workers: int) -> Figures:
-    """Friction fitted on recordings made in MuJoCo and written back into a model, against the model that moved."""
-    from mujoco_friction import recover
-
-    runs = []
-    for seed in SEEDS:
-        (folder / f"{seed}").mkdir(exist_ok=True)
-        runs.append(recover(folder / f"{seed}", seed))
-    lines, inside = [], 0
-    for values in zip(*runs, strict=True):
-        first = values[0]
-        unit = "mN·m" if first.attribute == "frictionloss" else "mN·m·s/rad"
-        cells = [f"{1e3 * value.value:.2f} ± {1e3 * value.error:.2f}" for value in values]
-        lines.append([f"`{first.attribute}` of {first.joint}, {unit}", f"{1e3 * first.true:g}", *cells])
-        inside += sum(abs(value.value - value.true) <= 1.96 * value.error for value in values)
-    return {"inside": inside, "of": sum(map(len, runs)), "lines": lines}
 
 
 def contact_table(figures: Figures) -> str:
@@ -70,25 +51,6 @@ def prediction_table(figures: Figures) -> str:
 
 
 PARTS = {
-    "recovery": Part(
-        recovery.measure,
-        headlines={
-            f"{setting}.{figure}": interval
-            for setting in recovery.SETTINGS
-            for figure, interval in {
-                "identifiable, least": (0.7, 1.0),
-                "batch: within 3 standard errors": (0.99, 1.0),
-                "batch: mean square": (0.8, 1.25),
-                "not converged": (0, 0),
-            }.items()
-        },
-        tables={"recovery": of_cells("lines", ["", *recovery.SETTINGS])},
-    ),
-    "levers": Part(
-        recovery.levers,
-        headlines={"numbers": (472, 472), "usual": (0.78, 0.84), "worst": (0.1, 0.25)},
-        tables={"levers": of_cells("lines", ["", "identifiable of 472", ""])},
-    ),
     "recalibration": Part(
         recalibration.measure,
         minutes=2.0,
@@ -103,13 +65,6 @@ PARTS = {
         virtual_hand,
         headlines={"left.0": (10, 20), "left.1": (10, 25), "left.2": (10, 20), "left.3": (10, 25)},
         tables={"residual": of_cells("lines", ["bias", "training", *HAND], 2)},
-    ),
-    "written_back": Part(
-        written_back,
-        minutes=0.1,
-        needs=("mujoco",),
-        headlines={"inside": (15, 16), "of": (16, 16)},
-        tables={"numbers": of_cells("lines", ["", "true", *(f"recording {seed}" for seed in SEEDS)])},
     ),
     "paper": Part(
         paper_figures.measure,

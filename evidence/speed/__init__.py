@@ -1,4 +1,4 @@
-"""How fast is a step: of the C interface, of the FMUs, from Python, and of the simulated finger?
+"""How fast is a step: of the C interface, of the FMU, and of the simulated finger?
 
 bench_step.cpp and bench_fmu.cpp are built by CMake with TENDONFMU_BUILD_BENCH.
 """
@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-import tendonfmu as tf
 from evidence import table
-from evidence.cases import EXAMPLES, INDEX_RIG, ROOT, say
+from evidence.cases import INDEX_RIG, ROOT, say
 from evidence.part import Figures, Part
 from tendonfmu.arrays import Numbers
 from tendonfmu.model import native
@@ -104,7 +103,7 @@ def motion(description: Description, shaking: bool = False) -> Numbers:
 
 
 def write_cases(folder: Path) -> list[Path]:
-    """Descriptions and their samples, as bench_case.h reads them."""
+    """Model images and their samples, as bench_case.h reads them."""
     middle = finger(4, 8, 5)
     presliding = {"extensions": [{"effect": "presliding", "displacement": 0.05}]}
     cases: dict[str, tuple[Description, bool]] = {
@@ -116,9 +115,9 @@ def write_cases(folder: Path) -> list[Path]:
         "16x64x5": (finger(16, 64, 5), False),
     }
     for name, (description, shaking) in cases.items():
-        (folder / f"{name}.json").write_text(json.dumps(description), encoding="utf-8")
+        (folder / f"{name}.image").write_bytes(native.image_from_json(json.dumps(description)))
         motion(description, shaking).tofile(folder / f"{name}.samples")
-    return [folder / f"{name}.json" for name in cases]
+    return [folder / f"{name}.image" for name in cases]
 
 
 def bench(folder: Path, target: str, files: list[Path]) -> dict[str, float]:
@@ -162,63 +161,13 @@ STEPS = {
     "avx2/1x2x1": "AVX2, 1 joint × 2 tendons × 1 point",
     "avx2/16x64x5": "AVX2, 16 joints × 64 tendons × 5 points",
 }
-WAYS = {"fmi2": "FMI 2.0, value by value", "fmi3": "FMI 3.0, arrays"}
+WAYS = {"fmi2": "FMI 2.0, value by value"}
 
 
 def time_table(names: Mapping[str, str], head: str) -> Callable[[Figures], str]:
     return lambda figures: table.table(
         [head, "time, ns"], [[words, f"{figures[name]:,.0f}"] for name, words in names.items() if name in figures]
     )
-
-
-# --- from Python ------------------------------------------------------------------------------------------------------
-
-DEMO = EXAMPLES / "demo_recording"
-INTERFACE = {  # description and recording
-    "2 joints, 4 tendons, presliding": ("two_joints.json", "two_joints_unseen.parquet"),
-    "4 joints, 8 tendons, all that `calibrate` writes": ("index_finger_calibrated.json", "index_finger_pushes.parquet"),
-}
-
-
-def least(call: Callable[[], object]) -> float:
-    """Least processor time of several calls, s: other jobs on the machine make it longer."""
-    times = []
-    for _ in range(15):
-        begin = time.process_time()
-        call()
-        times.append(time.process_time() - begin)
-    return min(times)
-
-
-def sample_costs(description: Path, recording: tf.Recording) -> list[float]:
-    """µs a sample of the C library in one call, of `run`, and of `Runner.step` one sample after the other."""
-    model = tf.read_finger(description)
-    instance, runner, arrays = native.Instance(model.image), tf.Runner(model), recording.arrays()
-    columns = (recording.time.tolist(), list(arrays["tendon_force"]), list(arrays["tendon_position"]))
-
-    def library() -> None:
-        instance.reset()
-        instance.run(arrays)
-
-    def step() -> None:
-        runner.reset()
-        for at, force, position in zip(*columns, strict=True):
-            runner.step(at, force, position)
-
-    calls = (library, lambda: tf.run(model, recording), step)
-    return [1e6 * least(call) / len(recording) for call in calls]
-
-
-def python(_folder: Path, _workers: int) -> Figures:
-    return {
-        name: sample_costs(DEMO / description, tf.read_recording(DEMO / file))
-        for name, (description, file) in INTERFACE.items()
-    }
-
-
-def python_table(figures: Figures) -> str:
-    lines = [[name, *(f"{value:.2f}" for value in values)] for name, values in figures.items()]
-    return table.table(["µs a sample", "C library, one call", "`tf.run`", "`Runner.step`"], lines)
 
 
 # --- the simulated finger ---------------------------------------------------------------------------------------------
@@ -279,10 +228,9 @@ PARTS = {
     ),
     "fmu_steps": Part(
         fmu_steps,
-        headlines={"fmi2": (0.0, 600.0), "fmi3": (0.0, 600.0)},
+        headlines={"fmi2": (0.0, 600.0)},
         tables={"steps": time_table(WAYS, "a step by the")},
     ),
-    "python": Part(python, minutes=0.3, tables={"samples": python_table}),
     "plant": Part(
         plant,
         minutes=0.5,

@@ -1,18 +1,7 @@
-// Time of a step of the C interface: bench_step [OPTIONS OF GOOGLE BENCHMARK] FILE.json ... (bench_case.h). Counter
-// per_step is the figure of docs/evidence/speed.md.
-#include <benchmark/benchmark.h>
-
-#include <memory>
-
+// Time of a step of the C interface: bench_step [OPTIONS OF GOOGLE BENCHMARK] FILE.image ... (bench_case.h).
 #include "bench_case.h"
 
 namespace {
-
-using finger_pointer = std::unique_ptr<tendonfmu_finger, decltype(&tendonfmu_destroy)>;
-
-finger_pointer finger_of(const bench_case& made) {
-  return {tendonfmu_create(made.image.data(), made.image.size(), nullptr, 0), &tendonfmu_destroy};
-}
 
 // Steps one by one, as a control loop does.
 void run(tendonfmu_finger* finger, const bench_case& made) {
@@ -21,7 +10,8 @@ void run(tendonfmu_finger* finger, const bench_case& made) {
   outputs.compensated_torque = torque.data();
   tendonfmu_reset(finger);
   for (std::size_t k = 0; k < made.samples; ++k) {
-    const tendonfmu_inputs inputs = made.inputs(k);
+    const double* row = made.inputs(k);
+    const tendonfmu_inputs inputs = {row, row + made.tendons, nullptr, nullptr};
     if (k == 0) {
       tendonfmu_initialise(finger, made.time[k], &inputs);
     } else {
@@ -33,7 +23,7 @@ void run(tendonfmu_finger* finger, const bench_case& made) {
 }
 
 void steps(benchmark::State& state, const bench_case& made, const char* kernel) {
-  const finger_pointer finger = finger_of(made);
+  const finger_pointer finger = made.finger();
   if (tendonfmu_set_kernel(finger.get(), kernel) != TENDONFMU_OK) {
     state.SkipWithError("this kernel cannot run here");
     return;
@@ -41,8 +31,7 @@ void steps(benchmark::State& state, const bench_case& made, const char* kernel) 
   for (auto _ : state) {
     run(finger.get(), made);
   }
-  const auto count = static_cast<double>(state.iterations() * static_cast<std::int64_t>(made.samples));
-  state.counters["per_step"] = benchmark::Counter(count, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  count_steps(state, made);
 }
 
 }  // namespace
@@ -51,7 +40,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   for (int k = 1; k < argc; ++k) {
     const std::filesystem::path file = argv[k];
-    const auto made = std::make_shared<const bench_case>(read_case(file));
+    const auto made = std::make_shared<const bench_case>(file);
     for (const char* kernel : {"avx2", "sse2", "plain"}) {
       const std::string name = std::string(kernel) + "/" + file.stem().string();
       benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) { steps(state, *made, kernel); });

@@ -1,8 +1,9 @@
-"""Simulated fingers of which one number has changed between two recordings, or none.
+"""How often does `diagnose --reference` name what has changed between two recordings, and how often a wrong change?
 
-Simulators that share no code with the product (evidence/fingers), whose truth is exact. `then` and `now` are the same
-finger; motion and noise have seeds of their own. The description is the simulator's, fitted to `then`. Constants of the
-product were chosen on the cases of odd number; those of even number judge it.
+One number of a simulated finger has changed between two recordings, or none. The simulators share no code with the
+product (evidence/fingers). `then` and `now` are the same finger; motion and noise have seeds of their own. The
+description is the simulator's, fitted to `then`. Constants of the product were chosen on the cases of odd number; those
+of even number judge it.
 """
 
 from __future__ import annotations
@@ -350,10 +351,12 @@ def _of(hits: int | None, cases: int) -> str:
     return f"{hits} ({100 * known.low:.0f}–{100 * known.high:.0f} %)"
 
 
-PART = Part(
-    run=measure,
-    minutes=80.0,
-    needs=("mujoco",),
-    headlines={"even.nothing changed.wrong": (0, 0), "strong_named": (0.8, 1.0)},
-    tables={"counts": counts_table},
-)
+PARTS = {
+    "simulated": Part(
+        run=measure,
+        minutes=80.0,
+        needs=("mujoco",),
+        headlines={"even.nothing changed.wrong": (0, 0), "strong_named": (0.8, 1.0)},
+        tables={"counts": counts_table},
+    )
+}
