@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.cause import Cause
+from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
 from tendonfmu.diagnosis.effects.description_edit import data_number
 from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
 from worn_finger import described
@@ -84,6 +85,23 @@ def test_every_number_can_have_with_numbers(seed: int) -> None:
 def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Cause]:
     numbers = numbers_of(data)
     return {each.key: each for each in number_hypotheses(numbers, len(numbers), 0)}
+
+
+def test_places_of_one_effect_can_have_changed_together() -> None:
+    found = by_key(described())
+    levels = {key: each.direction.level for key, each in found.items() if key[0] == "edge_friction"}
+    assert levels == {
+        ("edge_friction", None, None): EVERYWHERE,
+        ("edge_friction", 1, 1): HERE,
+        ("edge_friction", 1, 2): HERE,
+    }
+    levels = {key: each.direction.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
+    assert levels[("edge_friction", None, None)] == EVERYWHERE
+    assert {key[1:] for key, level in levels.items() if level == SOMEWHERE} == {
+        (1, None),
+        (2, None),
+        *((None, i) for i in range(1, 5)),
+    }
 
 
 def test_both_sides_of_a_law_change_alike_or_against_each_other() -> None:

@@ -23,13 +23,36 @@ from c_driver import SAMPLES, STEP, arguments, compile_driver, moving, printed, 
 from fmi2_headers import FMPY_HEADERS, write_headers
 from fmu_binary import FINGER, UnpackedFmu, fmi_platform, unpack
 from optional_parts import require
+from repository_paths import ROOT
 from tendonfmu.fmu import build_fmu
 from tendonfmu.fmu.packaging import members
 from tendonfmu.model import read_finger
 
+sys.path.insert(0, str(ROOT / "fmu_src" / "source_fmu"))
+
+from collect_sources import external_names
+
 needs_compiler = pytest.mark.skipif(
     sys.platform != "linux" or not all(map(shutil.which, ("cc", "nm"))), reason="SKIPPED: needs Linux, cc and nm"
 )
+
+
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        ("int plain(void);", {"plain"}),
+        (
+            "/* int x(void); */ double* pointer(int a) {\n  if (a) { return 0; }\n}\nint next(void) { }",
+            {"pointer", "next"},
+        ),
+        ("const row table[] = {\n  {1, f(2)},\n};\nint after;", {"table", "after"}),
+        ("static int own(void) { return 0; }\nHOT_INLINE int hot(void) { return 0; }", set()),
+        ('#define MACRO(x) \\\n  int x(void);\nconst char* text = "int in_text(void);";', {"text"}),
+    ],
+)
+def test_external_names_of_c(code: str, names: set[str]) -> None:
+    """Those that a source FMU gives the prefix of its finger."""
+    assert external_names(code) == names
 
 
 # --- a program in C ---------------------------------------------------------------------------------------------------
