@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes
     from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
-    from .series import make_grid
     from .signal_choice import estimation_recordings
     from .sizes import size_at
     from .sliding import settled, without_stuck

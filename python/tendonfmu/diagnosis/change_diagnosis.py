@@ -24,12 +24,13 @@ from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.result import Diagnosis, Event, Experiment, SteadyLoad, Unexplained
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
-from tendonfmu.diagnosis.series import Series, make_grid
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings
 from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
 from tendonfmu.diagnosis.steady_load import steady_load
 from tendonfmu.diagnosis.view import residual_alone
 from tendonfmu.estimate import Choice
+from tendonfmu.recordings import make_grid
 from tendonfmu.statistics import Interval
 
 LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much

@@ -30,10 +30,10 @@ from tendonfmu.diagnosis.reference import (
     outside,
 )
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import Grid, block_prediction, exact_model, sample_blocks
+from tendonfmu.diagnosis.series import block_prediction, exact_model
 from tendonfmu.diagnosis.view import look, nominal_scale, residual_alone
 from tendonfmu.model import moment_arms
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, Grid, sample_blocks
 from tendonfmu.statistics import Grams, Interval, Products
 
 MOST_CHANGES = 4

@@ -25,9 +25,9 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.remainder_features import features, run_starts
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Event
-from tendonfmu.diagnosis.series import Grid, Series
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.view import bias_of, residual_alone, series_of
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, Grid
 from tendonfmu.statistics import Folds, Interval, Splines, blocks_of, make_folds, paired_gain
 
 LEVEL = 0.01  # probability of any event in recordings without one

@@ -25,12 +25,11 @@ from tendonfmu.diagnosis.remainder_map import remainder_map
 from tendonfmu.diagnosis.result import Diagnosis, Event, Invisible, Unexplained
 from tendonfmu.diagnosis.search import Search, search
 from tendonfmu.diagnosis.selection import invisible_effects
-from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import residual_alone, series_of
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, make_grid
 
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
 

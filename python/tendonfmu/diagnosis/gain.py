@@ -19,11 +19,11 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.result import ModelErrors
-from tendonfmu.diagnosis.series import block_prediction, make_grid, sample_blocks
+from tendonfmu.diagnosis.series import block_prediction
 from tendonfmu.diagnosis.view import bias_of, series_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.model import number_of, without_friction
-from tendonfmu.recordings import FitRecording, rms
+from tendonfmu.recordings import FitRecording, make_grid, rms, sample_blocks
 from tendonfmu.statistics import BlockIndex, Interval, Span, blocks_of, gain_interval, make_folds, variance_between
 
 

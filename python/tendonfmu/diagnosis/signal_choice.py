@@ -25,18 +25,21 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes, noise_of
 from tendonfmu.diagnosis.selection import CERTAIN, rms_gain
-from tendonfmu.diagnosis.series import Grid, Series, make_grid, sample_blocks
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import View, bias_of, look, nominal_scale, predicted_of, series_of
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
 from tendonfmu.recordings import FEWEST as FEWEST_SAMPLES
 from tendonfmu.recordings import (
     FitRecording,
+    Grid,
     Held,
     Signals,
     at_rows,
     joint_position_noise,
+    make_grid,
     prepare,
+    sample_blocks,
     smoothing_of,
     zero_phase,
 )

@@ -18,11 +18,10 @@ import numpy as np
 
 from tendonfmu.arrays import Flags
 from tendonfmu.diagnosis.extension_fit import FittedModel, fit_numbers
-from tendonfmu.diagnosis.series import Grid
 from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings, part_of, starting_point
 from tendonfmu.diagnosis.view import residual_alone, series_of
 from tendonfmu.model import Finger, effects, sliding_velocity, velocity_threshold
-from tendonfmu.recordings import FitRecording, Signals
+from tendonfmu.recordings import FitRecording, Grid, Signals
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 
 WORSE = 1.8  # times the error of the samples that slide: a smaller error of stuck ones does not mislead

@@ -25,10 +25,10 @@ from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
 from tendonfmu.diagnosis.hypotheses import hypotheses
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.selection import Selection
-from tendonfmu.diagnosis.series import Grid, Series, block_prediction, exact_model, make_series, sample_blocks
+from tendonfmu.diagnosis.series import Series, block_prediction, exact_model, make_series
 from tendonfmu.estimate import Estimator
 from tendonfmu.model import moment_arms, native, number_of
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, Grid, sample_blocks
 from tendonfmu.statistics import (
     KNOTS,
     TRENDS,

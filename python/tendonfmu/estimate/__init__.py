@@ -10,6 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
+    from .core_runs import CoreRuns, Direction, with_angles
     from .estimates import known_numbers
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         unknown_names,
     )
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
+    from .slow_drift import SlowDrift, slowest_drift
     from .structure import (
         MAGNITUDES,
         Choice,
