@@ -59,6 +59,8 @@ class CoreRuns:
         [B] the stretch without a gap that a block belongs to, from 0.
     time, still
         [B] centre of each block (s), and whether all joints stand still in it.
+    torque, speed
+        [B, n] torque to explain (N·m), and joint speeds (rad/s).
     """
 
     def __init__(
@@ -80,8 +82,10 @@ class CoreRuns:
         )
         self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
         self.time: Numbers = self.grid.means([recording.time for recording in recordings])
-        speed = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
-        self.still: Flags = np.all(speed <= number_of(data, "velocity_threshold.joint"), axis=1)
+        self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
+        fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
+        self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
+        self.still: Flags = np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
         self._instances = _Instances()
 
