@@ -73,7 +73,7 @@ class CoreRuns:
         threads: int = 0,
     ) -> None:
         """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
-        self.data = data
+        self.data, self._rate, self._threads = data, rate, threads
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self._stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
@@ -99,6 +99,10 @@ class CoreRuns:
         other = object.__new__(CoreRuns)
         other.__dict__ = {**self.__dict__, "data": data}
         return other
+
+    def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
+        """Return runs of the same description over other signals of the same samples."""
+        return CoreRuns(self.data, recordings, self.grid, rate=self._rate, threads=self._threads)
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T.

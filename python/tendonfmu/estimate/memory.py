@@ -75,7 +75,7 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
 
 
 def _is_cord(data: Data, path: str) -> bool:
-    return extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]["effect"] == CORDS
+    return bool(extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]["effect"] == CORDS)
 
 
 def _number(data: Data, path: str) -> float:

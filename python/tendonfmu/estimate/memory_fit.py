@@ -22,6 +22,7 @@ from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
 
+BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_FALL = 1e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
@@ -108,9 +109,7 @@ class MemoryProblem:
 
     def linearised(self, state: State) -> Linearised:
         """Return the derivatives at a state."""
-        here = self.values(state.u)
-        directions = [self._direction(k, state.u, here) for k in range(len(state.u))]
-        columns = self.drift.without(self.runs.columns(directions, self._of_description(here)))
+        columns = self.drift.without(self._columns(state.u, self.runs))
         weight = self.blocks / len(state.residual) / self.variance(state.residual)
         information = np.zeros((len(state.u), len(state.u)))
         gradient = np.zeros(len(state.u))
@@ -118,6 +117,27 @@ class MemoryProblem:
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
+
+    def _columns(self, u: Numbers, runs: CoreRuns) -> Numbers:
+        """Return [B, n, u] the derivatives of τ − T by u (N·m)."""
+        here = self.values(u)
+        directions = [self._direction(k, u, here) for k in range(len(u))]
+        return runs.columns(directions, self._of_description(here))
+
+    def slopes(self, state: State, runs: CoreRuns) -> Numbers:
+        """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
+        return -self._columns(state.u, runs) / self.scale.slopes(self.scale.unknowns(state.u))
+
+    def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
+        """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
+        seconds = self.runs.grid.step * len(state.residual)
+        length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
+        size = max(1, round(length / self.runs.grid.step))
+        weight = self.blocks / len(state.residual) / self.variance(state.residual)
+        rows = np.einsum("rju,rj->ru", linearised.columns, state.residual * weight)
+        sums = np.add.reduceat(rows, np.arange(0, len(rows), size), axis=0)
+        scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
+        return scores - scores.mean(axis=0), length
 
     def _direction(self, k: int, u: Numbers, here: Mapping[str, float]) -> Direction:
         """Return the move of unknown k, inwards at its upper bound."""
@@ -192,4 +212,3 @@ def best_of(problem: MemoryProblem, begins: Sequence[State], most: int, toleranc
     """Go a few steps down from each start; return where they end, the best first."""
     ends = [minimise(problem, begin, most, tolerance).state for begin in begins]
     return sorted(ends, key=lambda state: state.cost)
-
