@@ -206,6 +206,7 @@ class FrictionFit(Configured):
             effective=options.effective_samples,
             previous=previous,
             noise=number_of(self.start_.data, "bias.noise_std"),
+            torque=float(np.sqrt(np.mean([np.mean(each.target[each.train] ** 2) for each in self.recordings_]))),
         )
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         try:

@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.model import extension_rows, moment_arms
+from tendonfmu.model import extension_rows
 
 PRESLIDING, CORDS = "presliding", "cord_stretch"
 TIMES = (1.0, 0.005)  # s, of a relaxation: cables creep for seconds, contacts of a soft constraint for milliseconds
@@ -81,8 +81,3 @@ def _is_cord(data: Data, path: str) -> bool:
 def _number(data: Data, path: str) -> float:
     row = extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]
     return float(row[path.rpartition(".")[2]])
-
-
-def arm(data: Data) -> float:
-    """Return a typical moment arm (m)."""
-    return float(abs(moment_arms(data)).max())

@@ -65,14 +65,14 @@ def coarse_problem(
     """Return the problem over few windows at a low rate, with the prior of guesses."""
     runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
     problem = MemoryProblem(structure, estimator, runs, SlowDrift(runs.time, runs.stretch, runs.used))
-    problem.mean = problem.scale.coordinates(estimator.start)
-    problem.known = np.diag(guess_size(problem, estimator) ** -2.0)
+    problem.mean, problem.known = guess_prior(problem)
     return problem
 
 
-def guess_size(problem: MemoryProblem, estimator: Estimator) -> Numbers:
-    """Return [u] by how much the numbers of a guess are off, in coordinates."""
-    return np.where(problem.scale.log, FACTOR, estimator.scale / problem.scale.size)
+def guess_prior(problem: MemoryProblem) -> tuple[Numbers, Numbers]:
+    """Return mean [u] and information [u, u] of coordinates that were guessed: off by their size, or by a factor."""
+    size = np.where(problem.scale.log, FACTOR, 1.0)
+    return problem.scale.coordinates(problem.estimator.start), np.diag(size**-2.0)
 
 
 def from_starts(

@@ -35,13 +35,15 @@ class Prior:
     def of(cls, estimator: Estimator, settings: Settings) -> Prior:
         start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
         covariance, estimated = np.zeros((len(names),) * 2), np.zeros(len(names), dtype=bool)
+        is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
         previous = settings.previous
         if previous is None:
-            return cls(covariance, scale, estimated)
+            # a bias of 0 at the start is no guess of its size: any torque that was measured may be its part
+            size = np.where(is_bias, np.maximum(scale, settings.torque), scale)
+            return cls(covariance, size, estimated)
         known = [unknown.path in previous.values for unknown in estimator.unknowns]
         estimated = np.array([name in previous.names for name in names] if len(previous.names) else known, dtype=bool)
         size = np.where(estimated, np.maximum(np.abs(start), _LEAST * scale), scale)
-        is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
         size[is_bias] = np.maximum(size[is_bias], settings.noise)
         place = {name: k for k, name in enumerate(previous.names)}
         both = [k for k, name in enumerate(names) if name in place and estimated[k]]
