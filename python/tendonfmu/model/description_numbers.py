@@ -72,13 +72,13 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
         for name, magnitude in MAGNITUDES[row["effect"]].items():
             missing = LEFT_OUT.get(name, 0.0)
             value = missing if row.get(name) is None else float(row[name])
-            left_out = missing != 0.0 and value == missing
+            left_out = value == missing and (missing != 0.0 or row["effect"] == "presliding")
             yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", value, magnitude, left_out)
 
 
 def place_of(row: Mapping[str, Any]) -> str:
     """Describe an extension as an appendix to a text."""
-    where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
+    where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon", "level") if row.get(key) is not None)
     return f", of {row['effect']}" + (f" at {where}" if where else "")
 
 
