@@ -272,7 +272,7 @@ HOT_INLINE quad own_friction(tendonfmu_finger* f, size_t j, quad sum) {
   }
   const quad_mask slides = slides_at(f, f->joints * f->tendon_lanes + j);
   const quad limit = limit_of(quad_add(both, quad_load(s->own_limit + j))), held = torque_of_memory(f, j, limit);
-  const quad share = quad_keep(quad_greater(limit, quad_set(0.0)), quad_div(held, limit));
+  const quad share = quad_div(held, quad_max(limit, quad_set(1e-300))); /* of a limit of 0 nothing is held */
   const quad part = quad_select(slides, share, quad_set(1.0));
   quad_store(s->joint_friction + j, quad_mul(part, joint));
   quad_store(s->load_friction + j, quad_mul(part, quad_load(s->load_friction + j)));
