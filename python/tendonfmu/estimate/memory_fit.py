@@ -8,7 +8,7 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,8 @@ from tendonfmu.estimate.structure import FIXED, Structure
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
-LEAST_FALL = 1e-4  # of the cost, for each joint and effective block
+LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
+LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -83,7 +84,8 @@ class MemoryProblem:
             low, high = (self.scale.coordinates(end) for end in ends)
         self.lower = np.where(log, np.maximum(low, -FARTHEST), low)
         self.upper = np.where(log, np.minimum(high, FARTHEST), high)
-        self.blocks = np.full(runs.joints, float(drift.used.sum()))  # N_j: those that count
+        self.span: Numbers = np.eye(len(log))  # [u, v] directions that a step may take, in coordinates
+        self.blocks = np.full(runs.joints, drift.used.sum() * runs.grid.step / LASTING)  # N_j: those that count
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30
         self.mean, self.known = np.zeros(len(log)), np.zeros((len(log), len(log)))  # u_0 and P of the prior
@@ -111,25 +113,25 @@ class MemoryProblem:
         return np.asarray(np.mean(residual**2, axis=0) + self._floor)
 
     def linearised(self, state: State) -> Linearised:
-        """Return the derivatives at a state."""
-        columns = self.drift.without(self._columns(state.u, self.runs))
+        """Return the derivatives by the directions of `span` at a state."""
+        columns = self.drift.without(self._columns(state.u, self.runs, self.span))
         weight = self.blocks / len(state.residual) / self.variance(state.residual)
-        information = np.zeros((len(state.u), len(state.u)))
-        gradient = np.zeros(len(state.u))
+        information = np.zeros((columns.shape[2],) * 2)
+        gradient = np.zeros(columns.shape[2])
         for j, share in enumerate(weight):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
 
-    def _columns(self, u: Numbers, runs: CoreRuns) -> Numbers:
-        """Return [B, n, u] the derivatives of τ − T by u (N·m)."""
+    def _columns(self, u: Numbers, runs: CoreRuns, span: Numbers) -> Numbers:
+        """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m)."""
         here = self.values(u)
-        directions = [self._direction(k, u, here) for k in range(len(u))]
+        directions = [self._direction(way, u, here) for way in span.T]
         return runs.columns(directions, self._of_description(here))
 
     def slopes(self, state: State, runs: CoreRuns) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
-        return -self._columns(state.u, runs) / self.scale.slopes(self.scale.unknowns(state.u))
+        return -self._columns(state.u, runs, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
 
     def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
         """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
@@ -142,13 +144,11 @@ class MemoryProblem:
         scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
         return scores - scores.mean(axis=0), length
 
-    def _direction(self, k: int, u: Numbers, here: Mapping[str, float]) -> Direction:
-        """Return the move of unknown k, inwards at its upper bound."""
-        step = STEP * max(1.0, abs(u[k])) if not self.scale.log[k] else STEP
-        step = -step if u[k] + step > self.upper[k] else step
-        moved = u.copy()
-        moved[k] += step
-        there = self._of_description(self.values(moved))
+    def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
+        """Return the move along a way [u], backwards where it would cross a bound."""
+        step = STEP * max(1.0, float(np.abs(u[(way != 0.0) & ~self.scale.log]).max(initial=0.0)))
+        step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
+        there = self._of_description(self.values(u + step * way))
         return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
 
     def _of_description(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -171,14 +171,15 @@ class Minimum:
 
 def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, watch: Watch | None = None) -> Minimum:
     """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors."""
-    state, damping, converged = begin, DAMPING[0], False
+    state, damping, converged, span = begin, DAMPING[0], False, problem.span
     linearised = problem.linearised(state)
     for number in range(1, most + 1):
-        gradient = linearised.gradient + problem.known @ (state.u - problem.mean)
-        matrix = linearised.information + problem.known
+        gradient = linearised.gradient + span.T @ problem.known @ (state.u - problem.mean)
+        matrix = linearised.information + span.T @ problem.known @ span
+        room = _room(span, problem.lower - state.u, problem.upper - state.u)
         while damping < DAMPING[2]:
-            step = _bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
-            tried = problem.state(state.u + step)
+            step = _bounded_step(matrix, gradient, damping, *room)
+            tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
             if tried.cost < state.cost:
                 break
             damping *= 8.0
@@ -196,6 +197,15 @@ def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, 
     return Minimum(state, linearised, number, converged)
 
 
+def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]:
+    """Return how far a step may go along each direction [v] before one of its numbers [u] is at a bound."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([low[:, None] / span, high[:, None] / span])
+    ends[:, span == 0.0] = np.inf
+    least = np.where(span == 0.0, -np.inf, ends.min(axis=0)).max(axis=0)
+    return least, np.where(span == 0.0, np.inf, ends.max(axis=0)).min(axis=0)
+
+
 def _bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
     """Return the step that minimises the damped quadratic model between bounds."""
     diagonal = np.maximum(np.diag(matrix), 1e-12 * float(np.diag(matrix).max()) + 1e-300)
@@ -209,9 +219,3 @@ def _bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbe
     room = np.minimum(low, -1e-300), np.maximum(high, 1e-300)
     found = lsq_linear(root, right, (room[0] * length, room[1] * length), method="bvls")
     return np.asarray(np.clip(found.x / length, low, high))
-
-
-def best_of(problem: MemoryProblem, begins: Sequence[State], most: int, tolerance: float) -> list[State]:
-    """Go a few steps down from each start; return where they end, the best first."""
-    ends = [minimise(problem, begin, most, tolerance).state for begin in begins]
-    return sorted(ends, key=lambda state: state.cost)
