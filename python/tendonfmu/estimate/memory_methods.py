@@ -218,6 +218,7 @@ def _weighted(
     given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(problem.runs.grid.segments)
     if settings.effective:
         problem.blocks, shares = effective_blocks(problem, first.state)
+    problem.reweighted(first.state)
     if given is None:
         now = problem.linearised(first.state)
         pull = now.information @ (first.state.u - problem.mean) - now.gradient
@@ -225,7 +226,7 @@ def _weighted(
     else:
         covariance = prior.of_spread(given)
     problem.known = inverse(covariance)
-    again = replace(first.state, cost=problem.cost(first.state.residual, first.state.u))
+    again = problem.reweighted(first.state)
     tolerance, show = settings.options.tolerance, shown(problem, "effective samples")
     last = minimise(problem, again, settings.passes, tolerance, show)
     return learned_of(problem, last, prior, given, _weights(problem, recordings, shares), first.steps, passes())
