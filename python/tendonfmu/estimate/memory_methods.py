@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -78,18 +78,23 @@ def guess_prior(problem: MemoryProblem) -> tuple[Numbers, Numbers]:
 
 
 def from_starts(
-    problem: MemoryProblem, begin: Numbers, tolerance: float, watch: Callable[[int, State], None]
+    problem: MemoryProblem,
+    begin: Numbers,
+    tolerance: float,
+    watch: Callable[[int, State], None],
+    memories: Iterable[Mapping[str, float]] | None = None,
 ) -> list[State]:
     """Go a few steps down from each start of the memory about z = `begin` [u]; return the best ends, the best first.
 
-    First the numbers of the memory and one factor for all friction of a kind move, then all numbers of the best.
+    `memories`: numbers of the memory by path to start from; None: those of `starts`. First the numbers of the memory
+    and one factor for all friction of a kind move, then all numbers of the best.
     """
     places = {unknown.path: k for k, unknown in enumerate(problem.estimator.unknowns)}
     first = problem.scale.coordinates(begin)
     whole = problem.span
     problem.span = _few_directions(problem, first)
     ends: list[State] = []
-    for start in starts(problem.runs.data):
+    for start in starts(problem.runs.data) if memories is None else memories:
         u = first.copy()
         for path, value in start.items():
             if path in places:
