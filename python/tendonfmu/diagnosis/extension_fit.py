@@ -1,48 +1,46 @@
-"""How the extended finger is fitted: the nominal description with the terms of the accepted causes, all numbers again.
+"""How a description's numbers are fitted: least squares of what runs of the core leave, without a learning bias.
 
-Likelihood, bias settings and samples are those of the nominal fit (`FrictionFit`, method batch). The numbers are not
-judged one by one here, so that a selection can fit many times.
+One constant a joint and stretch is left out of all that is compared; noise is correlated over some blocks, and prior
+knowledge of how large a number usually is counts as much as that. The derivatives come from runs of the core. Between
+two computations of them Broyden's rank-one update keeps them good enough (Broyden, Math. Comp. 19, 1965).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.effects.terms import changed_law
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,
     Estimator,
-    FrictionFitOptions,
-    Interrupted,
-    Learned,
-    Settings,
     Structure,
-    Watch,
     build_structure,
     get_number,
-    learn_batch,
+    own_copy,
+    set_number,
     unknown_names,
     unknowns,
     with_known_numbers,
     with_values,
 )
-from tendonfmu.model import effects, finger_from_data, law_path, moment_arms, native, number_of
+from tendonfmu.model import effects, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import MEMORY, bounded
 
-MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
-MOST_PASSES = 60  # over the recordings
-TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
-# The same for models that are only compared. Noise is correlated over some 20 samples, and these standard errors do not
-# know it: they are several times too small.
-ROUGH_TOLERANCE = 0.5
+MOST_STEPS = 20
+TOLERANCE = 2e-3  # of the cost: a step that lowers it by less is the last one
+RELATIVE, ABSOLUTE = 1e-3, 1e-4  # steps of derivatives, of a number and of its expected magnitude
+OF_LOGARITHM = 0.01  # the same of numbers that are fitted by their logarithm
+LOGARITHMIC = ("displacement", "stiffness", "relaxation_time", "time_constant")  # numbers of rows that may be far off
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -63,87 +61,207 @@ class FittedModel:
     # the description that says how large each number may be: its values are the standard deviations of the prior
     given: Mapping[str, Any]
     values: Mapping[str, float]  # by path of an estimated number, SI units
-    cost: float  # ½ Σ e²/S including the prior
+    cost: float = float("nan")  # Σ e² with the prior, (N·m)²
     warnings: tuple[str, ...] = ()  # sentences
     fixed: tuple[str, ...] = ()  # paths of numbers that no fit of this model changes
+    # derivatives of what is left by the unknowns, by their keys [R·n]; of the samples it was fitted to
+    slopes: Mapping[str, Numbers] = field(default_factory=dict, repr=False, compare=False)
+    scale: Numbers = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)  # of the unknowns [u]
+
+    def columns(self, samples: Samples) -> tuple[Array, Numbers]:
+        """Return the derivatives of the torque by the unknowns [B, n, u], 0 where not used, and their scale [u]."""
+        joints = len(self.data["joints"])
+        columns = np.zeros((samples.grid.blocks, joints, len(self.slopes)), dtype=np.float32)
+        for k, slope in enumerate(self.slopes.values()):
+            columns[samples.used, :, k] = -slope.reshape(-1, joints)
+        return columns, self.scale
 
 
 def fit_numbers(
     data: Mapping[str, Any],
-    recordings: Sequence[FitRecording],
+    samples: Samples,
     settings: FitSettings = FitSettings(),
     *,
     given: Mapping[str, Any] | None = None,
     fixed: tuple[str, ...] = (),
-    begin: Mapping[str, Any] | None = None,
+    known: Mapping[str, Numbers] | None = None,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is.
+    """Fit the numbers of a description, starting at its own; one without numbers stays as it is.
 
-    `begin` is the same description with better numbers, from which the search starts.
+    `known` are derivatives of a similar model, to begin with.
     """
-    # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
-    # otherwise fit by shrinking the force.
+    # The samples have the forces that the model predicts: they lack the noise, which a term that scales with the force
+    # would otherwise fit by shrinking the force.
     if not unknowns(data):
-        return FittedModel(data=data, given=data, values={}, cost=float("nan"))
+        return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
     if fixed:
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    every = _thinning(recordings, MOST_SAMPLES)
-    structure, learned = _learned(_with_noise(data, every), recordings, settings, origin, begin, every, ROUGH_TOLERANCE)
-    numbers = np.asarray(learned.estimator.values(learned.z))
-    finger = with_values(structure, numbers)
+    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
+    problem = _Problem(structure, samples)
+    x, cost, slopes = _minimised(problem, known or {})
+    numbers = problem.numbers(x)
     return FittedModel(
-        data=finger.data if every == 1 else {**finger.data, "bias": {**finger.data["bias"], **_noise(data)}},
+        data=with_values(structure, numbers).data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
-        cost=float(learned.cost),
-        warnings=tuple(learned.warnings),
+        cost=cost,
         fixed=fixed,
+        slopes=dict(zip(problem.keys, slopes.T, strict=True)),
+        scale=problem.scale,
     )
 
 
-def learn_numbers(
-    data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
-) -> tuple[Structure, Learned]:
-    """Fit the numbers of a description and return everything known about the fit."""
-    return _learned(data, recordings, settings, given, None, _thinning(recordings, MOST_SAMPLES), TOLERANCE)
+class _Problem:
+    """What the unknowns of a structure leave of samples. Some unknowns are fitted by their logarithm."""
+
+    def __init__(self, structure: Structure, samples: Samples) -> None:
+        self._structure, self._samples = structure, samples
+        self._estimator = Estimator(structure.start.image, structure.group, structure.scale)
+        chosen = [k for k, each in enumerate(self._estimator.unknowns) if not each.path.startswith("bias.")]
+        own = [self._estimator.unknowns[k] for k in chosen]
+        names = unknown_names(self._estimator)
+        self._chosen = np.array(chosen, dtype=np.intp)
+        self.keys = [key_of(structure.start.data, names[k]) for k in chosen]
+        self._is_log = np.array([_is_logarithmic(each.path, each.start) for each in own], dtype=bool)
+        self.start, self.low, self.high = (
+            self._turned(np.array([getattr(each, end) for each in own])) for end in ("start", "lower", "upper")
+        )
+        scale = self.plain_scale = np.array([each.scale for each in own])
+        self.scale = np.where(self._is_log, np.log(10.0), np.where(np.isfinite(scale) & (scale > 0.0), scale, np.inf))
+        self.start = np.clip(self.start, self.low, self.high)
+
+    def _turned(self, values: Numbers) -> Numbers:
+        return np.where(self._is_log, np.log(np.maximum(values, 1e-300)), values)
+
+    def numbers(self, x: Numbers) -> Numbers:
+        """Return the numbers of the description [p]."""
+        z = self._estimator.start.copy()
+        z[self._chosen] = np.where(self._is_log, np.exp(np.where(self._is_log, x, 0.0)), x)
+        return self._estimator.values(z)
+
+    @cached_property
+    def _paths(self) -> list[str]:
+        both = ((number.path, number.with_path) for number in self._structure.numbers)
+        return [path for pair in both for path in pair if path is not None and not path.startswith("bias.")]
+
+    def left(self, x: Numbers) -> Numbers:
+        """Return what is left at used blocks, without its constants [R·n], N·m."""
+        numbers = self.numbers(x)
+        values = {path: float(numbers[self._structure.index[path]]) for path in self._paths}
+        return self._samples.drift.without(self._samples.left(self._structure.start.data, values)).ravel()
+
+    def whole_slopes(self) -> Numbers:
+        """Return the derivatives of the model's torque by the unknowns as they are, at the start [B, n, u]."""
+        data, x = self._structure.start.data, self.start
+        base = self._samples.left(data)
+        columns = np.empty((*base.shape, len(x)))
+        steps = self._steps(x)
+        for k in range(len(x)):
+            moved = x.copy()
+            moved[k] += steps[k]
+            numbers = self.numbers(moved)
+            values = {path: float(numbers[self._structure.index[path]]) for path in self._paths}
+            per = steps[k] * (np.exp(x[k]) if self._is_log[k] else 1.0)
+            columns[:, :, k] = (base - self._samples.left(data, values)) / per
+        return columns
+
+    def _steps(self, x: Numbers) -> Numbers:
+        steps = np.where(self._is_log, OF_LOGARITHM, np.maximum(RELATIVE * np.abs(x), ABSOLUTE * self.size))
+        return np.where(x + steps <= self.high, steps, -steps)
+
+    def slopes(self, x: Numbers, left: Numbers, known: Mapping[str, Numbers]) -> Numbers:
+        """Return the derivatives of `left` [R·n, u]; those that are known are taken as they are."""
+        columns = np.empty((len(left), len(x)))
+        steps = self._steps(x)
+        for k, key in enumerate(self.keys):
+            if key in known and len(known[key]) == len(left):
+                columns[:, k] = known[key]
+                continue
+            moved = x.copy()
+            moved[k] += steps[k]
+            columns[:, k] = (self.left(moved) - left) / steps[k]
+        return columns
+
+    @cached_property
+    def size(self) -> Numbers:
+        """Expected magnitudes, also where none is known [u]."""
+        return np.where(np.isfinite(self.scale), self.scale, np.maximum(np.abs(self.start), 1e-6))
+
+
+def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
+    """Return the derivatives of a torque by the numbers that a fit estimates [B, n, u], and the scale of these [u]."""
+    if not unknowns(data):
+        return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
+    problem = _Problem(build_structure(finger_from_data(data, Path("finger")), Choice()), samples)
+    return problem.whole_slopes(), problem.plain_scale
+
+
+def _is_logarithmic(path: str, start: float) -> bool:
+    return path.startswith("extensions[") and path.rsplit(".", 1)[-1] in LOGARITHMIC and start > 0.0
+
+
+def key_of(data: Data, name: str) -> str:
+    """Return a name of an unknown that another description has, too: rows of `extensions` by effect and place."""
+    if not name.startswith("extensions["):
+        return name
+    head, _, last = name.partition(".")
+    number = int(head[len("extensions[") : -1]) - 1
+    rows = data["extensions"]
+
+    def mark(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        return tuple(row.get(key) for key in ("effect", "joint", "tendon", "level"))
+
+    same = sum(mark(row) == mark(rows[number]) for row in rows[:number])
+    return f"{mark(rows[number])} {same}.{last}"
+
+
+def _minimised(problem: _Problem, known: Mapping[str, Numbers]) -> tuple[Numbers, float, Numbers]:
+    """Return the unknowns [u] of least cost, the cost, and the derivatives there [R·n, u] (Levenberg, Marquardt)."""
+    x, damping = problem.start.copy(), 1e-3
+    left = problem.left(x)
+    slopes, is_fresh = problem.slopes(x, left, known), not known
+    if not len(x):
+        return x, float(left @ left), slopes
+    # the weight of prior knowledge: that of `MEMORY` independent rows of what is left
+    weight = MEMORY * float(left @ left) / len(left) / problem.scale**2
+    cost = float(left @ left + weight @ (x - problem.start) ** 2)
+    for _ in range(MOST_STEPS):
+        gram, score = slopes.T @ slopes, -slopes.T @ left - weight * (x - problem.start)
+        gram[np.diag_indices_from(gram)] += weight + damping * np.maximum(np.diagonal(gram), 1e-300)
+        step = bounded(gram[None], score[None], problem.low - x, problem.high - x)[0]
+        after = problem.left(x + step)
+        lower = float(after @ after + weight @ (x + step - problem.start) ** 2)
+        gain = cost - lower
+        if gain > 0.0:
+            turned = step / problem.size**2
+            slopes += np.outer((after - left - slopes @ step) / max(float(step @ turned), 1e-300), turned)
+            x, left, cost, damping = x + step, after, lower, max(damping / 5.0, 1e-6)
+        if gain < TOLERANCE * cost:
+            if is_fresh and (gain >= 0.0 or damping > 1.0):
+                break
+            if is_fresh:
+                damping *= 10.0
+                continue
+            slopes, is_fresh = problem.slopes(x, left, {}), True
+        else:
+            is_fresh = False
+    return x, cost, slopes
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
     """Return a fitted description with what recordings tell of its numbers (`estimated`)."""
-    own = [_with_own_target(data, recording) for recording in recordings]
-    return with_known_numbers(finger_from_data(data, settings.path), own).data
-
-
-def _learned(
-    data: Mapping[str, Any],
-    recordings: Sequence[FitRecording],
-    settings: FitSettings,
-    given: Mapping[str, Any],
-    begin: Mapping[str, Any] | None,
-    every: int,
-    tolerance: float,
-) -> tuple[Structure, Learned]:
-    recordings = [_thinned(_with_own_target(data, recording), every) for recording in recordings]
-    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
-    # a diagnosis has its own noise model, so the effective number of samples does not matter
-    fit = FrictionFitOptions(prior=PRIOR, tolerance=tolerance, threads=settings.threads)
-    options = Settings(fit, passes=MOST_PASSES, effective=False)
-    try:
-        start = None if begin is None else _start_at(structure, begin, settings)
-        return structure, learn_batch(structure, recordings, Watch(None), options, start)
-    except Interrupted:  # the intermediate result of a partial fit is of no use
-        raise KeyboardInterrupt from None
+    return with_known_numbers(finger_from_data(data, settings.path), recordings).data
 
 
 def fit_extended(
     nominal: FittedModel,
     causes: Sequence[Term],
-    recordings: Sequence[FitRecording],
+    samples: Samples,
     settings: FitSettings = FitSettings(),
-    begin: Mapping[str, Any] | None = None,
+    begin: FittedModel | None = None,
 ) -> FittedModel:
-    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit or at `begin`."""
+    """Fit the nominal model with the causes' terms, all numbers again; those that `begin` has start there."""
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
@@ -151,7 +269,22 @@ def fit_extended(
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
     estimated = {number.path for number in unknowns(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
-    return fit_numbers(data, recordings, settings, given=nominal.given, fixed=fixed, begin=begin)
+    known = None if begin is None else begin.slopes
+    if begin is not None:
+        data = carried(data, begin.data)
+    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, known=known)
+
+
+def carried(data: Data, known: Data) -> Mapping[str, Any]:
+    """Return a description with the numbers that another one has, too."""
+    theirs = {key_of(known, number.path): number.path for number in unknowns(known)}
+    result = own_copy(data)
+    for number in unknowns(data):
+        path = theirs.get(key_of(data, number.path))
+        for own in (number.path, number.with_path):
+            if own is not None and path is not None:
+                set_number(result, own, float(get_number(known, path)))
+    return result
 
 
 def cause_parameters(
@@ -199,53 +332,6 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
             data = cause.added_to(data)
             kept.append(cause)
     return kept
-
-
-def _start_at(
-    structure: Structure, begin: Mapping[str, Any], settings: FitSettings
-) -> Callable[[Sequence[str]], Numbers] | None:
-    """Return the unknowns of a description with the same numbers as the start of a fit; None if it has others."""
-    image = finger_from_data(begin, settings.path).image
-    if len(native.Instance(image).parameters()) != len(structure.group):
-        return None
-    estimator = Estimator(image, structure.group, structure.scale)
-    known = dict(zip(unknown_names(estimator), estimator.start, strict=True))
-    same = known.keys() == {*unknown_names(Estimator(structure.start.image, structure.group, structure.scale))}
-    return (lambda names: np.array([known[name] for name in names])) if same else None
-
-
-def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
-    """Return the recording with the external torque that makes its target follow from its forces."""
-    groups = recording.recording.groups
-    known = groups["tendon_force"] @ moment_arms(data) - recording.target
-    given = groups.get("external_torque", np.zeros_like(known))
-    if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
-        return recording
-    return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
-
-
-def _thinning(recordings: Sequence[FitRecording], most: int) -> int:
-    """Return of how many samples a fit learns from one."""
-    return max(1, -(-sum(int(recording.train.sum()) for recording in recordings) // most))
-
-
-def _with_noise(data: Mapping[str, Any], every: int) -> Mapping[str, Any]:
-    """Return the description with less noise, so that the bias follows one of `every` samples as fast as all."""
-    if every == 1:
-        return data
-    less = {key: value / np.sqrt(every) for key, value in _noise(data).items()}
-    return {**data, "bias": {**(data.get("bias") or {}), **less}}
-
-
-def _noise(data: Mapping[str, Any]) -> dict[str, float]:
-    return {key: number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force")}
-
-
-def _thinned(recording: FitRecording, every: int) -> FitRecording:
-    """Train on every `every`-th sample."""
-    if every == 1:
-        return recording
-    return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
 
 
 def _coarser(path: str) -> list[str]:

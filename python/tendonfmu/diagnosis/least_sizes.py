@@ -16,11 +16,13 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.effects import Candidate, Place, Term
 from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT
-from tendonfmu.model import extended_row
+from tendonfmu.model import extended_row, moment_arms
+from tendonfmu.recordings import FitRecording, zero_phase
 
 OF_NOISE = 4.0  # standard deviations of the position noise
 OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
 NEVER_NEGATIVE = ("preload_friction", "load_friction")  # all their places together
+NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
 BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
 
 
@@ -70,6 +72,28 @@ class LeastSizes:
         if effect in NEVER_NEGATIVE and sum(row["coulomb"] for row in rows if row) < 0.0:
             return False
         return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
+
+
+def least_sizes(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float, lag: float = 0.0
+) -> LeastSizes:
+    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
+    joints: list[Numbers] = []
+    tendons: list[Numbers] = []
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        angle, force = recording.model.joint_angle, groups["tendon_force"]
+        reached = (
+            groups["tendon_position"] - force / stiffness
+            if "tendon_position" in groups
+            else angle @ moment_arms(data).T
+        )
+        for part in recording.parts:
+            rate = 1.0 / float(np.median(np.diff(recording.time[part])))
+            for values, noise in ((angle[part], joints), (reached[part], tendons)):
+                noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, lag)
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:
