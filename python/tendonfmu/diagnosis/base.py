@@ -62,10 +62,17 @@ class Base:
         return replace(self, samples=samples, nominal=nominal, model=model)
 
 
-def refitted(model: FittedModel, samples: Samples, settings: FitSettings) -> FittedModel:
+def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
     """Fit a model again, at the forces that it predicts."""
-    predicted = samples.at_predicted_forces(model.data)
-    return fit_numbers(model.data, predicted, settings, given=model.given, fixed=model.fixed, known=model.slopes)
+    return fit_numbers(
+        model.data,
+        samples.at_predicted_forces(model.data),
+        settings,
+        given=model.given,
+        fixed=model.fixed,
+        known=model.slopes,
+        rough=rough,
+    )
 
 
 def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
@@ -109,9 +116,11 @@ def _with_memory(
 ) -> tuple[FittedModel, tuple[Term, ...]]:
     """Return the best model of several starts, and the terms of memory that the description lacks."""
     predicted = samples.at_predicted_forces(nominal.data)
-    models: list[tuple[FittedModel, tuple[Term, ...]]] = [(fit_extended(nominal, terms, predicted, settings), ())]
+    models: list[tuple[FittedModel, tuple[Term, ...]]] = [
+        (fit_extended(nominal, terms, predicted, settings, rough=True), ())
+    ]
     for presliding in presliding_everywhere(nominal.data, samples.recordings[0].kinematics, span):
-        models.append((fit_extended(nominal, [*terms, *presliding], predicted, settings), presliding))
+        models.append((fit_extended(nominal, [*terms, *presliding], predicted, settings, rough=True), presliding))
     best, memory = min(models, key=lambda each: each[0].cost)
     return refitted(best, samples, settings), memory
 

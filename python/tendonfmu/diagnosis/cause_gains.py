@@ -140,7 +140,7 @@ class _Bench:
             return self.nominal
         if key not in self._fits:
             order = self._order.setdefault(key, terms)
-            self._fits[key] = fit_extended(self.nominal, order, self._predicted, self._settings, self._full)
+            self._fits[key] = fit_extended(self.nominal, order, self._predicted, self._settings, self._full, rough=True)
         return self._fits[key]
 
     def each_without(self, causes: Sequence[Cause]) -> list[FittedModel]:

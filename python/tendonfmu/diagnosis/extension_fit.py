@@ -85,10 +85,11 @@ def fit_numbers(
     given: Mapping[str, Any] | None = None,
     fixed: tuple[str, ...] = (),
     known: Mapping[str, Numbers] | None = None,
+    rough: bool = False,
 ) -> FittedModel:
     """Fit the numbers of a description, starting at its own; one without numbers stays as it is.
 
-    `known` are derivatives of a similar model, to begin with.
+    `known` are derivatives of a similar model, to begin with. A rough fit does not compute them anew at its end.
     """
     # The samples have the forces that the model predicts: they lack the noise, which a term that scales with the force
     # would otherwise fit by shrinking the force.
@@ -99,7 +100,7 @@ def fit_numbers(
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
     problem = _Problem(structure, samples)
-    x, cost, slopes = _minimised(problem, known or {})
+    x, cost, slopes = _minimised(problem, known or {}, rough)
     numbers = problem.numbers(x)
     return FittedModel(
         data=with_values(structure, numbers).data,
@@ -216,7 +217,7 @@ def key_of(data: Data, name: str) -> str:
     return f"{mark(rows[number])} {same}.{last}"
 
 
-def _minimised(problem: _Problem, known: Mapping[str, Numbers]) -> tuple[Numbers, float, Numbers]:
+def _minimised(problem: _Problem, known: Mapping[str, Numbers], rough: bool) -> tuple[Numbers, float, Numbers]:
     """Return the unknowns [u] of least cost, the cost, and the derivatives there [R·n, u] (Levenberg, Marquardt)."""
     x, damping = problem.start.copy(), 1e-3
     left = problem.left(x)
@@ -238,9 +239,9 @@ def _minimised(problem: _Problem, known: Mapping[str, Numbers]) -> tuple[Numbers
             slopes += np.outer((after - left - slopes @ step) / max(float(step @ turned), 1e-300), turned)
             x, left, cost, damping = x + step, after, lower, max(damping / 5.0, 1e-6)
         if gain < TOLERANCE * cost:
-            if is_fresh and (gain >= 0.0 or damping > 1.0):
+            if (is_fresh or rough) and (gain >= 0.0 or damping > 1.0):
                 break
-            if is_fresh:
+            if is_fresh or rough:
                 damping *= 10.0
                 continue
             slopes, is_fresh = problem.slopes(x, left, {}), True
@@ -260,6 +261,7 @@ def fit_extended(
     samples: Samples,
     settings: FitSettings = FitSettings(),
     begin: FittedModel | None = None,
+    rough: bool = False,
 ) -> FittedModel:
     """Fit the nominal model with the causes' terms, all numbers again; those that `begin` has start there."""
     causes = possible(nominal.data, causes)
@@ -272,7 +274,7 @@ def fit_extended(
     known = None if begin is None else begin.slopes
     if begin is not None:
         data = carried(data, begin.data)
-    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, known=known)
+    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, known=known, rough=rough)
 
 
 def carried(data: Data, known: Data) -> Mapping[str, Any]:

@@ -109,8 +109,9 @@ class ExtensionSearch(CauseSearch):
             return Trial(cause, None, np.array([np.inf]))
         # predict with the cause: forces predicted without a delay are not late, so no fit would find a delay in them
         begin = extended_description(self.model.data, cause.terms)
-        model = fit_extended(base.nominal, terms, base.samples.at_predicted_forces(begin), base.settings, self.model)
-        model = refitted(model, base.samples, base.settings)
+        predicted = base.samples.at_predicted_forces(begin)
+        model = fit_extended(base.nominal, terms, predicted, base.settings, self.model, rough=True)
+        model = refitted(model, base.samples, base.settings, rough=True)
         if not base.least.shows_all(cause.effect, cause.terms, model.data):
             return Trial(cause, None, np.array([np.inf]))
         return Trial(cause, model, base.look(model, ()).selection.base)
@@ -123,7 +124,7 @@ class ExtensionSearch(CauseSearch):
             return False
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
-        self.model = model
+        self.model = model = refitted(model, self.base.samples, self.base.settings)
         self.view = self.view.lean  # frees memory for the next one
         self.view = self.base.look(model)
         return True
