@@ -26,16 +26,17 @@ if TYPE_CHECKING:
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
-    from .methods import (
+    from .learning import (
         FitProgress,
         FrictionFitOptions,
         Interrupted,
         Learned,
         Settings,
         Watch,
-        learn_batch,
         unknown_names,
     )
+    from .memory import has_memory
+    from .methods import learn_batch
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
     from .slow_drift import SlowDrift, slowest_drift
     from .structure import (

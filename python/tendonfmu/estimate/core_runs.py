@@ -59,6 +59,8 @@ class CoreRuns:
         [B] the stretch without a gap that a block belongs to, from 0.
     time, still
         [B] centre of each block (s), and whether all joints stand still in it.
+    torque, speed
+        [B, n] torque to explain (N·m), and joint speeds (rad/s).
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class CoreRuns:
         threads: int = 0,
     ) -> None:
         """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
-        self.data = data
+        self.data, self._rate, self._threads = data, rate, threads
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self._stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
@@ -80,8 +82,10 @@ class CoreRuns:
         )
         self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
         self.time: Numbers = self.grid.means([recording.time for recording in recordings])
-        speed = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
-        self.still: Flags = np.all(speed <= number_of(data, "velocity_threshold.joint"), axis=1)
+        self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
+        fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
+        self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
+        self.still: Flags = np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
         self._instances = _Instances()
 
@@ -95,6 +99,10 @@ class CoreRuns:
         other = object.__new__(CoreRuns)
         other.__dict__ = {**self.__dict__, "data": data}
         return other
+
+    def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
+        """Return runs of the same description over other signals of the same samples."""
+        return CoreRuns(self.data, recordings, self.grid, rate=self._rate, threads=self._threads)
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T.
