@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,13 +16,15 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_extended, fit_numbers
+from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
 from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import View, look
-from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
+from tendonfmu.estimate import choose_memory
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
 from tendonfmu.recordings import FitRecording
 
 LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
@@ -31,7 +33,8 @@ LARGE = 0.005  # s: smaller delays compete with other causes, by their derivativ
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 POSITION = ("cover_stiffness", "cover_hardening", "gravity", "joint_coupling")  # torque that depends on angles alone
-PRESLIDING, DELAY = by_name("presliding"), by_name("time_delay")
+DISTANCES = (5e-5, 5e-4)  # m, of presliding beside which a delay is scanned for
+DELAY = by_name("time_delay")
 
 
 @dataclass(frozen=True)
@@ -86,10 +89,8 @@ def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSe
     late = _delay(nominal.data, samples, span, least)
     position = _position_dependent(extended_description(nominal.data, late), samples, least, least_gain)
     start = [terms for terms in (late, *position) if terms]
-    model, memory = _with_memory(nominal, [term for terms in start for term in terms], samples, settings, span)
-    if memory:
-        start.append(memory)
-    return Base(samples, least, nominal, tuple(start), model, settings)
+    model, memory = _with_memory(given, nominal, start, samples, settings)
+    return Base(samples, least, nominal, (*start, *memory), model, settings)
 
 
 # --- position-dependent torque ----------------------------------------------------------------------------------------
@@ -112,28 +113,13 @@ def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_g
 
 
 def _with_memory(
-    nominal: FittedModel, terms: Sequence[Term], samples: Samples, settings: FitSettings, span: Span
-) -> tuple[FittedModel, tuple[Term, ...]]:
-    """Return the best model of several starts, and the terms of memory that the description lacks."""
-    predicted = samples.at_predicted_forces(nominal.data)
-    models: list[tuple[FittedModel, tuple[Term, ...]]] = [
-        (fit_extended(nominal, terms, predicted, settings, rough=True), ())
-    ]
-    for presliding in presliding_everywhere(nominal.data, samples.recordings[0].kinematics, span):
-        models.append((fit_extended(nominal, [*terms, *presliding], predicted, settings, rough=True), presliding))
-    best, memory = min(models, key=lambda each: each[0].cost)
-    return refitted(best, samples, settings), memory
-
-
-def presliding_everywhere(data: Mapping[str, Any], source: int, span: Span) -> list[tuple[Term, ...]]:
-    """Return presliding at all places with one distance, for each distance of a grid."""
-    if any(row["effect"] == PRESLIDING.name for row in data.get("extensions") or []):
-        return []
-    by_place = [
-        [Term(PRESLIDING, place, variant.shape, (1.0,)) for variant in PRESLIDING.variants(data, place, span)]
-        for place in PRESLIDING.places(data, source)
-    ]
-    return [terms for terms in zip(*filter(None, by_place), strict=False) if terms]
+    given: Finger, nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
+) -> tuple[FittedModel, list[tuple[Term, ...]]]:
+    """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
+    described = replace(given, data=extended_description(nominal.data, [term for terms in start for term in terms]))
+    choice = choose_memory(described, samples.recordings, settings.choice, threads=settings.threads)
+    model = FittedModel(choice.finger.data, nominal.given, {})
+    return refitted(model, samples, settings), memory_terms(nominal.data, memory_of(choice.finger.data))
 
 
 # --- delay ------------------------------------------------------------------------------------------------------------
@@ -150,8 +136,8 @@ def _delay(data: Data, samples: Samples, span: Span, least: LeastSizes) -> tuple
     delays = _delays(span.step)
     moved = np.stack([_late_torque(samples, delay) for delay in delays], axis=2)
     still, best, found = int(np.argmin(np.abs(delays))), np.inf, 0.0
-    for presliding in ((), *presliding_everywhere(data, source, span)):
-        errors = _errors(extended_description(data, presliding), samples, least, moved)
+    for described in _elastic(data):
+        errors = _errors(described, samples, least, moved)
         k = int(np.argmin(errors))
         # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
         is_large = 0 < k < len(delays) - 1 and abs(delays[k]) >= LARGE
@@ -160,6 +146,16 @@ def _delay(data: Data, samples: Samples, span: Span, least: LeastSizes) -> tuple
         if error < best:
             best, found = float(error), float(delay)
     return _late(found) if found else ()
+
+
+def _elastic(data: Data) -> Iterator[Data]:
+    """Yield a description as it is, and with presliding over several distances: it delays the torque of friction."""
+    yield data
+    tendon = number_of(data, "velocity_threshold.tendon")
+    if tendon > 0.0 and not memory_of(data):
+        for distance in DISTANCES:
+            row = {"effect": "presliding", "displacement": distance / tendon}
+            yield {**data, "extensions": [*(data.get("extensions") or []), row]}
 
 
 def _late(delay: float) -> tuple[Term, ...]:

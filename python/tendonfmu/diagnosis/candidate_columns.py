@@ -73,7 +73,7 @@ def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> I
     """Yield the columns of a variant [B, n]; `base` is what the description leaves [B, n], N·m."""
     if variant.late:
         late = CoreRuns(data, with_late_forces(samples.recordings, variant.late), samples.grid, threads=samples.threads)
-        yield late.residual() + samples.added - base
+        yield late.residual() + samples.runs.added - base
     elif variant.secant is not None:
         yield base - samples.left(variant.secant)
     else:

@@ -1,15 +1,14 @@
-"""How a description's numbers are fitted: least squares of what runs of the core leave, without a learning bias.
+"""How a description's numbers are fitted: by what runs of the core leave, without a learning bias.
 
-One constant a joint and stretch is left out of all that is compared; noise is correlated over some blocks, and prior
-knowledge of how large a number usually is counts as much as that. The derivatives come from runs of the core. Between
-two computations of them Broyden's rank-one update keeps them good enough (Broyden, Math. Comp. 19, 1965).
+The likelihood is that of `estimate.memory_fit`; noise is correlated over some blocks, so that so many count as one.
+Derivatives are differences between runs. Between two computations of them Broyden's rank-one update keeps them good
+enough (Broyden, Math. Comp. 19, 1965), and a fit begins with those of a similar model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +16,20 @@ import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
 from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,
     Estimator,
+    Linearised,
+    MemoryProblem,
+    State,
     Structure,
+    bounded_step,
     build_structure,
     get_number,
+    guess_prior,
     own_copy,
     set_number,
     unknown_names,
@@ -34,13 +39,10 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.model import effects, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import MEMORY, bounded
+from tendonfmu.statistics import MEMORY
 
 MOST_STEPS = 20
-TOLERANCE = 2e-3  # of the cost: a step that lowers it by less is the last one
-RELATIVE, ABSOLUTE = 1e-3, 1e-4  # steps of derivatives, of a number and of its expected magnitude
-OF_LOGARITHM = 0.01  # the same of numbers that are fitted by their logarithm
-LOGARITHMIC = ("displacement", "stiffness", "relaxation_time", "time_constant")  # numbers of rows that may be far off
+LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -64,7 +66,7 @@ class FittedModel:
     cost: float = float("nan")  # Σ e² with the prior, (N·m)²
     warnings: tuple[str, ...] = ()  # sentences
     fixed: tuple[str, ...] = ()  # paths of numbers that no fit of this model changes
-    # derivatives of what is left by the unknowns, by their keys [R·n]; of the samples it was fitted to
+    # derivatives of what is left by the unknowns, by their keys [R, n]; of the samples it was fitted to
     slopes: Mapping[str, Numbers] = field(default_factory=dict, repr=False, compare=False)
     scale: Numbers = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)  # of the unknowns [u]
 
@@ -73,7 +75,7 @@ class FittedModel:
         joints = len(self.data["joints"])
         columns = np.zeros((samples.grid.blocks, joints, len(self.slopes)), dtype=np.float32)
         for k, slope in enumerate(self.slopes.values()):
-            columns[samples.used, :, k] = -slope.reshape(-1, joints)
+            columns[samples.used, :, k] = -slope
         return columns, self.scale
 
 
@@ -100,94 +102,52 @@ def fit_numbers(
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
     problem = _Problem(structure, samples)
-    x, cost, slopes = _minimised(problem, known or {}, rough)
-    numbers = problem.numbers(x)
+    fit = problem.fit
+    state, linearised = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
+    numbers = fit.estimator.values(np.clip(fit.scale.unknowns(state.u), *fit.bounds))
     return FittedModel(
         data=with_values(structure, numbers).data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
-        cost=cost,
+        cost=state.cost,
         fixed=fixed,
-        slopes=dict(zip(problem.keys, slopes.T, strict=True)),
-        scale=problem.scale,
+        slopes=problem.known(linearised),
+        scale=np.where(fit.scale.log, np.log(10.0), fit.scale.size),
     )
 
 
 class _Problem:
-    """What the unknowns of a structure leave of samples. Some unknowns are fitted by their logarithm."""
+    """A fit of a structure, with derivatives that other fits know."""
 
     def __init__(self, structure: Structure, samples: Samples) -> None:
-        self._structure, self._samples = structure, samples
-        self._estimator = Estimator(structure.start.image, structure.group, structure.scale)
-        chosen = [k for k, each in enumerate(self._estimator.unknowns) if not each.path.startswith("bias.")]
-        own = [self._estimator.unknowns[k] for k in chosen]
-        names = unknown_names(self._estimator)
-        self._chosen = np.array(chosen, dtype=np.intp)
-        self.keys = [key_of(structure.start.data, names[k]) for k in chosen]
-        self._is_log = np.array([_is_logarithmic(each.path, each.start) for each in own], dtype=bool)
-        self.start, self.low, self.high = (
-            self._turned(np.array([getattr(each, end) for each in own])) for end in ("start", "lower", "upper")
-        )
-        scale = self.plain_scale = np.array([each.scale for each in own])
-        self.scale = np.where(self._is_log, np.log(10.0), np.where(np.isfinite(scale) & (scale > 0.0), scale, np.inf))
-        self.start = np.clip(self.start, self.low, self.high)
+        estimator = Estimator(structure.start.image, structure.group, structure.scale)
+        self.fit = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
+        self.fit.blocks = self.fit.blocks / MEMORY
+        self.fit.mean, self.fit.known = guess_prior(self.fit)
+        self.keys = [key_of(structure.start.data, name) for name in unknown_names(estimator)]
+        self._unit = np.where(self.fit.scale.log, 1.0, self.fit.scale.size)  # of a coordinate
 
-    def _turned(self, values: Numbers) -> Numbers:
-        return np.where(self._is_log, np.log(np.maximum(values, 1e-300)), values)
+    def linearised(self, state: State, known: Mapping[str, Numbers]) -> Linearised:
+        """Return the derivatives at a state; those that are known are taken as they are."""
+        rows = len(state.residual)
+        shared = {k for k, key in enumerate(self.keys) if key in known and len(known[key]) == rows}
+        columns = np.empty((*state.residual.shape, len(state.u)))
+        missing = [k for k in range(len(state.u)) if k not in shared]
+        columns[:, :, missing] = self.fit.drift.without(self.fit.columns(state.u, missing))
+        for k in shared:
+            columns[:, :, k] = known[self.keys[k]] * self._unit[k]
+        return self.fit.of_columns(state, columns)
 
-    def numbers(self, x: Numbers) -> Numbers:
-        """Return the numbers of the description [p]."""
-        z = self._estimator.start.copy()
-        z[self._chosen] = np.where(self._is_log, np.exp(np.where(self._is_log, x, 0.0)), x)
-        return self._estimator.values(z)
+    def known(self, linearised: Linearised) -> dict[str, Numbers]:
+        """Return the derivatives by their keys [R, n], for another fit."""
+        return {key: linearised.columns[:, :, k] / self._unit[k] for k, key in enumerate(self.keys)}
 
-    @cached_property
-    def _paths(self) -> list[str]:
-        both = ((number.path, number.with_path) for number in self._structure.numbers)
-        return [path for pair in both for path in pair if path is not None and not path.startswith("bias.")]
-
-    def left(self, x: Numbers) -> Numbers:
-        """Return what is left at used blocks, without its constants [R·n], N·m."""
-        numbers = self.numbers(x)
-        values = {path: float(numbers[self._structure.index[path]]) for path in self._paths}
-        return self._samples.drift.without(self._samples.left(self._structure.start.data, values)).ravel()
-
-    def whole_slopes(self) -> Numbers:
-        """Return the derivatives of the model's torque by the unknowns as they are, at the start [B, n, u]."""
-        data, x = self._structure.start.data, self.start
-        base = self._samples.left(data)
-        columns = np.empty((*base.shape, len(x)))
-        steps = self._steps(x)
-        for k in range(len(x)):
-            moved = x.copy()
-            moved[k] += steps[k]
-            numbers = self.numbers(moved)
-            values = {path: float(numbers[self._structure.index[path]]) for path in self._paths}
-            per = steps[k] * (np.exp(x[k]) if self._is_log[k] else 1.0)
-            columns[:, :, k] = (base - self._samples.left(data, values)) / per
-        return columns
-
-    def _steps(self, x: Numbers) -> Numbers:
-        steps = np.where(self._is_log, OF_LOGARITHM, np.maximum(RELATIVE * np.abs(x), ABSOLUTE * self.size))
-        return np.where(x + steps <= self.high, steps, -steps)
-
-    def slopes(self, x: Numbers, left: Numbers, known: Mapping[str, Numbers]) -> Numbers:
-        """Return the derivatives of `left` [R·n, u]; those that are known are taken as they are."""
-        columns = np.empty((len(left), len(x)))
-        steps = self._steps(x)
-        for k, key in enumerate(self.keys):
-            if key in known and len(known[key]) == len(left):
-                columns[:, k] = known[key]
-                continue
-            moved = x.copy()
-            moved[k] += steps[k]
-            columns[:, k] = (self.left(moved) - left) / steps[k]
-        return columns
-
-    @cached_property
-    def size(self) -> Numbers:
-        """Expected magnitudes, also where none is known [u]."""
-        return np.where(np.isfinite(self.scale), self.scale, np.maximum(np.abs(self.start), 1e-6))
+    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
+        """Return derivatives that agree with the last step: Broyden's update, in coordinates of their own size."""
+        step = tried.u - state.u
+        missed = tried.residual - state.residual - linearised.columns @ step
+        columns = linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+        return self.fit.of_columns(tried, columns)
 
 
 def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
@@ -195,11 +155,9 @@ def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
     if not unknowns(data):
         return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
     problem = _Problem(build_structure(finger_from_data(data, Path("finger")), Choice()), samples)
-    return problem.whole_slopes(), problem.plain_scale
-
-
-def _is_logarithmic(path: str, start: float) -> bool:
-    return path.startswith("extensions[") and path.rsplit(".", 1)[-1] in LOGARITHMIC and start > 0.0
+    fit = problem.fit
+    chosen = [k for k, unknown in enumerate(fit.estimator.unknowns) if not unknown.path.startswith("bias.")]
+    return fit.slopes(fit.state(fit.mean), fit.runs)[:, :, chosen], fit.scale.size[chosen]
 
 
 def key_of(data: Data, name: str) -> str:
@@ -217,37 +175,30 @@ def key_of(data: Data, name: str) -> str:
     return f"{mark(rows[number])} {same}.{last}"
 
 
-def _minimised(problem: _Problem, known: Mapping[str, Numbers], rough: bool) -> tuple[Numbers, float, Numbers]:
-    """Return the unknowns [u] of least cost, the cost, and the derivatives there [R·n, u] (Levenberg, Marquardt)."""
-    x, damping = problem.start.copy(), 1e-3
-    left = problem.left(x)
-    slopes, is_fresh = problem.slopes(x, left, known), not known
-    if not len(x):
-        return x, float(left @ left), slopes
-    # the weight of prior knowledge: that of `MEMORY` independent rows of what is left
-    weight = MEMORY * float(left @ left) / len(left) / problem.scale**2
-    cost = float(left @ left + weight @ (x - problem.start) ** 2)
-    for _ in range(MOST_STEPS):
-        gram, score = slopes.T @ slopes, -slopes.T @ left - weight * (x - problem.start)
-        gram[np.diag_indices_from(gram)] += weight + damping * np.maximum(np.diagonal(gram), 1e-300)
-        step = bounded(gram[None], score[None], problem.low - x, problem.high - x)[0]
-        after = problem.left(x + step)
-        lower = float(after @ after + weight @ (x + step - problem.start) ** 2)
-        gain = cost - lower
-        if gain > 0.0:
-            turned = step / problem.size**2
-            slopes += np.outer((after - left - slopes @ step) / max(float(step @ turned), 1e-300), turned)
-            x, left, cost, damping = x + step, after, lower, max(damping / 5.0, 1e-6)
-        if gain < TOLERANCE * cost:
-            if (is_fresh or rough) and (gain >= 0.0 or damping > 1.0):
-                break
-            if is_fresh or rough:
-                damping *= 10.0
-                continue
-            slopes, is_fresh = problem.slopes(x, left, {}), True
-        else:
+def _minimised(
+    problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool
+) -> tuple[State, Linearised]:
+    """Go down from coordinates `begin` [u] (Levenberg, Marquardt); return where it ends, and the derivatives there."""
+    fit = problem.fit
+    state, damping = fit.state(begin), 1e-3
+    linearised, is_fresh = problem.linearised(state, known), not known
+    for _ in range(MOST_STEPS if len(begin) else 0):
+        gradient = linearised.gradient + fit.known @ (state.u - fit.mean)
+        matrix = linearised.information + fit.known
+        step = bounded_step(matrix, gradient, damping, fit.lower - state.u, fit.upper - state.u)
+        tried = fit.state(state.u + step)
+        fall = state.cost - tried.cost
+        if fall > 0.0:
+            linearised, state, damping = problem.moved_on(state, linearised, tried), tried, max(damping / 5.0, 1e-6)
+        if fall > LEAST_FALL * float(fit.blocks.sum()):
             is_fresh = False
-    return x, cost, slopes
+        elif not (is_fresh or rough):
+            linearised, is_fresh = problem.linearised(state, {}), True
+        elif fall >= 0.0 or damping > 1.0:
+            break
+        else:
+            damping *= 10.0
+    return state, linearised
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
@@ -330,6 +281,8 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
+        if needs_presliding(cause) and not any(row["effect"] == PRESLIDING for row in memory_of(data)):
+            continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)
             kept.append(cause)

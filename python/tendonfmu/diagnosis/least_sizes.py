@@ -1,6 +1,6 @@
 """What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
 
-Play and the distance of presliding must be several times the noise of the positions. A delay must be more than half a
+Play must be several times the noise of the positions. A delay must be more than half a
 sample; forces that are early must be so by more than velocities lag that are computed from positions.
 """
 
@@ -39,7 +39,7 @@ class LeastSizes:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
         if effect == "time_delay":
             return OF_SAMPLE * self.step
-        if effect in ("backlash", "presliding"):
+        if effect == "backlash":
             if joint is not None:
                 return OF_NOISE * float(self.joint_noise[joint - 1])
             if tendon is not None:
@@ -61,8 +61,6 @@ class LeastSizes:
 
     def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""
-        if cause.effect == "presliding":  # its size is the distance that was tried, not the magnitude
-            return True
         least = self.least(*cause.key)
         return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 

@@ -25,11 +25,9 @@ PLANTED = 3  # states planted at each joint
 
 def states_of(series: Series, starts: Indices) -> Iterator[tuple[str, Numbers]]:
     """Yield (part of the finger, its states of every width and time [B, k]), for each joint and tendon."""
-    options = list(product(WIDTHS, TIMES))
+    widths, times = np.array(list(product(WIDTHS, TIMES))).T
     for who, driver, load in _drivers(series):
-        states = stopped(
-            np.repeat(driver[:, None], len(options), axis=1), *zip(*options, strict=True), series.step, starts
-        )
+        states = stopped(np.repeat(driver[:, None], len(widths), axis=1), widths, times, series.step, starts)
         yield who, states if load is None else states * load[:, None]
 
 
@@ -63,17 +61,10 @@ def _in_ranges(values: Numbers) -> Numbers:
     return np.asarray(values / max(float(high - low), 1e-12))
 
 
-def stopped(
-    drivers: Numbers,
-    widths: Numbers | tuple[float, ...],
-    times: Numbers | tuple[float, ...],
-    step: float,
-    starts: Indices,
-) -> Numbers:
+def stopped(drivers: Numbers, widths: Numbers, times: Numbers, step: float, starts: Indices) -> Numbers:
     """Return stop operators of drivers [B, k] with widths [k] and times [k] (s), as shares of their widths [B, k]."""
-    wide = np.asarray(widths, dtype=np.float64)
-    kept = np.exp(-step / np.asarray(times, dtype=np.float64))
-    moves = np.diff(drivers, axis=0, prepend=drivers[:1]) / wide
+    kept = np.exp(-step / times)
+    moves = np.diff(drivers, axis=0, prepend=drivers[:1]) / widths
     states = np.zeros_like(drivers)
     for first, end in pairwise(starts):
         state = np.zeros(drivers.shape[1])

@@ -36,7 +36,6 @@ class Samples:
     runs: CoreRuns
     drift: SlowDrift  # what is not compared
     threads: int
-    added: Numbers | float = 0.0  # torque that is measured beyond that of these forces, N·m [B, n]
 
     @classmethod
     def of(cls, data: Data, recordings: Sequence[FitRecording], threads: int = 1) -> Samples:
@@ -70,7 +69,7 @@ class Samples:
 
     def left(self, data: Data, values: Mapping[str, float] | None = None) -> Numbers:
         """Return the torque that a description leaves, with some other numbers by path, N·m [B, n]."""
-        return np.asarray(self.runs.of(data).residual(values) + self.added)
+        return self.runs.of(data).residual(values)
 
     def residual(self, data: Data) -> Numbers:
         """Return the same without its drift [B, n], N·m; 0 at blocks that are not used."""
@@ -93,7 +92,8 @@ class Samples:
                 for each in predicted
             ]
         )
-        return replace(self, recordings=predicted, runs=runs, added=self.added + added)
+        runs.added = self.runs.added + added
+        return replace(self, recordings=predicted, runs=runs)
 
 
 # --- forces that a model predicts ------------------------------------------------------------------------------------

@@ -87,10 +87,12 @@ class MemoryProblem:
 
     def values(self, u: Numbers) -> dict[str, float]:
         """Return the numbers of the description by path."""
-        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self._bounds()))
+        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self.bounds))
         return dict(zip(self._paths, numbers[self._rows].tolist(), strict=True))
 
-    def _bounds(self) -> tuple[Numbers, Numbers]:
+    @property
+    def bounds(self) -> tuple[Numbers, Numbers]:
+        """Lower and upper bounds of the unknowns z."""
         return self.scale.unknowns(self.lower), self.scale.unknowns(self.upper)
 
     def state(self, u: Numbers) -> State:
@@ -109,7 +111,10 @@ class MemoryProblem:
 
     def linearised(self, state: State) -> Linearised:
         """Return the derivatives at a state."""
-        columns = self.drift.without(self._columns(state.u, self.runs))
+        return self.of_columns(state, self.drift.without(self.columns(state.u)))
+
+    def of_columns(self, state: State, columns: Numbers) -> Linearised:
+        """Return what follows from derivatives [R, n, u] at a state."""
         weight = self.blocks / len(state.residual) / self.variance(state.residual)
         information = np.zeros((len(state.u), len(state.u)))
         gradient = np.zeros(len(state.u))
@@ -118,15 +123,15 @@ class MemoryProblem:
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
 
-    def _columns(self, u: Numbers, runs: CoreRuns) -> Numbers:
-        """Return [B, n, u] the derivatives of τ − T by u (N·m)."""
+    def columns(self, u: Numbers, chosen: Sequence[int] | None = None, runs: CoreRuns | None = None) -> Numbers:
+        """Return [B, n, c] the derivatives of τ − T by the chosen of u, or all (N·m), over some runs."""
         here = self.values(u)
-        directions = [self._direction(k, u, here) for k in range(len(u))]
-        return runs.columns(directions, self._of_description(here))
+        directions = [self._direction(k, u, here) for k in (range(len(u)) if chosen is None else chosen)]
+        return (self.runs if runs is None else runs).columns(directions, self._of_description(here))
 
     def slopes(self, state: State, runs: CoreRuns) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
-        return -self._columns(state.u, runs) / self.scale.slopes(self.scale.unknowns(state.u))
+        return -self.columns(state.u, None, runs) / self.scale.slopes(self.scale.unknowns(state.u))
 
     def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
         """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
@@ -174,7 +179,7 @@ def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, 
         gradient = linearised.gradient + problem.known @ (state.u - problem.mean)
         matrix = linearised.information + problem.known
         while damping < DAMPING[2]:
-            step = _bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
+            step = bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
             tried = problem.state(state.u + step)
             if tried.cost < state.cost:
                 break
@@ -193,7 +198,7 @@ def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, 
     return Minimum(state, linearised, number, converged)
 
 
-def _bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
+def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
     """Return the step that minimises the damped quadratic model between bounds."""
     diagonal = np.maximum(np.diag(matrix), 1e-12 * float(np.diag(matrix).max()) + 1e-300)
     length = np.sqrt(diagonal)

@@ -83,11 +83,6 @@ def delay(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     return replace(secant("delay", most=_LONGEST)(name, data, place, shape), late=float(shape["delay"]))
 
 
-def presliding(name: str, data: Data, place: Place, shape: Shape) -> Variant:
-    """Return presliding over a distance."""
-    return secant("displacement", scaled=False)(name, data, place, shape)
-
-
 # --- friction laws ----------------------------------------------------------------------------------------------------
 
 
