@@ -36,6 +36,9 @@ if TYPE_CHECKING:
         unknown_names,
     )
     from .memory import has_memory
+    from .memory_choice import choose_memory
+    from .memory_fit import Linearised, MemoryProblem, State, bounded_step
+    from .memory_methods import guess_prior
     from .methods import learn_batch
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
     from .slow_drift import SlowDrift, slowest_drift

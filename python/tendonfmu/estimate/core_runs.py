@@ -86,6 +86,7 @@ class CoreRuns:
         fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
         self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
         self.still: Flags = np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
+        self.added: Numbers | float = 0.0  # torque that is measured beyond that of the runs' forces, N·m [B, n]
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
         self._instances = _Instances()
 
@@ -119,7 +120,7 @@ class CoreRuns:
         """
         image = _image(self.data)
         parts = self._pool.map(lambda each: self._left(image, values or {}, each), self._stretches)
-        return np.concatenate(list(parts))
+        return np.concatenate(list(parts)) + self.added
 
     def columns(self, directions: Sequence[Direction], values: Mapping[str, float] | None = None) -> Numbers:
         """Return the derivatives of `residual` by directions at `values`.
@@ -153,7 +154,7 @@ class CoreRuns:
             if direction.central:
                 columns[:, :, k] = (run(k, 1.0) - run(k, -1.0)) / (2.0 * direction.step)
             else:
-                columns[:, :, k] = (run(k, 1.0) - base) / direction.step
+                columns[:, :, k] = (run(k, 1.0) + self.added - base) / direction.step
 
         list(self._pool.map(fill, range(len(directions))))
         return columns

@@ -10,7 +10,7 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and leas
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_SPREAD = 0.04  # of the mean variance over the joints
+WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
 LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
 LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
@@ -96,10 +97,12 @@ class MemoryProblem:
 
     def values(self, u: Numbers) -> dict[str, float]:
         """Return the numbers of the description by path."""
-        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self._bounds()))
+        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self.bounds))
         return dict(zip(self._paths, numbers[self._rows].tolist(), strict=True))
 
-    def _bounds(self) -> tuple[Numbers, Numbers]:
+    @property
+    def bounds(self) -> tuple[Numbers, Numbers]:
+        """Lower and upper bounds of the unknowns z."""
         return self.scale.unknowns(self.lower), self.scale.unknowns(self.upper)
 
     def state(self, u: Numbers) -> State:
@@ -122,14 +125,25 @@ class MemoryProblem:
 
     def linearised(self, state: State) -> Linearised:
         """Return the derivatives by the directions of `span` at a state."""
-        columns = self.drift.without(self._columns(state.u, self.runs, self.span))
-        weight = self._weight(state.residual)
-        information = np.zeros((columns.shape[2],) * 2)
-        gradient = np.zeros(columns.shape[2])
-        for j, share in enumerate(weight):
+        return self.of_columns(state, self.drift.without(self._columns(state.u, self.runs, self.span)))
+
+    def of_columns(self, state: State, columns: Numbers) -> Linearised:
+        """Return what follows from derivatives [R, n, v] at a state."""
+        information, gradient = np.zeros((columns.shape[2],) * 2), np.zeros(columns.shape[2])
+        for j, share in enumerate(self._weight(state.residual)):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
+
+    def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
+        """Return derivatives at `tried` that agree with the step [v] there from `state`: Broyden's update."""
+        missed = tried.residual - state.residual - linearised.columns @ step
+        update = missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+        return self.of_columns(tried, linearised.columns + update)
+
+    def columns(self, u: Numbers, chosen: Sequence[int]) -> Numbers:
+        """Return [B, n, c] the derivatives of τ − T by the chosen of u (N·m)."""
+        return self._columns(u, self.runs, np.eye(len(u))[:, list(chosen)])
 
     def _weight(self, residual: Numbers) -> Numbers:
         """Return [n] what a block of each joint weighs."""
@@ -187,31 +201,49 @@ class Minimum:
     converged: bool
 
 
-def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, watch: Watch | None = None) -> Minimum:
-    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors."""
-    state, damping, converged, span = begin, DAMPING[0], False, problem.span
-    linearised = problem.linearised(state)
-    for number in range(1, most + 1):
+def minimise(
+    problem: MemoryProblem,
+    begin: State,
+    most: int,
+    tolerance: float,
+    watch: Watch | None = None,
+    *,
+    rough: bool = False,
+) -> Minimum:
+    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
+
+    Derivatives are computed anew when steps with Broyden's update (Math. Comp. 19, 1965) no longer go down well. A
+    rough end has updated ones.
+    """
+    state, damping, number, converged, span = begin, DAMPING[0], 0, False, problem.span
+    linearised, is_fresh = problem.linearised(state), True
+    while number < most:
+        number += 1
         gradient = linearised.gradient + span.T @ problem.known @ (state.u - problem.mean)
         matrix = linearised.information + span.T @ problem.known @ span
         room = _room(span, problem.lower - state.u, problem.upper - state.u)
-        while damping < DAMPING[2]:
-            step = _bounded_step(matrix, gradient, damping, *room)
-            tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
-            if tried.cost < state.cost:
-                break
-            damping *= 8.0
-        else:
-            converged = True
-            break
+        step = bounded_step(matrix, gradient, damping, *room)
+        tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
+        expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        state, damping = tried, max(damping / 5.0, DAMPING[1])
-        if watch is not None:
-            watch(number, state)
-        linearised = problem.linearised(state)
-        if step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum()):
+        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < LEAST_FALL * float(problem.blocks.sum())
+        if fall > 0.0:
+            linearised = problem.moved_on(linearised, state, step, tried)
+            state, damping = tried, max(damping / 5.0, DAMPING[1])
+            if watch is not None:
+                watch(number, state)
+        else:
+            damping *= 8.0
+        if (is_small and (is_fresh or rough)) or damping > DAMPING[2]:
             converged = True
             break
+        is_good = fall > WELL * expected
+        if is_good and not is_small:
+            is_fresh = False
+        elif not is_fresh or fall > 0.0:
+            linearised, is_fresh = problem.linearised(state), True
+    if not (rough or is_fresh):
+        linearised = problem.linearised(state)
     return Minimum(state, linearised, number, converged)
 
 
@@ -224,7 +256,7 @@ def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]
     return least, np.where(span == 0.0, np.inf, ends.max(axis=0)).min(axis=0)
 
 
-def _bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
+def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
     """Return the step that minimises the damped quadratic model between bounds."""
     diagonal = np.maximum(np.diag(matrix), 1e-12 * float(np.diag(matrix).max()) + 1e-300)
     length = np.sqrt(diagonal)

@@ -28,7 +28,7 @@ from tendonfmu.statistics import sample_weights
 
 STEP, RATE = 0.02, 200.0  # s and Hz of a fit: elements take any step, and friction changes in tens of milliseconds
 COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell starts apart
-ROUGH_STEPS, COARSE_STEPS, POLISHED = 8, 4, 2  # from each start; of the best ones with all numbers; how many these are
+ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
 SAME = 0.3  # of a logarithm
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
@@ -100,10 +100,10 @@ def from_starts(
             if path in places:
                 u[places[path]] = np.log(value / problem.scale.size[places[path]])
         u = np.clip(u, problem.lower, problem.upper)
-        ends.append(minimise(problem, problem.state(u), ROUGH_STEPS, tolerance, watch).state)
+        ends.append(minimise(problem, problem.state(u), ROUGH_STEPS, tolerance, watch, rough=True).state)
     problem.span = whole
     best = _distinct(sorted(ends, key=lambda state: state.cost), problem)[:POLISHED]
-    polished = [minimise(problem, end, COARSE_STEPS, tolerance, watch).state for end in best]
+    polished = [minimise(problem, end, COARSE_STEPS, tolerance, watch, rough=True).state for end in best]
     return sorted(polished, key=lambda state: state.cost)
 
 

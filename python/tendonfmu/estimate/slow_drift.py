@@ -26,7 +26,8 @@ class SlowDrift:
     def __init__(self, time: Numbers, stretch: Indices, used: Flags, knots: float = np.inf) -> None:
         """Make the basis. time: [B] (s); stretch: [B]; used: [B]; knots: s, inf for constants."""
         self.knots, self.used = knots, used
-        self._span = Span(sparse.csr_array(sparse.block_diag(list(_bases(time, stretch, knots)), format="csr"))[used])
+        self.basis = sparse.csr_array(sparse.block_diag(_bases(time, stretch, knots), format="csr"))  # [B, s]
+        self._span = Span(self.basis[used])
 
     def without(self, values: Array) -> Numbers:
         """Return the used rows of values [B, n, ...] without their constant or drift, [R, n, ...]."""
