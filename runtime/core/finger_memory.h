@@ -65,9 +65,6 @@ typedef struct extension_row {
   const double* parameters;
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
-  size_t offset;         /* of its memory among the effect_memory; not of signals and memory rows */
-  double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
-  double* next_slopes;
 } extension_row;
 
 /* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
