@@ -141,7 +141,8 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
   if (!remembers_at(f, slot)) {
     return product(acts, friction);
   }
-  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE], stretch = f->memory.compliance * before;
+  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE];
+  const double stretch = f->memory.compliance > 0.0 ? f->memory.sections[slot] * f->memory.compliance * before : 0.0;
   const double turned = first != 0.0 ? 0.0 : motion + stretch, limit = product(acts, friction).slope;
   double force = 0.0;
   for (size_t e = 0; e < f->memory.elements; ++e) {
