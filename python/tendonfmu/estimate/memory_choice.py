@@ -18,7 +18,7 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.memory import CORDS, PRESLIDING, memory_rows, with_rows, without_memory
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
-from tendonfmu.estimate.memory_methods import coarse_problem, from_starts, full_problem, guess_prior, no_show
+from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
 from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, make_grid
@@ -99,7 +99,7 @@ class _Search:
 
     def __init__(self, finger: Finger, recordings: Sequence[FitRecording], choice: Choice, threads: int) -> None:
         self._finger, self._recordings, self._choice = finger, recordings, choice
-        self._threads, self._grid = threads, make_grid(recordings)
+        self._threads, self._grid = threads, make_grid(recordings, STEP)
         self._variance: Numbers | None = None  # [n] of what the plain model leaves
         self.tried: list[Form] = []
 

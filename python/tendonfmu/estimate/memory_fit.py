@@ -8,7 +8,7 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,8 @@ from tendonfmu.estimate.structure import FIXED, Structure
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
-LEAST_FALL = 1e-4  # of the cost, for each joint and effective block
+LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
+LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -83,19 +84,18 @@ class MemoryProblem:
             low, high = (self.scale.coordinates(end) for end in ends)
         self.lower = np.where(log, np.maximum(low, -FARTHEST), low)
         self.upper = np.where(log, np.minimum(high, FARTHEST), high)
-        self.blocks = np.full(runs.joints, float(drift.used.sum()))  # N_j: those that count
+        self.span: Numbers = np.eye(len(log))  # [u, v] directions that a step may take, in coordinates
+        self.blocks = np.full(runs.joints, drift.used.sum() * runs.grid.step / LASTING)  # N_j: those that count
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30
         self.mean, self.known = np.zeros(len(log)), np.zeros((len(log), len(log)))  # u_0 and P of the prior
 
     def values(self, u: Numbers) -> dict[str, float]:
         """Return the numbers of the description by path."""
-        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self.bounds))
+        numbers = self.estimator.values(np.clip(self.scale.unknowns(u), *self._bounds()))
         return dict(zip(self._paths, numbers[self._rows].tolist(), strict=True))
 
-    @property
-    def bounds(self) -> tuple[Numbers, Numbers]:
-        """Lower and upper bounds of the unknowns z."""
+    def _bounds(self) -> tuple[Numbers, Numbers]:
         return self.scale.unknowns(self.lower), self.scale.unknowns(self.upper)
 
     def state(self, u: Numbers) -> State:
@@ -112,41 +112,26 @@ class MemoryProblem:
         """Return Q, [n] ((N·m)²)."""
         return np.asarray(np.mean(residual**2, axis=0) + self._floor)
 
-    def linearised(self, state: State, like: Linearised | None = None) -> Linearised:
-        """Return the derivatives at a state; only those by numbers of the memory are new if there are others like it."""
-        if like is None:
-            return self.of_columns(state, self.drift.without(self.columns(state.u)))
-        remembered, columns = np.flatnonzero(self.scale.log), like.columns.copy()
-        columns[:, :, remembered] = self.drift.without(self.columns(state.u, remembered.tolist()))
-        return self.of_columns(state, columns)
-
-    def of_columns(self, state: State, columns: Numbers) -> Linearised:
-        """Return what follows from derivatives [R, n, u] at a state."""
+    def linearised(self, state: State) -> Linearised:
+        """Return the derivatives by the directions of `span` at a state."""
+        columns = self.drift.without(self._columns(state.u, self.runs, self.span))
         weight = self.blocks / len(state.residual) / self.variance(state.residual)
-        information = np.zeros((len(state.u), len(state.u)))
-        gradient = np.zeros(len(state.u))
+        information = np.zeros((columns.shape[2],) * 2)
+        gradient = np.zeros(columns.shape[2])
         for j, share in enumerate(weight):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
 
-    def columns(self, u: Numbers, chosen: Sequence[int] | None = None, runs: CoreRuns | None = None) -> Numbers:
-        """Return [B, n, c] the derivatives of τ − T by the chosen of u, or all (N·m), over some runs."""
+    def _columns(self, u: Numbers, runs: CoreRuns, span: Numbers) -> Numbers:
+        """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m)."""
         here = self.values(u)
-        directions = [self._direction(k, u, here) for k in (range(len(u)) if chosen is None else chosen)]
-        return (self.runs if runs is None else runs).columns(directions, self._of_description(here))
-
-    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
-        """Return derivatives at `tried` that agree with the step there: Broyden's update."""
-        step = tried.u - state.u
-        missed = tried.residual - state.residual - linearised.columns @ step
-        return self.of_columns(
-            tried, linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
-        )
+        directions = [self._direction(way, u, here) for way in span.T]
+        return runs.columns(directions, self._of_description(here))
 
     def slopes(self, state: State, runs: CoreRuns) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
-        return -self.columns(state.u, None, runs) / self.scale.slopes(self.scale.unknowns(state.u))
+        return -self._columns(state.u, runs, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
 
     def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
         """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
@@ -159,13 +144,11 @@ class MemoryProblem:
         scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
         return scores - scores.mean(axis=0), length
 
-    def _direction(self, k: int, u: Numbers, here: Mapping[str, float]) -> Direction:
-        """Return the move of unknown k, inwards at its upper bound."""
-        step = STEP * max(1.0, abs(u[k])) if not self.scale.log[k] else STEP
-        step = -step if u[k] + step > self.upper[k] else step
-        moved = u.copy()
-        moved[k] += step
-        there = self._of_description(self.values(moved))
+    def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
+        """Return the move along a way [u], backwards where it would cross a bound."""
+        step = STEP * max(1.0, float(np.abs(u[(way != 0.0) & ~self.scale.log]).max(initial=0.0)))
+        step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
+        there = self._of_description(self.values(u + step * way))
         return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
 
     def _of_description(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -186,48 +169,44 @@ class Minimum:
     converged: bool
 
 
-def minimise(
-    problem: MemoryProblem,
-    begin: State,
-    most: int,
-    tolerance: float,
-    watch: Watch | None = None,
-    *,
-    known: Linearised | None = None,
-    rough: bool = False,
-) -> Minimum:
-    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
-
-    Between two computations of the derivatives Broyden's update keeps them good enough (Math. Comp. 19, 1965). `known`
-    are some to begin with; a rough end has updated ones.
-    """
-    state, damping, converged, number = begin, DAMPING[0], False, 0
-    linearised, is_fresh = (problem.linearised(state), True) if known is None else (known, False)
-    while not converged and number < most:
-        number += 1
-        gradient = linearised.gradient + problem.known @ (state.u - problem.mean)
-        matrix = linearised.information + problem.known
-        step = bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
-        tried = problem.state(state.u + step)
-        fall = state.cost - tried.cost
-        small = step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum())
-        if fall > 0.0:
-            linearised = problem.moved_on(state, linearised, tried)
-            state, damping = tried, max(damping / 5.0, DAMPING[1])
-            if watch is not None:
-                watch(number, state)
-        else:
+def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, watch: Watch | None = None) -> Minimum:
+    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors."""
+    state, damping, converged, span = begin, DAMPING[0], False, problem.span
+    linearised = problem.linearised(state)
+    for number in range(1, most + 1):
+        gradient = linearised.gradient + span.T @ problem.known @ (state.u - problem.mean)
+        matrix = linearised.information + span.T @ problem.known @ span
+        room = _room(span, problem.lower - state.u, problem.upper - state.u)
+        while damping < DAMPING[2]:
+            step = _bounded_step(matrix, gradient, damping, *room)
+            tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
+            if tried.cost < state.cost:
+                break
             damping *= 8.0
-        if small and (is_fresh or rough):
-            converged = fall >= 0.0 or damping > 1.0
-        elif small:
-            linearised, is_fresh = problem.linearised(state), True
-            continue
-        is_fresh = is_fresh and fall <= 0.0
-    return Minimum(state, linearised if is_fresh or rough else problem.linearised(state), number, converged)
+        else:
+            converged = True
+            break
+        fall = state.cost - tried.cost
+        state, damping = tried, max(damping / 5.0, DAMPING[1])
+        if watch is not None:
+            watch(number, state)
+        linearised = problem.linearised(state)
+        if step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum()):
+            converged = True
+            break
+    return Minimum(state, linearised, number, converged)
 
 
-def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
+def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]:
+    """Return how far a step may go along each direction [v] before one of its numbers [u] is at a bound."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([low[:, None] / span, high[:, None] / span])
+    ends[:, span == 0.0] = np.inf
+    least = np.where(span == 0.0, -np.inf, ends.min(axis=0)).max(axis=0)
+    return least, np.where(span == 0.0, np.inf, ends.max(axis=0)).min(axis=0)
+
+
+def _bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
     """Return the step that minimises the damped quadratic model between bounds."""
     diagonal = np.maximum(np.diag(matrix), 1e-12 * float(np.diag(matrix).max()) + 1e-300)
     length = np.sqrt(diagonal)
@@ -240,9 +219,3 @@ def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Number
     room = np.minimum(low, -1e-300), np.maximum(high, 1e-300)
     found = lsq_linear(root, right, (room[0] * length, room[1] * length), method="bvls")
     return np.asarray(np.clip(found.x / length, low, high))
-
-
-def best_of(problem: MemoryProblem, begins: Sequence[State], most: int, tolerance: float) -> list[State]:
-    """Go a few steps down from each start; return where they end, the best first."""
-    ends = [minimise(problem, begin, most, tolerance, rough=True).state for begin in begins]
-    return sorted(ends, key=lambda state: state.cost)
