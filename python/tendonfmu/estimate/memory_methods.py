@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from tendonfmu.statistics import sample_weights
 
 STEP, RATE = 0.02, 200.0  # s and Hz of a fit: elements take any step, and friction changes in tens of milliseconds
 COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell starts apart
-ROUGH_STEPS, COARSE_STEPS, POLISHED = 8, 4, 2  # from each start; of the best ones with all numbers; how many these are
+ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
 SAME = 0.3  # of a logarithm
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
@@ -78,27 +78,32 @@ def guess_prior(problem: MemoryProblem) -> tuple[Numbers, Numbers]:
 
 
 def from_starts(
-    problem: MemoryProblem, begin: Numbers, tolerance: float, watch: Callable[[int, State], None]
+    problem: MemoryProblem,
+    begin: Numbers,
+    tolerance: float,
+    watch: Callable[[int, State], None],
+    memories: Iterable[Mapping[str, float]] | None = None,
 ) -> list[State]:
     """Go a few steps down from each start of the memory about z = `begin` [u]; return the best ends, the best first.
 
-    First the numbers of the memory and one factor for all friction of a kind move, then all numbers of the best.
+    `memories`: numbers of the memory by path to start from; None: those of `starts`. First the numbers of the memory
+    and one factor for all friction of a kind move, then all numbers of the best.
     """
     places = {unknown.path: k for k, unknown in enumerate(problem.estimator.unknowns)}
     first = problem.scale.coordinates(begin)
     whole = problem.span
     problem.span = _few_directions(problem, first)
     ends: list[State] = []
-    for start in starts(problem.runs.data):
+    for start in starts(problem.runs.data) if memories is None else memories:
         u = first.copy()
         for path, value in start.items():
             if path in places:
                 u[places[path]] = np.log(value / problem.scale.size[places[path]])
         u = np.clip(u, problem.lower, problem.upper)
-        ends.append(minimise(problem, problem.state(u), ROUGH_STEPS, tolerance, watch).state)
+        ends.append(minimise(problem, problem.state(u), ROUGH_STEPS, tolerance, watch, rough=True).state)
     problem.span = whole
     best = _distinct(sorted(ends, key=lambda state: state.cost), problem)[:POLISHED]
-    polished = [minimise(problem, end, COARSE_STEPS, tolerance, watch).state for end in best]
+    polished = [minimise(problem, end, COARSE_STEPS, tolerance, watch, rough=True).state for end in best]
     return sorted(polished, key=lambda state: state.cost)
 
 
@@ -218,6 +223,7 @@ def _weighted(
     given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(problem.runs.grid.segments)
     if settings.effective:
         problem.blocks, shares = effective_blocks(problem, first.state)
+    problem.reweighted(first.state)
     if given is None:
         now = problem.linearised(first.state)
         pull = now.information @ (first.state.u - problem.mean) - now.gradient
@@ -225,7 +231,7 @@ def _weighted(
     else:
         covariance = prior.of_spread(given)
     problem.known = inverse(covariance)
-    again = replace(first.state, cost=problem.cost(first.state.residual, first.state.u))
+    again = problem.reweighted(first.state)
     tolerance, show = settings.options.tolerance, shown(problem, "effective samples")
     last = minimise(problem, again, settings.passes, tolerance, show)
     return learned_of(problem, last, prior, given, _weights(problem, recordings, shares), first.steps, passes())
