@@ -35,8 +35,6 @@ typedef struct finger_settings {
   double start_share; /* of friction as it stood before the first sample */
   int has_initial_torque, has_tendon_zero;
   double hysteresis;
-  int filters_position;
-  double jerk_density; /* rad²/s⁵ */
   int forgets_by_absorption, remembers_entry_load;
   /* the detector */
   int bounds_friction, bounds_presliding, knows_uncertainty, uses_innovation;
@@ -65,9 +63,6 @@ typedef struct extension_row {
   const double* parameters;
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
-  size_t offset;         /* of its memory among the effect_memory; not of signals and memory rows */
-  double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
-  double* next_slopes;
 } extension_row;
 
 /* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
@@ -93,6 +88,7 @@ typedef struct friction_memory {
   int relaxes;       /* some place has a relaxation time */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
+  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end; with cord_stretch only */
   friction_element element[MODEL_MAX_ELEMENTS];
 } friction_memory;
 
@@ -115,13 +111,12 @@ typedef struct derived_numbers {
   uint32_t* edge_record;   /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
   double* joint_law;       /* [N × LAW_NUMBERS] T_jv0 */
   double* load_law;        /* [N × LAW_NUMBERS] T_jvf */
-  double *cover_stiffness, *cover_rest;                /* [N] */
-  double *contact_threshold, *contact_per_force;       /* [N] */
-  double* initial_torque;                              /* [N] */
-  double* position_variance;                           /* [N] rad², with a position filter only; 1 in spare lanes */
-  double *innovation_threshold, *innovation_per_force; /* [N] */
-  double *deviation, *deviation_per_force;             /* [N] */
-  double *drift_threshold, *drift_per_force;           /* [N] with contact.drift only */
+  double *cover_stiffness, *cover_rest;                                   /* [N] */
+  double *contact_threshold, *contact_per_force;                          /* [N] */
+  double* initial_torque;                                                 /* [N] */
+  double *innovation_threshold, *innovation_per_force;                    /* [N] */
+  double *deviation, *deviation_per_force;                                /* [N] */
+  double *drift_threshold, *drift_per_force;                              /* [N] with contact.drift only */
   double *rest_threshold, *rest_per_force, *rest_creep, *rest_innovation; /* [N] with contact.rest only */
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
   link_geometry links; /* arrays NULL without links */
@@ -150,26 +145,6 @@ enum {
   STATE_STEP,            /* Δt of the last sample, s; 0 of the first */
   STATE_SCALARS = 20     /* a multiple of 4: the rows stay aligned */
 };
-
-#define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
-
-/* Rows of joints that the position filter remembers, beside the velocity. */
-typedef enum filter_row_kind {
-  FILTER_ANGLE,        /* x, rad */
-  FILTER_ACCELERATION, /* a, rad/s² */
-  FILTER_HELD_ANGLE,   /* z behind the gate, rad */
-  FILTER_P00,          /* covariance of x, v, a */
-  FILTER_P01,
-  FILTER_P02,
-  FILTER_P11,
-  FILTER_P12,
-  FILTER_P22,
-  FILTER_GAIN_0, /* ∂x/∂q, ∂v/∂q, ∂a/∂q of the last sample; 0 of the first */
-  FILTER_GAIN_1,
-  FILTER_GAIN_2,
-  FILTER_CARRIES, /* ∂z/∂x of the last sample: 1 or 0 */
-  FILTER_ROWS
-} filter_row_kind;
 
 /* Rows of tendons that sensor_fault remembers. */
 typedef enum sensor_row_kind {
@@ -221,8 +196,7 @@ typedef struct finger_state {
       *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
   double *start_left, *unlearned; /* [n × M + N] share of how an effect stood at the start that motion has not turned
                                      over, [N] V, N·m; with start_share only */
-  double* part;   /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
-  double* filter; /* [FILTER_ROWS × N] with a position filter only */
+  double* part; /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
   /* [N] N·m, with contact.drift only: u, p, s, what the bias has learned since the start, d */
   double *drift_of_late, *drift_quick, *drift_slow, *learned, *drift;
   /* with contact.rest only */
@@ -238,9 +212,8 @@ typedef struct finger_state {
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
   double *by_turning, *by_limit; /* [2 × (n × M + N)] ∂F/∂c0, ∂F/∂lim of the last sample */
-  double *tension,
-      *tension_change; /* [2 × (n × M + N)] f behind a place, N; [n × M + N] of f_B; with cord_stretch only */
-  double* extension;   /* as the extensions ask for */
+  double* tension;               /* [2 × (n × M + N)] f behind a place, N; with cord_stretch only */
+  double* extension;             /* as the extensions ask for */
 } finger_state;
 
 /* Which lanes of a row stand for something; the others hold 0, unless they are tracked along. */
@@ -306,8 +279,6 @@ typedef struct finger_scratch {
   double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
   double* residual_variance;             /* [N] S, (N·m)²; of a guided sample only */
   double* part;                          /* as in the state */
-  double* filter;                        /* as in the state, after this sample */
-  double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
@@ -324,10 +295,10 @@ typedef struct finger_scratch {
   double *grip, *bias_grip;          /* [n × M + N] what friction rows make of F and b; with extensions only */
   double *whole_edge, *whole_pulley; /* [n × M + N] grip·|F| of the law; with extensions only */
   double* own_limit;                 /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
-  double *travelled, *turning, *kept; /* [n × M + N] Δ; with what cords beyond have stretched; the share left of what
-                                        was held before this sample; this and the next with a memory only */
-  double *element, *by_turning, *by_limit, *tension, *tension_change; /* as in the state, after this sample */
-  effect_sample sample;                                               /* as the extensions see it */
+  double *travelled, *kept;          /* [n × M + N] Δ; the share left of what was held before this sample; this and
+                                      * the next with a memory only */
+  double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
+  effect_sample sample;                              /* as the extensions see it */
   double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 
@@ -364,15 +335,6 @@ struct tendonfmu_finger {
 /* 1 while there is anything to learn of how friction stood at the start */
 static inline int start_is_open(const tendonfmu_finger* finger) {
   return finger->remembered.scalar[STATE_START_OPEN] != 0.0;
-}
-
-/* 1 where the velocity comes from the position filter; then its row of the filter in memory */
-static inline int filters_position(const tendonfmu_finger* finger) {
-  return finger->derived.settings.filters_position &&
-         (int)finger->remembered.scalar[STATE_SOURCE] != TENDONFMU_JOINT_VELOCITIES;
-}
-static inline const double* filter_memory(const tendonfmu_finger* finger, const double* filter, filter_row_kind row) {
-  return filter + (size_t)row * finger->joint_lanes;
 }
 
 /* Row of the sensors in memory. */
