@@ -31,7 +31,7 @@ LEAST_SPREAD = 0.04  # of the mean variance over the joints
 WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
 RIGID = 1e12  # N/m
 LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
-LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
+LEAST_FALL = 3e-4  # of the cost, for each joint and effective block, in rough fits
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -226,6 +226,7 @@ def minimise(
     rough end has updated ones.
     """
     state, damping, number, converged, span = begin, DAMPING[0], 0, False, problem.span
+    least = LEAST_FALL * float(problem.blocks.sum()) if rough else 0.5 * tolerance**2
     linearised, is_fresh = problem.linearised(state), True
     while number < most:
         number += 1
@@ -236,7 +237,7 @@ def minimise(
         tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
         expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < LEAST_FALL * float(problem.blocks.sum())
+        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < least
         if fall > 0.0:
             linearised = problem.moved_on(linearised, state, step, tried)
             state, damping = tried, max(damping / 5.0, DAMPING[1])
@@ -252,9 +253,7 @@ def minimise(
             is_fresh = False
         elif not is_fresh or fall > 0.0:
             linearised, is_fresh = problem.linearised(state), True
-    if not (rough or is_fresh):
-        linearised = problem.linearised(state)
-    return Minimum(state, linearised, number, converged)
+    return Minimum(state, linearised if rough else problem.linearised(state), number, converged)
 
 
 def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]:
