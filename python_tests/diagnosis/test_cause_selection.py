@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tendonfmu.diagnosis.signal_choice import lag_of
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
@@ -16,7 +17,6 @@ from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, LARGEST_SECANT, hypotheses
 from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
-from tendonfmu.diagnosis.signal_choice import lag_of
 from tendonfmu.recordings import Signals
 from tendonfmu.statistics.block_grams import standard_error
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
@@ -25,7 +26,6 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numb
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
-from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.description import Finger

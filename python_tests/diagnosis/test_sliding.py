@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
 
 import sticking_finger
 from tendonfmu.calibration.fit import fit_all
@@ -18,7 +19,6 @@ from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.remainder import Remainder, unexplained_of
 from tendonfmu.diagnosis.remainder_features import Finding
 from tendonfmu.diagnosis.result import Diagnosis
-from tendonfmu.diagnosis.sliding import TIMES, is_stuck, settled
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import read_recording
