@@ -71,12 +71,18 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
         start |= {path: factor * given[path] for path in lengths}
         start |= {} if time is None else dict.fromkeys(times, time)
         start |= {} if cord is None else dict.fromkeys(cords, cord)
-        yield start
+        if start != given:
+            yield start
 
 
 def memory_values(data: Data) -> dict[str, float]:
     """Return the numbers of the memory by path."""
     return {path: _number(data, path) for path in memory_paths(data)}
+
+
+def optional_paths(data: Data) -> list[str]:
+    """Return the paths of the numbers that the memory can be without: relaxation times, and the stiffness of cords."""
+    return [path for path in memory_paths(data) if path.endswith(".relaxation_time") or _is_cord(data, path)]
 
 
 def _is_cord(data: Data, path: str) -> bool:
