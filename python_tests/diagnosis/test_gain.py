@@ -147,7 +147,7 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     found = fit_extended(before, causes, samples, settings)
     parameters = cause_parameters(before.data, causes, found)
     value, unit = parameters[0]["extensions[1].stiffness"]
-    assert value == pytest.approx(1.0, rel=0.1) and unit == "N.m/rad3"
+    assert value == pytest.approx(1.0, rel=0.2) and unit == "N.m/rad3"
     assert list(parameters[1]) == ["extensions[2].inertia"]
     without = [fit_extended(before, [other], samples, settings).data for other in causes[::-1]]
     result = measure_gain(before.data, found.data, [training], [test], between=[without[1]])
