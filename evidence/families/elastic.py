@@ -26,9 +26,10 @@ from evidence.families.motion import Motion
 
 JOINTS, RATE = 3, 500.0  # Hz
 STEP, TICK, SETTLE = 0.0005, 0.001, 1.5  # s; friction is set at every tick
-LINK, RADIUS, PULLEY = 0.04, 0.008, 5e-7  # m, m, kg·m²
-FIRST = 0.6  # share of a cord's compliance before its first pulley
-DAMPING = 2e-4  # s, of a cord, over its stiffness
+LINK, MASS, RADIUS, PULLEY = 0.03, 0.008, 0.008, 5e-7  # m, kg, m, kg·m²
+SECTION = 2e4  # N/m, of a cord from one joint to the next
+DAMPING = 2e-4  # s, of a cord between pulleys, over its stiffness
+HARD, SOFT = 0.999, 0.97  # impedance of friction in journals and joints: they creep below 0.5 mm/s and 10 mrad/s
 FREE, TINY = -1e3, 1e-9  # m: springs only pull; N·m: MuJoCo leaves out a frictionloss of 0
 
 
@@ -38,22 +39,24 @@ def mjcf(arms: Array, finger: Finger) -> str:
     body = ""
     for j in reversed(range(n)):
         turning = "".join(
-            f'<body gravcomp="1"><joint name="pulley_{i}_{j}" axis="0 -1 0" armature="{PULLEY}" frictionloss="1e-9"/>'
+            f'<body gravcomp="1"><joint name="pulley_{i}_{j}" axis="0 -1 0" armature="{PULLEY}" frictionloss="1e-9" '
+            f'solimpfriction="{HARD} {HARD} 0.001"/>'
             '<inertial pos="0 0 0" mass="1e-4" diaginertia="1e-9 1e-9 1e-9"/></body>'
             for i in range(m)
             if arms[i, j]
         )
         body = (
-            f'<body pos="{j and LINK} 0 0" gravcomp="1"><joint name="joint_{j}" axis="0 -1 0" armature="2e-5" '
+            f'<body pos="{j and LINK} 0 0" gravcomp="1"><joint name="joint_{j}" axis="0 -1 0" armature="5e-6" '
             f'stiffness="{finger.cover[j]}" springref="{finger.rest[j]}" damping="{finger.damping[j]}" '
-            f'frictionloss="1e-9"/><inertial pos="{LINK / 2} 0 0" mass="0.015" diaginertia="1e-7 2e-6 2e-6"/>{body}'
+            f'frictionloss="1e-9" solimpfriction="{SOFT} {SOFT} 0.001"/>'
+            f'<inertial pos="{LINK / 2} 0 0" mass="{MASS}" diaginertia="1e-7 1e-6 1e-6"/>{body}'
             f"</body>{turning}"
         )
     runs = "".join(run(arms, finger, i, s) for i in range(m) for s in range(reach(arms, i) + 1))
     return f"""
 <mujoco><compiler angle="radian"/>
   <option timestep="{STEP}" integrator="implicitfast" jacobian="dense" gravity="0 0 0"/>
-  <default><joint solreffriction="0.003 1" solimpfriction="0.999 0.999 0.001"/></default>
+  <default><joint solreffriction="0.01 1"/></default>
   <worldbody>{body}</worldbody><tendon>{runs}</tendon>
 </mujoco>"""
 
@@ -63,17 +66,22 @@ def reach(arms: Array, i: int) -> int:
     return int(np.count_nonzero(arms[i]))
 
 
+def first_part(finger: Finger, i: int, last: int) -> float:
+    """Stiffness of cord i up to its first pulley [N/m]: that of all of it is the described one."""
+    return float(1.0 / (1.0 / finger.stiffness[i] - last / SECTION))
+
+
 def run(arms: Array, finger: Finger, i: int, s: int) -> str:
     """The part of cord i that comes to its pulley s from the one before; the last one ends at the link."""
     last = reach(arms, i)
-    stiffness = finger.stiffness[i] / (FIRST if s == 0 else (1.0 - FIRST) / last)
+    stiffness = SECTION if s else first_part(finger, i, last)
     ends = ""
     if s:
         ends = f'<joint joint="pulley_{i}_{s - 1}" coef="{RADIUS}"/>'
         ends += f'<joint joint="joint_{s - 1}" coef="{-arms[i, s - 1]}"/>'
     ends += f'<joint joint="pulley_{i}_{s}" coef="{-RADIUS}"/>' if s < last else ""
     return (
-        f'<fixed name="run_{i}_{s}" stiffness="{stiffness}" damping="{DAMPING * stiffness}" '
+        f'<fixed name="run_{i}_{s}" stiffness="{stiffness}" damping="{DAMPING * stiffness if s else 0.0}" '
         f'springlength="{FREE} 0">{ends}</fixed>'
     )
 
@@ -95,7 +103,7 @@ class Mechanism:
         self.arriving = np.array([self.model.tendon(f"run_{i}_{j}").id for i, j in passes])
         self.stiffness = self.model.tendon_stiffness.reshape(self.model.ntendon, -1)[:, 0].copy()
         # of the whole cord; its first part takes all of it
-        self.hardening = hardening(hidden, m) / FIRST**2
+        self.hardening = hardening(hidden, m) * (self.stiffness[self.first] / finger.stiffness) ** 3
         self.crept = np.zeros((1, n))
 
     def tension(self) -> Array:

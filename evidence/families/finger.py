@@ -71,7 +71,7 @@ def finger(joints: int, rng: np.random.Generator, pretension: float = 18.0) -> F
         arms=arms,
         stiffness=rng.uniform(3000.0, 5000.0, m),
         edge=np.where(arms != 0.0, rng.uniform(0.025, 0.05, (m, n)), 0.0),
-        friction=rng.uniform(0.002, 0.006, n),
+        friction=rng.uniform(0.001, 0.003, n),
         damping=rng.uniform(0.0005, 0.002, n),
         cover=rng.uniform(0.015, 0.035, n),
         rest=rng.uniform(-0.05, 0.1, n),
