@@ -25,13 +25,13 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, fit_numb
 from tendonfmu.diagnosis.gain import OnlineError
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
-from tendonfmu.diagnosis.series import make_grid
 from tendonfmu.diagnosis.signal_choice import choose, delay_of_positions, least_sizes, scan
 from tendonfmu.diagnosis.span import span_of
 from tendonfmu.diagnosis.view import bias_of, predicted_of, series_of
 from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.model.native import Instance
+from tendonfmu.recordings import make_grid
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.statistics.splines import residual_of

@@ -77,7 +77,7 @@ CAMPAIGNS = {
         range(600, 640),
         range(602, 640, 3),
         {
-            "friction_drift", "stribeck", "presliding", "presliding_from_rest", "presliding_turns", "gate_open",
+            "friction_drift", "stribeck", "element_slips", "element_holds", "one_element_slips", "gate_open",
             "gate_held", "gate_pushed", "progressive_pull", "progressive_push", "inside_the_play",
             "play_carried_along", "before_the_oldest", "delayed_forces", "delayed_tendon_position",
             "delayed_joint_position",

@@ -114,7 +114,7 @@ def held_friction(run: Run) -> None:
 
 @case
 def held_friction_builds_up(run: Run) -> None:
-    """preload_friction and load_friction with presliding everywhere: ζ of their velocity in place of its sign."""
+    """preload_friction with presliding everywhere: z in place of its sign; load_friction: part of the joint's limit."""
     extensions = [
         {"effect": "presliding", "displacement": 0.1},  # D: 5e-5 m at a tendon, 1e-3 rad at a joint
         {"effect": "preload_friction", "joint": 2, "tendon": 2, "coulomb": 5.0},
@@ -122,13 +122,10 @@ def held_friction_builds_up(run: Run) -> None:
     ]
     rec = of_two([0.0, 0.001, 0.002], [[10.0, 8.0]] * 3, [[0.0, 0.0], [0.0, -1.0], [0.0, 2.0]])
     still = torque(run(two_joints(extensions[:1]), rec))
-    tendon, joint = [0.0], [0.0]  # ẋ_22 = −0.01 q̇_2
-    for side, travel in ((-1.0, 1e-3), (1.0, 2e-3)):
-        joint.append(side - (side - joint[-1]) * math.exp(-travel / 1e-3))
-        tendon.append(-side - (-side - tendon[-1]) * math.exp(-0.01 * travel / 5e-5))
+    # ẋ_22 = −0.01 q̇_2 travels 1e-5 m and −2e-5 m of 5e-5; q̇_2 −1e-3 rad, which is all of D, and back by twice that
     added = torque(run(two_joints(extensions), rec)) - still
     close(added[:, 0], np.zeros(3))
-    close(added[:, 1], -0.01 * 5.0 * np.array(tendon) + 8.0 * 1e-3 * np.array(joint))
+    close(added[:, 1], -0.01 * 5.0 * np.array([0.0, 0.2, -0.2]) + 8.0 * 1e-3 * np.array([0.0, -1.0, 1.0]))
 
 
 @case
@@ -160,27 +157,43 @@ def corrected_measurements(run: Run) -> None:
 
 @case
 def presliding(run: Run) -> None:
-    """ζ: 0, 1/2, 3/4, back over twice the distance, then at rest on the earlier side; no jump of the bias."""
+    """F: 0, half of the limit, slips, back over twice the distance, then at rest on the earlier side; no bias jump."""
     law = {"positive": JOINT_DRY, "negative": JOINT_DRY | {"static": 0.3, "coulomb": 0.2}}
-    rows = [{"effect": "presliding", "joint": 1, "displacement": 0.1 * HALF}]
+    rows = [{"effect": "presliding", "joint": 1, "displacement": 0.2}]
     description = finger([{"moment_arms": [ARM]}], [{"name": "j", "friction": law}], extensions=rows)
     speed = [1.0, 1.0, 1.0, -2.0, 0.0, 0.0, -0.005, 1.0]
-    rec = recording(np.arange(8) * 0.1, 10.0, speed)
-    out = run(description, rec)
-    back = -1.0 + 1.75 / 4.0
+    out = run(description, recording(np.arange(8) * 0.1, 10.0, speed))
+    # 0.1 N·m on the positive side, 0.2 and what is left of 0.1 on the other: κ = limit/D
     slow = 0.2 + 0.1 * math.exp(-0.5)
-    crept = -1.0 + (1.0 + back) * 0.5**0.005
-    forward = 1.0 - (1.0 - crept) / 2.0
-    expected = [0.0, 0.05, 0.075, 0.2 * back, 0.3 * back, 0.3 * back, slow * crept, 0.1 * forward]
+    back = 0.1 - 0.2 / 0.2 * 0.2
+    crept = back - slow / 0.2 * 0.0005
+    expected = [0.0, 0.05, 0.1, back, back, back, crept, crept + 0.05]
     close(torque(out)[:, 0], expected)
     close(out["bias_torque"], 0.1)
 
 
 @case
-def presliding_passes_the_force_on(run: Run) -> None:
-    """At a tendon: f_B = f_A·(1 − ζ·|F|), with a factor of friction_drift, beside a joint that sticks as ever."""
+def presliding_by_stiffness(run: Run) -> None:
+    """Two elements of a joint, one of which relaxes; what is held does not change with the load."""
     rows = [
-        {"effect": "presliding", "tendon": 1, "displacement": 1e-3 * HALF},
+        {"effect": "presliding", "joint": 1, "stiffness": 2.0, "share": 3.0},
+        {"effect": "presliding", "joint": 1, "stiffness": 1.0, "share": 1.0, "relaxation_time": 0.1 * HALF},
+    ]
+    load = {"static": 1e-2, "coulomb": 1e-2, "stribeck_velocity": 1.0}
+    description = finger([{"moment_arms": [ARM]}], [{"name": "j", "load_friction": load}], extensions=rows)
+    rec = recording(np.arange(5) * 0.1, [10.0, 10.0, 5.0, 5.0, 5.0], [0.0, 0.1, 0.0, 0.0, 1.0])
+    out = run(description, rec)
+    # limits 0.075 and 0.025, then half of that; the second loses half in each step and gains 1/(2 ln 2) of its travel
+    second = 0.01 / (2.0 * math.log(2.0))
+    expected = [0.0, 0.02 + second, 0.02 + second / 2.0, 0.02 + second / 4.0, 0.05]
+    close(torque(out)[:, 0], expected)
+
+
+@case
+def presliding_passes_the_force_on(run: Run) -> None:
+    """At a tendon: f_B = f_A − F, with a factor of friction_drift, beside a joint that sticks as ever."""
+    rows = [
+        {"effect": "presliding", "tendon": 1, "displacement": 2e-3},
         {"effect": "friction_drift", "tendon": 1, "amplitude": 1.0, "time_constant": 0.1 * HALF},
     ]
     tendon = {"moment_arms": [ARM], "edge_friction": [DRY]}
@@ -188,12 +201,23 @@ def presliding_passes_the_force_on(run: Run) -> None:
     description = finger([tendon], [{"name": "j", "load_friction": load}], extensions=rows)
     rec = recording([0.0, 0.1, 0.2], 10.0, [1.0, 1.0, 0.0])
     out = run(description, rec)
-    # ζ = 0, 1/2, 1/2; φ = 1, 3/2, 7/4
-    F = np.array([0.0, 0.1 * 0.5 * 1.5, 0.1 * 0.5 * 1.75])
-    rubs = np.array([1e-3, 1e-3, 0.0]) * 10.0 * (1.0 - F)
-    close(torque(out)[:, 0], 0.1 * F + rubs)
-    entered = 1e-3 * 10.0 * (1.0 - F[2])  # the joint alone came to rest
+    # half the distance at a limit of 3/2; that is held at rest, whatever the limit
+    F = np.array([0.0, 0.5 * 1.5, 0.5 * 1.5])
+    rubs = np.array([1e-3, 1e-3, 0.0]) * (10.0 - F)
+    close(torque(out)[:, 0], ARM * F + rubs)
+    entered = 1e-3 * (10.0 - F[2])  # the joint alone came to rest
     close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, 0.0, entered]))
+
+
+@case
+def cords_that_stretch(run: Run) -> None:
+    """A pulley turns as the cord beyond it stretches: a force that rises at a finger that stands."""
+    rows = [{"effect": "presliding", "tendon": 1, "stiffness": 1000.0}, {"effect": "cord_stretch", "stiffness": 500.0}]
+    tendon = {"moment_arms": [ARM], "edge_friction": [DRY]}
+    description = finger([tendon], [{"name": "j"}], extensions=rows)
+    out = run(description, recording([0.0, 0.1, 0.2, 0.3], [10.0, 10.3, 10.3, 20.0], [0.0, 0.0, 0.0, 0.0]))
+    # F = κ·(ΔT_b − F)/k_c, so 2/3 of the rise; then it is held, and what the rise makes of it slips at a tenth of T_b
+    close(torque(out)[:, 0], ARM * np.array([0.0, 0.2, 0.2, 2.0]))
 
 
 @case

@@ -34,9 +34,13 @@ ROWS: list[dict[str, Any]] = [
     {"effect": "stribeck", "joint": 1, "amplitude": -0.4, "stribeck_velocity": 0.3},
     {"effect": "stribeck", "tendon": 2, "amplitude": 0.4, "stribeck_velocity": 0.004},
     {"effect": "presliding", "displacement": 0.3},
+    {"effect": "presliding", "level": 2, "displacement": 2e-4, "relaxation_time": 2.0},
+    {"effect": "presliding", "joint": 1, "tendon": 2, "stiffness": 2e4},
+    {"effect": "presliding", "stiffness": 2e4, "share": 2.0},
+    {"effect": "cord_stretch", "stiffness": 5e4},
 ]
 
 
 def name_of(row: dict[str, Any]) -> str:
     """Effect and place, for the name of a test."""
-    return "-".join(str(row[key]) for key in ("effect", "joint", "tendon") if key in row)
+    return "-".join(str(row[key]) for key in ("effect", "joint", "tendon", "level") if key in row)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oracle_detection import Detector, direction_above
+from oracle_elements import Elements
 from oracle_extensions import Extensions
 from oracle_finger import Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
 from oracle_position_filter import read_position_filter
@@ -45,6 +46,7 @@ class FingerOracle:
         self.sensors = SensorWatch(description, self.R, kinematics_source, self.branches) if watches else None
         self.watch = Watch(self.R_plus, self.R_plus, [False] * self.n, [False] * self.n)
         self.spring_end = np.zeros(self.m)  # x0 − f0/k
+        self.elements = Elements(description, self.R, self.thresholds, self.branches)
         self.grips = [self.extensions.rows_at(kind, at) for kind, at, _ in self.places]
         # state
         self.samples = 0
@@ -119,14 +121,17 @@ class FingerOracle:
         x_dot = tendon_velocity(self.R, v)
         travel = v * dt if self.travel is None else self.travel
         self.travelled = travel, tendon_velocity(self.R, travel)
-        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, out)
+        self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, self.elements, out)
+        self.elements.turn(self.travelled, dt, first)
         # 2. each friction effect: F, the increment b, and what stiction may hide
         F, b, hidden = self._effects(q, v, x_dot, time, dt, first, out)
         # 3. forces at and between the joints, and with them what multiplies an F or a b
-        f_between, f_before_edge, slack = self._propagate(f0, F.edge, F.pulley, out)
+        f_between, f_before_edge, slack, lost = self._propagate(f0, F.edge, F.pulley, out)
         f = self._loads(f_before_edge, f_between)
         # 4. totals, eq. (10)
-        T = self._total(F * f) + self._springs(q)
+        products = self._remembered(F * f, lost, out)
+        self._start_of_elements(F, first)
+        T = self._total(products) + self._springs(q)
         db = self._total(self._increments(b * f))
         tau = self.R.T @ f0 - self.known_torque
         mean_force = float(np.mean(np.abs(f0))) if self.sensors is None else self.sensors.mean_force(f0)
@@ -145,7 +150,7 @@ class FingerOracle:
         change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
         unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew)
         self.start.forget(unwatched)
-        bounds = self.detector.bounds(hold(hidden * f), self._parts(F * f, q), change, self.start.unlearned, dt)
+        bounds = self.detector.bounds(hold(hidden * f), self._parts(products, q), change, self.start.unlearned, dt)
         unwell = bool(unwatched.any()) or (self.sensors is not None and bool(self.sensors.faults.any()))
         self.detector.watch(f0, x0, mean_force, time, dt, first or unwell, out)
         joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
@@ -229,15 +234,12 @@ class FingerOracle:
         """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
         F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
         seen = q.tolist(), v.tolist(), x_dot.tolist()
-        travelled = self.travelled[0].tolist(), self.travelled[1].tolist()
         for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
             velocity, angle, key = self._seen_by(kind, at, *seen)
             factor = self.extensions.factor(rows, abs(velocity), time)
-            if (displacement := self.extensions.slides(rows, effect.threshold)) is not None:
-                travel = self._seen_by(kind, at, seen[0], *travelled)[0]
-                taken = self._slide(effect, displacement, velocity, angle, travel, key), 0.0
-                whole = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle))
-                self.start.slides(effect, travel, displacement, factor * whole, first)
+            if self._remembers(kind, at):
+                taken = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle)), 0.0
+                effect.whole = factor * taken[0]
                 direction = direction_above(velocity, effect.limit(self.hysteresis), key, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
                 if effect.rests and self.detector.bounds_presliding:
@@ -250,8 +252,31 @@ class FingerOracle:
                 getattr(hidden, kind)[at] = factor * abs(effect.value(effect.side or 1, abs(velocity), angle))
         return F, b, hidden
 
-    def _slide(self, effect: Effect, displacement: float, v: float, angle: float, travel: float, key: Key) -> float:
-        return self.extensions.sliding_friction(effect, displacement, key, v, angle, travel)
+    def _remembers(self, kind: str, at: tuple[int, ...]) -> bool:
+        """Whether the friction of a place has a memory: F is then |F|, the limit without the force."""
+        return bool(self.elements.at(("joint", *at) if kind in ("joint", "load") else (kind, *at)))
+
+    def _remembered(self, products: Places, lost: dict[tuple[str, int, int], float], out: Step) -> Places:
+        """F·f with what has a memory in its place."""
+        for (kind, i, j), loss in lost.items():
+            getattr(products, kind)[i, j] = loss
+        for j in range(self.n):
+            if self._remembers("joint", (j,)):
+                limit = products.joint[j] + products.load[j] + self.extensions.own_limit(j)
+                held = self.elements.own(j, limit, out)
+                share = held / limit if limit > 0.0 else 0.0
+                own = products.joint[j] + products.load[j]
+                products.load[j] *= share
+                products.joint[j] = held - products.load[j] if own else held
+        self.elements.end()
+        return products
+
+    def _start_of_elements(self, F: Places, first: bool) -> None:
+        for kind, at, effect in self.places:
+            if self._remembers(kind, at):
+                *_, key = self._seen_by(kind, at, [0.0] * self.n, [0.0] * self.n, [[0.0] * (self.n + 1)] * self.m)
+                turns = key[0] == "joint" or bool(self.R[key[1], key[2] :].any())  # else nothing of it is ever held
+                self.start.remembers(effect, self.elements.kept.get(key, 0.0) if turns else 0.0, first)
 
     def _seen_by(
         self, kind: str, at: tuple[int, ...], q: list[float], v: list[float], x_dot: list[list[float]]
@@ -339,8 +364,11 @@ class FingerOracle:
                 product[at] -= effect.taken_out
         return products
 
-    def _propagate(self, f0: Array, F_B: Array, F_A: Array, out: Step) -> tuple[Array, Array, Array]:
-        """eqs. (6), (7) as a recursion: f_B[i, j], f_A before the edge of joint j, and slack[i]."""
+    def _propagate(
+        self, f0: Array, F_B: Array, F_A: Array, out: Step
+    ) -> tuple[Array, Array, Array, dict[tuple[str, int, int], float]]:
+        """eqs. (6), (7) as a recursion: f_B[i, j], f_A before the edge of joint j, slack[i], what memories lose."""
+        lost: dict[tuple[str, int, int], float] = {}
         f_between = np.zeros((self.m, self.n))
         f_before_edge = np.zeros((self.m, self.n))
         slack = np.zeros(self.m, dtype=bool)
@@ -356,6 +384,13 @@ class FingerOracle:
                 return 0.0
             return force
 
+        def loss(kind: str, i: int, j: int, friction: float, force: float) -> float:
+            product = self._load(i, force) * friction
+            if not self._remembers(kind, (i, j)):
+                return product
+            lost[kind, i, j] = self.elements.loss(kind, i, j, product, force, out)
+            return lost[kind, i, j]
+
         given_forces, before, at_pulley = f0.tolist(), F_B.tolist(), F_A.tolist()
         for i in range(self.m):
             # f0 is an input: every implementation compares the same number, so it is never "near" (but interpolated)
@@ -363,10 +398,12 @@ class FingerOracle:
             for j in range(self.n):
                 f_before_edge[i, j] = f_A
                 # a force of 0 stays 0 whatever the friction: nothing is decided there by rounding
-                f_B = checked(f_A - self._load(i, f_A) * before[i][j], i, "between", j, computed=f_A != 0.0)
+                f_B = checked(f_A - loss("edge", i, j, before[i][j], f_A), i, "between", j, computed=f_A != 0.0)
+                self.elements.behind("edge", i, j, f_B)
                 f_between[i, j] = f_B
-                f_A = checked(f_B - self._load(i, f_B) * at_pulley[i][j], i, "at", j, computed=f_B != 0.0)
-        return f_between, f_before_edge, slack
+                f_A = checked(f_B - loss("pulley", i, j, at_pulley[i][j], f_B), i, "at", j, computed=f_B != 0.0)
+                self.elements.behind("pulley", i, j, f_A)
+        return f_between, f_before_edge, slack, lost
 
     def _load(self, i: int, force: float) -> float:
         """What multiplies an F or a b: the force, or its magnitude for a bidirectional tendon."""

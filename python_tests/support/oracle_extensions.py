@@ -6,6 +6,7 @@ counted from 0. An object of this file remembers what the text says an effect re
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -16,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oracle_detection import direction_above
+from oracle_elements import Element, Elements
 from oracle_finger import Effect, Joint, Key, Step, given
 
 Array = NDArray[Any]
 
+PLACES = ("joint", "tendon", "level")
 HISTORY = 64  # samples that a delay looks back on
 OPTIONAL_NUMBERS = {
     "gravity": ("sine", "cosine"),
@@ -41,14 +44,15 @@ class Row:
     effect: str
     joint: int | None
     tendon: int | None
+    level: int | None
     numbers: dict[str, float]
     play: float = math.nan  # z of `backlash`
 
 
 @dataclass
 class Moment:
-    """A sample as torques see it: q, v, acceleration, rest [n], f0 [m]; s of ẋ [m, n + 1] and of q̇ [n], or ζ where
-    `presliding` acts; Δ of both."""
+    """A sample as torques see it: q, v, acceleration, rest [n], f0 [m]; s of ẋ [m, n + 1] and of q̇ [n], z of ẋ and 0 of
+    q̇ where friction has a memory."""
 
     q: Array
     v: Array
@@ -57,7 +61,6 @@ class Moment:
     f0: Array
     tendon_side: Array
     joint_side: Array
-    travelled: tuple[Array, Array]
 
 
 @dataclass
@@ -83,12 +86,10 @@ def read_rows(description: Mapping[str, Any]) -> list[Row]:
     rows = []
     for entry in given(description, "extensions", []):
         effect = str(entry["effect"])
-        joint, tendon = (
-            None if given(entry, key, None) is None else int(entry[key]) - 1 for key in ("joint", "tendon")
-        )
+        places = [None if given(entry, key, None) is None else int(entry[key]) - 1 for key in PLACES]
         numbers = dict.fromkeys(OPTIONAL_NUMBERS.get(effect, ()), 0.0) | MECHANISM.get(effect, {})
-        numbers |= {k: float(v) for k, v in entry.items() if k not in ("effect", "joint", "tendon") and v is not None}
-        rows.append(Row(effect, joint, tendon, numbers))
+        numbers |= {k: float(v) for k, v in entry.items() if k not in ("effect", *PLACES) and v is not None}
+        rows.append(Row(effect, *places, numbers))
     return rows
 
 
@@ -158,21 +159,13 @@ def factor_of(row: Row, numbers: Mapping[str, Any], speed: Any, since_start: Any
     return 1.0
 
 
-def everywhere(row: Row) -> bool:
-    return row.joint is None and row.tendon is None
-
-
-def distance_of(row: Row, displacement: Any, threshold: float) -> Any:
-    """D of `presliding` at an effect with this v_min, m or rad."""
-    return displacement * threshold if everywhere(row) else displacement
-
-
-def next_share(share: Any, travel: float, displacement: Any) -> Any:
-    """ζ_k of `presliding` from ζ_{k−1}."""
+def _followed(z: float, element: Element, size: float, travel: float, dt: float) -> float:
+    """z of a sample before it is clipped, of friction of this size, N."""
+    kept, gain = element.decay(dt)
     if travel == 0.0:
-        return share
-    s = math.copysign(1.0, travel)
-    return s - (s - share) * np.exp(-abs(travel) / displacement)
+        return kept * z
+    steepness = element.per_distance if not element.stiffness else math.inf if size == 0.0 else element.stiffness / size
+    return kept * z + gain * min(steepness, 1e290) * travel
 
 
 class Extensions:
@@ -194,7 +187,7 @@ class Extensions:
         self.history: dict[str, list[Array]] = {}
         self.v_before = np.zeros(n)
         self.sides = Sides(np.zeros((m, n + 1)), np.zeros(n), set(self._read_sides(m)))
-        self.shares = np.zeros((m, n + 1)), np.zeros(n)  # ζ of all places of `presliding`
+        self.follows: dict[int, Array] = {}  # by number of a row of `preload_friction`, [n] z; NaN without a memory
         self.moment: Moment | None = None
 
     def _read_sides(self, m: int) -> list[tuple[Any, ...]]:
@@ -202,11 +195,10 @@ class Extensions:
         for row in self.rows:
             if row.effect == "preload_friction":
                 found += [("tendon", row.tendon, j) for j in (range(self.n) if row.joint is None else [row.joint])]
-            elif row.effect == "presliding" and row.joint is None:
-                tendons = range(m) if row.tendon is None else [row.tendon]
-                found += [("tendon", i, j) for i in tendons for j in range(self.n + 1)]
-                found += [("joint", j) for j in range(self.n) if row.tendon is None]
-            elif row.effect in ("presliding", "load_friction"):
+            elif row.effect == "presliding":
+                found += [("tendon", i, j) for i in range(m) for j in range(self.n + 1)]
+                found += [("joint", j) for j in range(self.n)]
+            elif row.effect == "load_friction":
                 found.append(("joint", row.joint))
         return found
 
@@ -274,7 +266,7 @@ class Extensions:
 
     def advance(
         self, q: Array, v: Array, x_dot: Array, f0: Array, dt: float, first: bool, thresholds: tuple[float, float],
-        travelled: tuple[Array, Array], out: Step,
+        travelled: tuple[Array, Array], elements: Elements, out: Step,
     ) -> None:  # fmt: skip
         """What torques and friction see of this sample. thresholds: v_min of tendons and joints; travelled: their Δ."""
         for i, row in enumerate(x_dot):
@@ -284,54 +276,53 @@ class Extensions:
             self.sides.take(("joint", j), velocity, thresholds[1], out)
         acceleration = np.zeros(self.n) if first else (v - self.v_before) / dt
         self.v_before = v
-        joint, tendon = (np.zeros_like(travel) if first else travel for travel in travelled)
-        sides = self.sides.tendon.copy(), self.sides.joint.copy()
-        for i, j in np.ndindex(tendon.shape):
-            if (distance := self.slides(self.rows_at("edge", (i, j)), thresholds[0])) is not None:
-                sides[0][i, j] = self.shares[0][i, j] = next_share(self.shares[0][i, j], tendon[i, j], distance)
-        for j in range(self.n):
-            if (distance := self.slides(self.rows_at("joint", (j,)), thresholds[1])) is not None:
-                sides[1][j] = self.shares[1][j] = next_share(self.shares[1][j], joint[j], distance)
-        self.moment = Moment(q, v, acceleration, self.rest, f0, *sides, (joint, tendon))
+        travel = np.zeros_like(travelled[1]) if first else travelled[1]
+        self.moment = Moment(q, v, acceleration, self.rest, f0, self.sides.tendon.copy(), self.sides.joint.copy())
+        self.elements = elements
+        self._follow(elements, travel, dt, out)
+        self.own = np.zeros(self.n)
+        for row in self.rows:
+            if row.effect == "load_friction" and elements.at(("joint", row.joint)):
+                self.own[row.joint] += row.numbers["coulomb"] * abs(f0[row.tendon])
+
+    def _follow(self, elements: Elements, travel: Array, dt: float, out: Step) -> None:
+        """z of `preload_friction`, before each joint, where friction has a memory; NaN elsewhere."""
+        for number, row in enumerate(self.rows):
+            if row.effect != "preload_friction":
+                continue
+            z = self.follows.get(number, np.zeros(self.n))
+            self.follows[number] = np.full(self.n, np.nan)
+            for j in range(self.n) if row.joint is None else [row.joint]:
+                found = elements.at(("edge", row.tendon, j))
+                if found:
+                    moved = _followed(z[j], found[0], abs(row.numbers["coulomb"]), travel[row.tendon, j], dt)
+                    slips = out.decide(("followed", number, j), abs(moved) >= 1.0, abs(abs(moved) - 1.0))
+                    side = out.decide(("followed_to", number, j), math.copysign(1.0, moved))
+                    self.follows[number][j] = side if slips else moved
+
+    def own_limit(self, j: int) -> float:
+        """What `load_friction` adds to the limit of a joint with a memory."""
+        return float(self.own[j])
 
     # --- step 2
 
     def rows_at(self, kind: str, at: tuple[int, ...]) -> list[Row]:
         """The rows that change the friction of one place."""
         joint, tendon = (at[0], None) if kind in ("joint", "load") else (None, at[0])
-        rows = [row for row in self.rows if row.effect in ("presliding", "friction_drift", "stribeck")]
-        rows = [row for row in rows if (row.joint is None or row.joint == joint)
+        rows = [row for row in self.rows if row.effect in ("friction_drift", "stribeck")]
+        return [row for row in rows if (row.joint is None or row.joint == joint)
                 and (row.tendon is None or row.tendon == tendon)]  # fmt: skip
-        named = any(row.effect == "presliding" and not everywhere(row) for row in rows)
-        return [row for row in rows if not (named and row.effect == "presliding" and everywhere(row))]
 
     def factor(self, rows: list[Row], speed: float, time: float) -> float:
         found = 1.0
         for row in rows:
             found *= float(factor_of(row, row.numbers, speed, time - self.start))
-            if row.effect != "presliding":
-                self.branches[row.effect] += 1
+            self.branches[row.effect] += 1
         return found
-
-    def slides(self, rows: list[Row], threshold: float) -> float | None:
-        """D of `presliding` at a place, m or rad; threshold: v_min there."""
-        row = next((row for row in rows if row.effect == "presliding"), None)
-        return None if row is None else float(distance_of(row, row.numbers["displacement"], threshold))
 
     def side_of(self, effect: Effect, key: tuple[Any, ...]) -> int:
         """On which side an effect with `presliding` is; effect.side is still that of the samples before this one."""
         return self.sides.now[key] or effect.side or 1
-
-    def sliding_friction(
-        self, effect: Effect, displacement: float, key: tuple[Any, ...], v: float, angle: float, travel: float
-    ) -> float:
-        """F of an effect with `presliding`. travel: Δ, 0 at the first sample, which leaves ζ at 0."""
-        effect.share = float(next_share(effect.share, travel, displacement))
-        side = self.side_of(effect, key)
-        self.branches["presliding_from_rest" if effect.side is None else "presliding"] += 1
-        if effect.share * side < 0.0:
-            self.branches["presliding_turns"] += 1
-        return effect.share * abs(effect.value(side, abs(v), angle))
 
     # --- step 4
 
@@ -339,6 +330,13 @@ class Extensions:
         """[n] N·m."""
         assert self.moment is not None
         T = np.zeros(self.n)
-        for row in self.rows:
-            T += torque_of(row, row.numbers, self.moment, self.R, self.cosines)
+        for number, row in enumerate(self.rows):
+            at = copy.copy(self.moment)
+            z = self.follows.get(number)
+            if z is not None:
+                at.tendon_side = at.tendon_side.copy()
+                at.tendon_side[row.tendon, : self.n] = np.where(np.isnan(z), at.tendon_side[row.tendon, : self.n], z)
+            if row.effect == "load_friction" and self.elements.at(("joint", row.joint)):
+                continue
+            T += torque_of(row, row.numbers, at, self.R, self.cosines)
         return T

@@ -49,8 +49,7 @@ class Effect:
     entry_load: float = 0.0  # e: the product b·f that it added on coming to rest
     enters: bool = False  # of the present sample alone, like
     taken_out: float = 0.0  # κ·e
-    share: float = 0.0  # ζ of the extension `presliding`; with it an effect never sticks, though it
-    rests: bool | None = None  # may be slower than what counts as motion
+    rests: bool | None = None  # with `presliding`, which never sticks: whether it is slower than what counts as motion
     start_left: float = 0.0  # of `bias.start_share`: share of how it stood at the start that motion has not turned over
     turned: float = 0.0  # of the present sample alone, like
     whole: float = 0.0  # by how much it may stand otherwise than the model took it

@@ -5,7 +5,6 @@ Part of the oracle (see oracle.py): naive, for tests alone, sharing no code with
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -27,18 +26,17 @@ def gain_of(P: float, noise: float) -> float:
 
 
 class StartFriction:
-    """V [n], step 4a. `slides` or `sticks` for every effect of a sample, then `turn`; `learn` with each update."""
+    """V [n], step 4a. `remembers` or `sticks` for every effect of a sample, then `turn`; `learn` with each update."""
 
     def __init__(self, share: float | None, n: int, branches: Counter[str]) -> None:
         self.share, self.branches = share, branches
         self.unlearned = np.zeros(n)  # V
 
-    def slides(self, effect: Effect, travel: float, displacement: float, whole: float, first: bool) -> None:
-        """With `presliding`. whole: |F| of the law."""
+    def remembers(self, effect: Effect, kept: float, first: bool) -> None:
+        """With `presliding`. kept: the share left of what was held before this sample."""
         if first:
-            effect.start_left = 1.0
-        kept = 1.0 if first else math.exp(-abs(travel) / displacement)
-        effect.turned, effect.whole = effect.start_left * (1.0 - kept), whole
+            effect.start_left, kept = kept, 1.0
+        effect.turned = effect.start_left * (1.0 - kept)
 
     def sticks(self, effect: Effect, F: float, first: bool) -> None:
         """Without. F: of the sample; b of a first exit takes it as standing that way already."""

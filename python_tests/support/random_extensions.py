@@ -51,10 +51,23 @@ def distance(rng: np.random.Generator, rad: float, m: float) -> tuple[float, flo
 
 def presliding(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
     rad, metres = distance(rng, 0.01, 1e-4)
-    draw = rng.random()
-    if draw < 0.25:
-        return {"displacement": 40.0 * rad}  # s, of both velocity thresholds
-    return {"joint": j, "displacement": rad} if draw < 0.6 else {"tendon": i, "displacement": metres}
+    places: list[Row] = [{}, {"joint": j}, {"tendon": i}, {"level": j}, {"tendon": i, "joint": j}]
+    place = places[int(rng.choice(5, p=[0.2, 0.35, 0.25, 0.1, 0.1]))]
+    row: Row = dict(place)
+    at_joint = place.keys() == {"joint"}
+    if rng.random() < 0.4:
+        row["stiffness"] = 0.5 / rad if at_joint else 2.0 / metres  # reaches some tenths of a N·m, some N
+    else:
+        row["displacement"] = rad if at_joint else metres if place else 40.0 * rad  # s, of both velocity thresholds
+    if rng.random() < 0.4:
+        row["relaxation_time"] = float(10.0 ** rng.uniform(-2.0, 1.0))
+    return row | ({"share": rng.uniform(0.2, 2.0)} if rng.random() < 0.3 else {})
+
+
+def second_element(rng: np.random.Generator, row: Row) -> Row:
+    """The numbers of another element of a place, softer than the first."""
+    key = "stiffness" if "stiffness" in row else "displacement"
+    return {key: row[key] * (0.2 if key == "stiffness" else 5.0), "share": rng.uniform(0.2, 2.0)}
 
 
 def stribeck(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
@@ -96,13 +109,15 @@ MAKE: dict[str, Make] = {
         | ({"turns": 1.2 + 0.9 * i} if j % 2 else {})
     ),
     "presliding": presliding,
+    "cord_stretch": lambda rng, n, m, j, i: {"stiffness": float(10.0 ** rng.uniform(3.5, 5.5))},
     "friction_drift": drift,
     "stribeck": stribeck,
     "tendon_nonlinearity": lambda rng, n, m, j, i: {"tendon": i, "hardening": float(10.0 ** rng.uniform(5.0, 7.0))},
     "backlash": backlash,
     "time_delay": delay,
 }
-ONCE = ("time_delay", "backlash", "tendon_nonlinearity", "presliding")  # at a place
+MOST = {"time_delay": 1, "backlash": 1, "tendon_nonlinearity": 1, "cord_stretch": 1, "presliding": 2}  # at a place
+PLACES = ("joint", "tendon", "level")
 
 OPTIONAL = ("presliding", "friction_drift", "stribeck", "backlash")  # of joint and tendon
 
@@ -123,16 +138,21 @@ def random_extensions(
     for name in rng.choice(names, int(rng.integers(2, 15)), p=likely / likely.sum()):
         made = MAKE[name](rng, joints, tendons, int(rng.integers(1, joints + 1)), int(rng.integers(1, tendons + 1)))
         row = {"effect": str(name)} | made
-        if name == "presliding" and row.keys().isdisjoint(("joint", "tendon")) and not thresholds:
+        if name == "presliding" and row.keys().isdisjoint(PLACES) and "displacement" in row and not thresholds:
             row["joint"] = joints
-        place = [row.get(key) for key in ("effect", "joint", "tendon")]
-        if name in ONCE and place in [[other.get(key) for key in ("effect", "joint", "tendon")] for other in rows]:
+        place = [row.get(key) for key in ("effect", *PLACES)]
+        same = [[other.get(key) for key in ("effect", *PLACES)] for other in rows].count(place)
+        if same >= MOST.get(str(name), 14):
             continue
-        if rng.random() < 0.08:  # legal for every one of these
+        if rng.random() < 0.08 and name not in ("presliding", "cord_stretch"):  # legal for every one of these
             row |= {key: 0.0 for key in MAGNITUDES if key in row}
         if name in OPTIONAL and rng.random() < 0.1:
-            row |= {key: None for key in ("joint", "tendon") if key not in row}  # null means absent
+            row |= {key: None for key in PLACES[: 3 if name == "presliding" else 2] if key not in row}  # absent
         rows.append(row)
+        if name == "presliding" and same == 0 and rng.random() < 0.5:  # a second element, and cords that stretch
+            rows.append({key: row[key] for key in row if key in ("effect", *PLACES)} | second_element(rng, row))
+            if not any(other["effect"] == "cord_stretch" for other in rows):
+                rows.append({"effect": "cord_stretch"} | MAKE["cord_stretch"](rng, joints, tendons, 1, 1))
     return rows
 
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "extension_signals.h"
-#include "presliding_step.h"
+#include "friction_memory.h"
 #include "rows_in_use.h"
 #include "slot_view.h"
 
@@ -32,14 +32,13 @@ static dual scaled(double factor, dual a) {
 typedef struct linearisation {
   const tendonfmu_finger* finger;
   dual angle[MODEL_MAX_JOINTS], speed[MODEL_MAX_JOINTS];
-  double motion[MODEL_MAX_JOINTS];  /* slope of what makes the travel: of the held angle with a position filter, else
-                                       speed */
+  double motion[MODEL_MAX_JOINTS];  /* slope of the travel of a joint */
   dual friction[MODEL_MAX_JOINTS];  /* T of eq. (10) */
   dual load[MODEL_MAX_JOINTS];      /* Σ f_B */
   dual bias_step[MODEL_MAX_JOINTS]; /* Δb */
   double torque_slope[MODEL_MAX_JOINTS];
+  double own_limit[MODEL_MAX_JOINTS]; /* of what torque rows add to the limit of a joint */
   double mean_force, mean_force_slope;
-  int gripped;                /* extensions act on friction */
   const double* memory_slope; /* of what the extensions remember; NULL: held fixed */
   double* entry;              /* [places] ∂(b·what acts); NULL: not wanted */
 } linearisation;
@@ -75,7 +74,7 @@ static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
     const double speed = given ? d->velocity[j] : gain * d->angle[j];
     l->angle[j] = (dual){s->angle[j], d->angle[j]};
     l->speed[j] = (dual){s->speed[j], speed};
-    l->motion[j] = speed;
+    l->motion[j] = s->scalar[STATE_STEP] * speed;
     if (filtered) {
       const double carries = filter_memory(l->finger, s->filter, FILTER_CARRIES)[j];
       l->motion[j] = carries * filter_memory(l->finger, s->filter, FILTER_GAIN_0)[j] * d->angle[j];
@@ -117,36 +116,46 @@ static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
   return sum(below, product(laws->weight, difference(law_at(laws->above, negative, speed), below)));
 }
 
-/* F at the present velocity: 0 where the effect sticks */
-static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity,
-                        double motion) {
-  const finger_state* s = &l->finger->remembered;
-  slot_grip grip = {.value = 1.0, .bias = 1.0};
-  double slope = 0.0;
-  if (l->gripped) {
-    grip = slot_grip_of(l->finger, slot);
-    slope = slot_grip_slope(l->finger, slot, &(slot_direction){velocity.slope, motion}, l->memory_slope);
+/* what friction rows make of F and b */
+static dual slot_grip(const linearisation* l, size_t slot, dual velocity) {
+  if (!l->finger->extensions.friction) {
+    return (dual){1.0, 0.0};
   }
-  if (grip.slides) {
+  return (dual){slot_grip_of(l->finger, slot), slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope)};
+}
+
+/* |F| at the present velocity where friction has a memory, else F: 0 where the effect sticks */
+static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
+  const finger_state* s = &l->finger->remembered;
+  const dual grip = slot_grip(l, slot, velocity);
+  if (remembers_at(l->finger, slot)) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
     const int negative = sliding_side(velocity.value, threshold, s->side_before[slot]);
-    return product((dual){grip.value, slope}, magnitude_at(laws, negative, scaled(sign, velocity)));
+    return product(grip, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
   const double side = s->side[slot];
-  return product((dual){side * grip.value, side * slope}, magnitude_at(laws, side < 0.0, scaled(side, velocity)));
+  return product(grip, scaled(side, magnitude_at(laws, side < 0.0, scaled(side, velocity))));
 }
 
-/* what extensions make of b; none of those that slide changes the others */
-static dual jump_grip(const linearisation* l, size_t slot, dual velocity) {
-  const slot_grip grip = l->gripped ? slot_grip_of(l->finger, slot) : (slot_grip){.value = 1.0, .bias = 1.0};
-  if (!l->gripped || grip.slides) {
-    return (dual){grip.bias, 0.0};
+/* what a place of a tendon loses: friction times what acts there, or what is remembered of it. motion: slope of the
+ * travel; before: of the force before the place */
+static dual loss_at(const linearisation* l, size_t slot, size_t row, dual friction, dual acts, double motion,
+                    double before) {
+  const tendonfmu_finger* f = l->finger;
+  const size_t at = row * f->slots + slot;
+  if (!remembers_at(f, slot)) {
+    return product(acts, friction);
   }
-  /* nothing that acts on b reads the travel */
-  return (dual){grip.bias, slot_grip_slope(l->finger, slot, &(slot_direction){velocity.slope, 0.0}, l->memory_slope)};
+  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE], stretch = f->memory.compliance * before;
+  const double turned = first != 0.0 ? 0.0 : motion + stretch, limit = product(acts, friction).slope;
+  double force = 0.0;
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    force += f->remembered.element[e * 2 * f->slots + at];
+  }
+  return (dual){force, f->remembered.by_turning[at] * turned + f->remembered.by_limit[at] * limit};
 }
 
 /* b of fig. 5 at the last sample */
@@ -157,7 +166,10 @@ static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot
   if (s->event[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
-  const dual grip = jump_grip(l, slot, velocity);
+  if (remembers_at(l->finger, slot)) {
+    return (dual){0.0, 0.0};
+  }
+  const dual grip = slot_grip(l, slot, velocity);
   const dual friction_before = product(grip, scaled(before, magnitude_at(laws, before < 0.0, speed)));
   if (s->event[slot] > 0.0) {
     return friction_before;
@@ -210,7 +222,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   for (size_t j = 0; j < f->joints; ++j) {
     const size_t slot = j * lanes + i;
     const effect_laws edge = edge_laws(l, j, i);
-    const dual edge_loss = product(acts, friction_at(l, &edge, slot, threshold, velocity[j], motion[j]));
+    const dual edge_friction = friction_at(l, &edge, slot, threshold, velocity[j]);
+    const dual edge_loss = loss_at(l, slot, 0, edge_friction, acts, motion[j], force.slope);
     const size_t place = 2 * (i * f->joints + j);
     jumped = sum(jumped, jump_at(l, place, acts, bias_at(l, &edge, slot, threshold, velocity[j])));
     lost = sum(lost, edge_loss);
@@ -219,8 +232,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     l->load[j] = sum(l->load[j], acts);
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
-      const dual pulley_loss =
-          product(acts, friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1], motion[j + 1]));
+      const dual pulley_friction = friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
+      const dual pulley_loss = loss_at(l, slot + lanes, 1, pulley_friction, acts, motion[j + 1], force.slope);
       const dual bias = bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
       jumped = sum(jumped, jump_at(l, place + 1, acts, bias));
       lost = sum(lost, pulley_loss);
@@ -236,6 +249,23 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
 /* --- totals ---------------------------------------------------------------------------------------------------------
  */
 
+/* the joint's own friction of eq. (8) */
+static dual own_friction(const linearisation* l, size_t j, dual own, dual load) {
+  const tendonfmu_finger* f = l->finger;
+  const size_t slot = f->joints * f->tendon_lanes + j;
+  const dual both = sum(own, load);
+  if (!remembers_at(f, slot)) {
+    return both;
+  }
+  double force = 0.0;
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    force += f->remembered.element[e * 2 * f->slots + slot];
+  }
+  const double turned = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0 ? 0.0 : l->motion[j];
+  const double limit = both.slope + l->own_limit[j];
+  return (dual){force, f->remembered.by_turning[slot] * turned + f->remembered.by_limit[slot] * limit};
+}
+
 static void linearise_joints(linearisation* l) {
   const tendonfmu_finger* f = l->finger;
   const size_t joint_row = f->joints * f->tendon_lanes;
@@ -243,19 +273,20 @@ static void linearise_joints(linearisation* l) {
   for (size_t j = 0; j < f->joints; ++j) {
     const effect_laws own = {.below = f->derived.joint_law + j * LAW_NUMBERS};
     const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
-    const dual own_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j], l->motion[j]);
-    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j], l->motion[j]);
+    const dual joint_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j]);
+    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual own_bias = bias_at(l, &own, joint_row + j, threshold, l->speed[j]);
     const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
-    l->friction[j] = sum(l->friction[j], sum(own_friction, sum(product(load_friction, l->load[j]), cover)));
+    const dual friction = own_friction(l, j, joint_friction, product(load_friction, l->load[j]));
+    l->friction[j] = sum(l->friction[j], sum(friction, cover));
     const size_t place = 2 * f->joints * f->tendons + 2 * j;
     const dual own_jump = jump_at(l, place, (dual){1.0, 0.0}, own_bias);
     l->bias_step[j] = sum(l->bias_step[j], sum(own_jump, jump_at(l, place + 1, l->load[j], load_bias)));
   }
 }
 
-/* slope of what makes the travel at a slot */
+/* slope of the travel at a slot */
 static double motion_at(const linearisation* l, size_t slot) {
   const size_t n = l->finger->joints, lanes = l->finger->tendon_lanes;
   if (slot >= n * lanes) {
@@ -271,18 +302,29 @@ static double motion_at(const linearisation* l, size_t slot) {
 /* adds what friction as a torque owes to how it builds up at its places */
 static void add_followed(const linearisation* l, const extension_row* row, const effect_sample* sample, double* slope) {
   const tendonfmu_finger* f = l->finger;
+  const double size = row->effect->size(row->place, row->parameters, sample);
   double slopes[MODEL_MAX_JOINTS] = {0.0};
   for (size_t k = 0; k < row->memory_count; ++k) {
-    size_t member;
     const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
-    const extension_row* sliding = sliding_row_at(f, slot, &member);
-    if (sliding && l->memory_slope) {
-      slopes[k] = l->memory_slope[sliding->offset + PRESLIDING_NUMBERS * member + PRESLIDING_SHARE];
-    } else if (sliding) {
-      slopes[k] = sliding->memory[PRESLIDING_NUMBERS * member + PRESLIDING_BY_MOTION] * motion_at(l, slot);
-    }
+    slopes[k] = follower_slope(f, row, k, size) * motion_at(l, slot);
   }
   row->effect->torque(row->place, row->parameters, sample, slopes, slope);
+}
+
+/* slope of what torque rows add to the limits of joints whose friction has a memory */
+static void linearise_limits(linearisation* l, const double* force) {
+  const tendonfmu_finger* f = l->finger;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  const effect_sample sample = remembered_sample(f);
+  const effect_direction direction = {.force = force};
+  for (size_t r = 0; r < f->extensions.torques; ++r) {
+    const extension_row* row = torque_row(f, r);
+    const size_t slot = row->effect->slot ? row->effect->slot(row->place, f->joints, f->tendon_lanes, 0) : 0;
+    if (slot >= joint_row && remembers_at(f, slot)) {
+      const double whole = 1.0;
+      row->effect->slope(row->place, row->parameters, &sample, &whole, &direction, l->own_limit);
+    }
+  }
 }
 
 /* what the torque rows add */
@@ -305,7 +347,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
     } else {
       row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
     }
-    if (row->effect->slot && f->extensions.sliding) {
+    if (row->effect->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }
   }
@@ -384,13 +426,16 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
 
 static void linearise_torques(linearisation* l, const double* force) {
   linearise_forces(l, force);
+  if (l->finger->memory.elements) {
+    linearise_limits(l, force);
+  }
   linearise_joints(l);
   linearise_extensions(l, force);
 }
 
 void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative) {
-  linearisation l = {.finger = finger, .gripped = finger->extensions.friction > 0};
+  linearisation l = {.finger = finger};
   signal_derivative signals;
   input_direction(finger, direction, &signals);
   linearise_kinematics(&l, &signals);
@@ -402,12 +447,11 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
 
 void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump,
                   double* entry) {
-  linearisation l = {
-      .finger = finger, .gripped = finger->extensions.friction > 0, .memory_slope = direction->memory, .entry = entry};
+  linearisation l = {.finger = finger, .memory_slope = direction->memory, .entry = entry};
   for (size_t j = 0; j < finger->joints; ++j) {
     l.angle[j] = (dual){finger->remembered.angle[j], direction->angle[j]};
     l.speed[j] = (dual){finger->remembered.speed[j], direction->speed[j]};
-    l.motion[j] = 0.0; /* it has come into the memory */
+    l.motion[j] = 0.0;
   }
   linearise_torques(&l, direction->force);
   for (size_t j = 0; j < finger->joints; ++j) {

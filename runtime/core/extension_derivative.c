@@ -6,7 +6,6 @@
 
 #include "directional_derivative.h"
 #include "extension_signals.h"
-#include "presliding_step.h"
 
 static void add_plain(parameter_derivative* d, uint32_t parameter, const double* torque, const double* jump) {
   for (size_t j = 0; j < d->joints; ++j) {
@@ -105,7 +104,7 @@ static void add_place(const parameter_derivative* d, const place_slopes* slopes,
 /* F and b of a place by the numbers of a row that acts on it with this grip; 0: neither depends on them */
 static int slopes_of_place(const parameter_derivative* d, size_t place, double others, const effect_grip* grip,
                            place_slopes* slopes) {
-  const double moved = others * d->base[place], jumped = grip->slides ? 0.0 : others * d->jump_base[place];
+  const double moved = others * d->base[place], jumped = others * d->jump_base[place];
   for (int k = 0; k < EFFECT_MAX_PARAMETERS; ++k) {
     slopes->friction[k] = moved * grip->by_parameter[k];
     slopes->jump[k] = jumped * grip->by_parameter[k];
@@ -122,28 +121,9 @@ void extension_place_slopes(const tendonfmu_finger* f, const parameter_derivativ
     const size_t slot = friction_slot(f, row->place, member);
     size_t places[2], count;
     places_of_slot(f, slot, places, &count);
-    if (!row_yields(f, row, slot) && (places[0] == place || (count == 2 && places[1] == place))) {
+    if (places[0] == place || (count == 2 && places[1] == place)) {
       const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
       slopes_of_place(d, place, other_grips(f, row, slot, grip.value), &grip, slopes);
-    }
-  }
-}
-
-/* friction as a torque whose places slide with a row, by this row's displacement */
-static void add_followers(const tendonfmu_finger* f, const extension_row* row, double* torque) {
-  const effect_sample sample = remembered_sample(f);
-  for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* other = torque_row(f, r);
-    double slopes[MODEL_MAX_JOINTS] = {0.0};
-    for (size_t k = 0; other->effect->slot && k < other->memory_count; ++k) {
-      size_t member;
-      const size_t slot = other->effect->slot(other->place, f->joints, f->tendon_lanes, k);
-      if (sliding_row_at(f, slot, &member) == row) {
-        slopes[k] = row->memory[PRESLIDING_NUMBERS * member + PRESLIDING_BY_DISPLACEMENT];
-      }
-    }
-    if (other->effect->slot) {
-      other->effect->torque(other->place, other->parameters, &sample, slopes, torque);
     }
   }
 }
@@ -153,9 +133,6 @@ static void read_friction_row(const tendonfmu_finger* f, const extension_row* ro
   const size_t members = friction_members(f, row->place);
   for (size_t member = 0; member < members; ++member) {
     const size_t slot = friction_slot(f, row->place, member);
-    if (row_yields(f, row, slot)) {
-      continue;
-    }
     const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
     const double others = other_grips(f, row, slot, grip.value);
     size_t place[2], count;
@@ -166,9 +143,6 @@ static void read_friction_row(const tendonfmu_finger* f, const extension_row* ro
         add_place(d, &slopes, place[p], row->effect->parameter_count, &sum);
       }
     }
-  }
-  if (row->in_layer) {
-    add_followers(f, row, sum.torque[0]);
   }
   for (uint32_t k = 0; k < row->effect->parameter_count; ++k) {
     add_plain(d, row->first_parameter + k, sum.torque[k], sum.jump[k]);

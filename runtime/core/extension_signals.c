@@ -153,19 +153,11 @@ void follow_signals(tendonfmu_finger* f, double step, double velocity_gain) {
 
 /* what number k of a signal row makes of what the others remember */
 static void follow_memory(const tendonfmu_finger* f, const extension_row* signal, uint32_t k) {
-  const size_t n = f->joints, others = 2 * n + f->tendons, held = filter_slopes(f) + 2 * n;
+  const size_t n = f->joints, others = 2 * n + f->tendons;
   const double *slopes_before = signal_slopes(f, signal, k), *before = slopes_before + others;
   double *angle = signal->next_slopes + slope_count(f) * k, *after = angle + others;
-  double travel[MODEL_MAX_JOINTS] = {0.0};
-  const double* motion = angle + n;
-  if (filters_position(f)) {
-    for (size_t j = 0; j < n && !f->scratch.sample.first; ++j) {
-      travel[j] = angle[held + j] - slopes_before[held + j];
-    }
-    motion = travel;
-  }
-  const effect_direction direction = {.angle = angle, .velocity = angle + n, .motion = motion};
-  for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
+  const effect_direction direction = {.angle = angle, .velocity = angle + n};
+  for (size_t r = f->extensions.signals; r < f->shape.extension_count - f->extensions.memory; ++r) {
     const extension_row* row = f->extensions.row + r;
     if (row->effect->advance_slope) {
       row->effect->advance_slope(row->place, row->parameters, &f->scratch.sample, row->memory, &direction,

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "presliding_step.h"
+#include "friction_memory.h"
 
 /* --- the table ------------------------------------------------------------------------------------------------------
  */
@@ -71,82 +71,11 @@ static void find_axis_cosines(tendonfmu_finger* f) {
   }
 }
 
-/* the slots whose place a row names, of the effects that leave it to such a row */
-static void find_named_slots(tendonfmu_finger* f) {
-  memset(f->extensions.is_named, 0, f->slots);
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    if (row->effect->yields && !is_everywhere(row->place)) {
-      for (size_t k = 0; k < friction_members(f, row->place); ++k) {
-        f->extensions.is_named[friction_slot(f, row->place, k)] = 1;
-      }
-    }
-  }
-}
-
-/* whether a slot that the row would act on is in the layer of another one: what no description says, but an image can
- */
-static int shares_a_slot(const tendonfmu_finger* f, const extension_row* row) {
-  const size_t members = friction_members(f, row->place);
-  for (size_t k = 0; k < members; ++k) {
-    const size_t slot = friction_slot(f, row->place, k);
-    if (!row_yields(f, row, slot) && f->extensions.acting.offset[slot] < f->shape.extension_memory) {
-      return 1;
-    }
-  }
-  return 0;
-}
-
-static void put_into_layers(tendonfmu_finger* f, const extension_row* row) {
-  const size_t members = friction_members(f, row->place), joint_row = f->joints * f->tendon_lanes;
-  const size_t begin = (size_t)(row->next - f->scratch.extension);
-  for (size_t k = 0; k < members; ++k) {
-    const size_t slot = friction_slot(f, row->place, k);
-    const int yields = row_yields(f, row, slot);
-    const sliding_layer* layer = yields ? &f->extensions.overruled : &f->extensions.acting;
-    const double threshold =
-        slot < joint_row ? f->derived.settings.tendon_threshold : f->derived.settings.joint_threshold;
-    layer->displacement[slot] = row->parameters[0];
-    layer->distance[slot] = presliding_distance(row->place, row->parameters[0], threshold);
-    layer->offset[slot] = (uint32_t)(begin + PRESLIDING_NUMBERS * k);
-    layer->taken[slot / 4] = 1;
-    ++*(yields ? &f->extensions.yielding : &f->extensions.sliding);
-  }
-}
-
-static void clear_layer(const tendonfmu_finger* f, const sliding_layer* layer) {
-  memset(layer->taken, 0, f->slots / 4);
+/* what a step finds in scratch while no friction row acts; where friction has a memory nothing sticks */
+static void clear_grips(tendonfmu_finger* f) {
   for (size_t slot = 0; slot < f->slots; ++slot) {
-    layer->displacement[slot] = layer->distance[slot] = 1.0;
-    layer->offset[slot] = (uint32_t)f->shape.extension_memory;
-  }
-}
-
-/* the layers, and what a step finds in scratch of slots that slide */
-static void find_sliding(tendonfmu_finger* f) {
-  const finger_scratch* s = &f->scratch;
-  clear_layer(f, &f->extensions.acting);
-  clear_layer(f, &f->extensions.overruled);
-  f->extensions.sliding = f->extensions.yielding = 0;
-  f->extensions.only_slides = 1;
-  for (size_t slot = 0; slot < f->slots; ++slot) {
-    s->slides[slot] = 0.0;
-  }
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    extension_row* row = f->extensions.row + f->extensions.signals + r;
-    row->in_layer = row->effect->slides && !shares_a_slot(f, row);
-    f->extensions.only_slides &= row->in_layer;
-    for (size_t k = 0; row->effect->slides && k < friction_members(f, row->place); ++k) {
-      const size_t slot = friction_slot(f, row->place, k);
-      s->slides[slot] = row_yields(f, row, slot) ? s->slides[slot] : 1.0;
-    }
-    if (row->in_layer) {
-      put_into_layers(f, row);
-    }
-  }
-  for (size_t slot = 0; slot < f->slots; ++slot) {
-    s->grip[slot] = s->others[slot] = 1.0;
-    s->bias_grip[slot] = s->slides[slot] != 0.0 ? 0.0 : 1.0;
+    f->scratch.grip[slot] = 1.0;
+    f->scratch.bias_grip[slot] = f->memory.elements && f->memory.remembers[slot] != 0.0 ? 0.0 : 1.0;
   }
 }
 
@@ -161,9 +90,12 @@ void find_extensions(tendonfmu_finger* f) {
   f->extensions.signals = signals;
   f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals, &offset);
   f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction, &offset);
+  const size_t others = signals + f->extensions.friction + f->extensions.torques;
+  f->extensions.memory = note_kind(f, EFFECT_MEMORY, 0, others, &none);
   find_axis_cosines(f);
-  find_named_slots(f);
-  find_sliding(f);
+  find_memory(f);
+  clear_grips(f);
+  f->extensions.gripped = f->extensions.friction > 0 || f->memory.elements > 0;
 }
 
 const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
@@ -177,19 +109,9 @@ const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
-/* friction as a torque builds up as presliding says where that acts on its places */
-static void follow_places(const tendonfmu_finger* f, const extension_row* row) {
-  for (size_t k = 0; k < row->memory_count; ++k) {
-    const uint32_t at = f->extensions.acting.offset[row->effect->slot(row->place, f->joints, f->tendon_lanes, k)];
-    if (at < f->shape.extension_memory) {
-      row->next[k] = f->scratch.extension[at + PRESLIDING_SHARE];
-    }
-  }
-}
-
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
-  const int travels = filters_position(f);
+  const size_t others = f->extensions.signals + f->extensions.friction + f->extensions.torques;
   f->scratch.sample = (effect_sample){.joints = f->joints,
                                       .tendons = f->tendons,
                                       .lanes = f->tendon_lanes,
@@ -200,21 +122,19 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
                                       .angle = s->angle,
                                       .velocity = s->velocity + f->joints * f->tendon_lanes,
                                       .tendon_velocity = s->velocity,
-                                      .travel = travels ? s->travel + f->joints * f->tendon_lanes : NULL,
-                                      .tendon_travel = travels ? s->travel : NULL,
                                       .force = s->force,
                                       .moment_arm = f->derived.moment_arm,
                                       .rest_angle = f->derived.cover_rest,
                                       .axis_cosine = f->derived.axis_cosine,
                                       .tendon_threshold = f->derived.settings.tendon_threshold,
                                       .joint_threshold = f->derived.settings.joint_threshold};
-  for (size_t r = f->extensions.signals; r < f->shape.extension_count; ++r) {
+  for (size_t r = f->extensions.signals; r < others; ++r) {
     const extension_row* row = f->extensions.row + r;
-    if (row->effect->advance && !row->in_layer) {
+    if (row->effect->advance) {
       row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
     }
-    if (row->effect->slot && f->extensions.sliding) {
-      follow_places(f, row);
+    if (row->effect->slot && f->memory.elements) {
+      follow_elements(f, row, row->effect->size(row->place, row->parameters, &s->sample));
     }
   }
 }
@@ -269,42 +189,24 @@ int friction_acts_on(const tendonfmu_finger* f, const extension_row* row, size_t
     *member = slot / lanes;
     return slot < joint_row && slot % lanes == place.tendon;
   }
-  const int at_tendon = slot < joint_row, used = at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
+  const int at_tendon = slot < joint_row;
   *member = at_tendon ? slot / lanes * f->tendons + slot % lanes : f->joints * f->tendons + slot - joint_row;
-  return used && !row_yields(f, row, slot);
+  return at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
 }
 
-const extension_row* sliding_row_at(const tendonfmu_finger* f, size_t slot, size_t* member) {
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    if (row->in_layer && friction_acts_on(f, row, slot, member)) {
-      return row;
-    }
-  }
-  return NULL;
-}
-
-static void add_grip(slot_grip* to, const effect_grip* grip) {
-  to->value *= grip->value;
-  to->slides |= grip->slides;
-  to->bias *= grip->slides ? 0.0 : grip->value;
-}
-
-slot_grip slot_grip_of(const tendonfmu_finger* f, size_t slot) {
-  slot_grip found = {.value = 1.0, .bias = 1.0};
+double slot_grip_of(const tendonfmu_finger* f, size_t slot) {
+  double value = 1.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
     size_t member;
     if (friction_acts_on(f, row, slot, &member)) {
-      const effect_grip grip = row->effect->grip(row->place, row->parameters, row->memory, member);
-      add_grip(&found, &grip);
+      value *= row->effect->grip(row->place, row->parameters, row->memory, member).value;
     }
   }
-  return found;
+  return value;
 }
 
-double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direction* direction,
-                       const double* memory_slope) {
+double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity, const double* memory_slope) {
   double value = 1.0, slope = 0.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
@@ -313,7 +215,7 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direct
       continue;
     }
     const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
-    double own_slope = own.by_velocity * direction->velocity + own.by_motion * direction->motion;
+    double own_slope = own.by_velocity * velocity;
     if (memory_slope && row->effect->advance_slope) {
       own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
     }
@@ -323,41 +225,22 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, const slot_direct
   return slope;
 }
 
-/* what a row that slides makes of one of its slots */
-static void slide_at(tendonfmu_finger* f, const extension_row* row, size_t k, size_t slot) {
-  const double* place = row->next + PRESLIDING_NUMBERS * k;
-  f->scratch.grip[slot] *= place[PRESLIDING_SHARE];
-  f->scratch.kept[slot] = place[PRESLIDING_KEPT];
-}
-
 static void grip_row(tendonfmu_finger* f, const extension_row* row) {
   const finger_scratch* s = &f->scratch;
   const size_t members = friction_members(f, row->place);
   for (size_t k = 0; k < members; ++k) {
     const size_t slot = friction_slot(f, row->place, k);
-    if (row_yields(f, row, slot)) {
-      continue;
-    }
-    if (row->effect->slides) {
-      slide_at(f, row, k, slot);
-      continue;
-    }
     const double value = row->effect->grip(row->place, row->parameters, row->next, k).value;
     s->grip[slot] *= value;
     s->bias_grip[slot] *= value;
-    s->others[slot] *= value;
   }
 }
 
 void find_grips(tendonfmu_finger* f) {
-  const finger_scratch* s = &f->scratch;
-  if (f->extensions.only_slides) {
-    return; /* the shares stand there already, the rest in find_sliding() */
+  if (!f->extensions.friction) {
+    return;
   }
-  for (size_t slot = 0; slot < f->slots; ++slot) {
-    s->grip[slot] = s->others[slot] = 1.0;
-    s->bias_grip[slot] = s->slides[slot] != 0.0 ? 0.0 : 1.0;
-  }
+  clear_grips(f);
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     grip_row(f, friction_row(f, r));
   }

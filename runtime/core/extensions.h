@@ -21,41 +21,20 @@ static inline const extension_row* torque_row(const tendonfmu_finger* finger, si
 /* Row of the extension `index` of the description. */
 const extension_row* extension_of(const tendonfmu_finger* finger, uint32_t index);
 
-/* Slots of a friction row: its member k, as effect_type.grip() counts it, slides with slot friction_slot(k),
- * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints, but for those that
- * it yields. */
+/* Slots of a friction row: its member k, as effect_type.grip() counts it, acts on slot friction_slot(k),
+ * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints. */
 size_t friction_members(const tendonfmu_finger* finger, effect_place place);
 size_t friction_slot(const tendonfmu_finger* finger, effect_place place, size_t k);
-
-/* Whether a row leaves one of its slots to another row of the same effect, which names the place. */
-static inline int row_yields(const tendonfmu_finger* finger, const extension_row* row, size_t slot) {
-  return row->effect->yields && is_everywhere(row->place) && finger->extensions.is_named[slot];
-}
 
 /* Whether such a row acts on a slot, and which member it is there. */
 int friction_acts_on(const tendonfmu_finger* finger, const extension_row* row, size_t slot, size_t* member);
 
-/* The row that makes a slot slide, and which member of it the slot is; NULL: none. */
-const extension_row* sliding_row_at(const tendonfmu_finger* finger, size_t slot, size_t* member);
+/* The factor of all friction rows together at a slot, from the memory. */
+double slot_grip_of(const tendonfmu_finger* finger, size_t slot);
 
-/* What all friction rows together make of a slot, from the memory: F = value·|F(v)| where it slides, else value·F; b is
- * multiplied by bias. */
-typedef struct slot_grip {
-  int slides;
-  double value, bias;
-} slot_grip;
-slot_grip slot_grip_of(const tendonfmu_finger* finger, size_t slot);
-
-/* A direction of what a slot's effects see: its velocity, and what makes its travel, with a position filter the travel
- * itself, else the velocity. */
-typedef struct slot_direction {
-  double velocity, motion;
-} slot_direction;
-
-/* Derivative of its value along a direction, and of what the effects remember [effect_memory]; NULL: what they
- * remembered at the sample before is held fixed. */
-double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, const slot_direction* direction,
-                       const double* memory_slope);
+/* Its derivative along a direction of the slot's velocity and of what the effects remember [effect_memory]; NULL: what
+ * they remembered at the sample before is held fixed. */
+double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity, const double* memory_slope);
 
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {
@@ -64,11 +43,10 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
 
-/* What every other effect will remember, but for the rows in the layers of what slides, which have been advanced;
- * angles, velocities and forces are known. */
+/* What friction and torque rows will remember; angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
 
-/* What the friction rows make of F at every slot, into scratch; after what slides has been advanced. */
+/* What the friction rows make of F at every slot, into scratch. */
 void find_grips(tendonfmu_finger* finger);
 
 /* b of every slot with a friction row, in scratch. */

@@ -6,8 +6,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "presliding_step.h"
-
 /* Every array begins at a multiple of 64 bytes, a cache line. The rows of the state follow each other without gaps,
  * each a multiple of 32 bytes: aligned loads in every kernel. */
 enum { ROW_BYTES = 64 };
@@ -90,29 +88,40 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 
-static void lay_out_layer(sliding_layer* layer, size_t slots, cursor* c) {
-  layer->displacement = take_numbers(c, slots);
-  layer->distance = take_numbers(c, slots);
-  layer->offset = take(c, slots * sizeof(uint32_t));
-  layer->taken = take(c, slots / 4);
+static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
+  finger_scratch* s = &f->scratch;
+  const size_t slots = f->shape.elements ? f->slots : 0, stretching = f->shape.stretches ? slots : 0;
+  f->memory.remembers = take_numbers(c, slots);
+  for (size_t e = 0; e < f->shape.elements; ++e) {
+    friction_element* element = &f->memory.element[e];
+    double** const rows[] = {&element->share, &element->stiffness, &element->per_distance, &element->relaxation_time,
+                             &element->kept,  &element->stiff,     &element->soft};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+      *rows[i] = take_numbers(c, slots);
+    }
+  }
+  double** const rows[] = {&s->travelled, &s->turning, &s->kept};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    *rows[i] = take_numbers(c, slots);
+  }
+  s->own_limit = take_numbers(c, slots ? f->joint_lanes : 0);
+  s->element = take_numbers(c, f->shape.elements * 2 * slots);
+  s->by_turning = take_numbers(c, 2 * slots);
+  s->by_limit = take_numbers(c, 2 * slots);
+  s->tension = take_numbers(c, 2 * stretching);
+  s->tension_change = take_numbers(c, stretching);
 }
 
-/* behind all memory of the extensions there is room for a place where nothing slides */
 static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->extensions.row = take(c, f->shape.extension_count * sizeof(extension_row));
   f->derived.axis_cosine = take_numbers(c, f->shape.extension_count ? f->joints * f->joints : 0);
-  f->scratch.extension = take_numbers(c, f->shape.extension_memory + PRESLIDING_NUMBERS);
+  f->scratch.extension = take_numbers(c, f->shape.extension_memory);
   const size_t slots = f->shape.extension_count ? f->slots : 0;
   f->scratch.grip = take_numbers(c, slots);
   f->scratch.bias_grip = take_numbers(c, slots);
-  f->scratch.slides = take_numbers(c, slots);
-  f->scratch.kept = take_numbers(c, slots);
-  f->scratch.others = take_numbers(c, slots);
   f->scratch.whole_edge = take_numbers(c, slots);
   f->scratch.whole_pulley = take_numbers(c, slots);
-  f->extensions.is_named = take(c, slots);
-  lay_out_layer(&f->extensions.acting, slots, c);
-  lay_out_layer(&f->extensions.overruled, slots, c);
+  lay_out_memory(f, c);
 }
 
 #define AT(name)     offsetof(finger_state, name)
@@ -171,6 +180,11 @@ const state_row state_rows[] = {
     {AT(recent_position), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
     {AT(sensor), ROW_OF_TENDONS, SENSOR_ROWS, MODEL_HAS_SENSOR_FAULT, ANYTHING, 1},
     {AT(watch), ROW_OF_JOINTS, 1, MODEL_HAS_SENSOR_FAULT, 0.0, JOINT_BEGINS_ANEW, 1, 0},
+    {AT(element), ROW_OF_ELEMENTS, 2, 0, WITHIN(LARGEST_SUM), 1},
+    {AT(by_turning), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
+    {AT(by_limit), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
+    {AT(tension), ROW_OF_CORDS, 2, 0, ANYTHING, 1},
+    {AT(tension_change), ROW_OF_CORDS, 1, 0, ANYTHING, 1},
     {AT(extension), ROW_OF_EXTENSIONS, 1, 0, ANYTHING, 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
@@ -183,6 +197,9 @@ size_t state_row_length(const tendonfmu_finger* finger, const state_row* row) {
     case ROW_OF_JOINTS: return row->rows * finger->joint_lanes;
     case ROW_OF_TENDONS: return row->rows * finger->tendon_lanes;
     case ROW_OF_SLOTS: return row->rows * finger->slots;
+    case ROW_OF_MEMORY: return finger->shape.elements ? row->rows * finger->slots : 0;
+    case ROW_OF_ELEMENTS: return finger->shape.elements * row->rows * finger->slots;
+    case ROW_OF_CORDS: return finger->shape.elements && finger->shape.stretches ? row->rows * finger->slots : 0;
     case ROW_OF_PARTS: return finger->joints * finger->tendon_lanes + 3 * finger->joint_lanes;
     default: return finger->shape.extension_memory;
   }
@@ -193,7 +210,7 @@ static void lay_out_state(tendonfmu_finger* f, cursor* c) {
   for (size_t k = 0; k < state_row_count; ++k) {
     f->state_count += state_row_length(f, &state_rows[k]);
   }
-  f->state = take_numbers(c, f->state_count + (f->shape.extension_count ? PRESLIDING_NUMBERS : 0));
+  f->state = take_numbers(c, f->state_count);
   double* run = f->state;
   f->remembered.scalar = part(&run, STATE_SCALARS);
   for (size_t k = 0; k < state_row_count; ++k) {
@@ -210,7 +227,8 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
                                  &s->load,      &s->joint_friction, &s->load_friction, &s->joint_bias,
                                  &s->load_bias, &s->stuck_friction, &s->uncertainty,   &s->residual_variance};
   double** const slot_rows[] = {&s->edge_kept, &s->pulley_kept, &s->edge_stuck, &s->pulley_stuck};
-  double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
+  double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,
+                               &s->edge_loss, &s->pulley_loss, &s->force_at,  &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
     *tendon_rows[i] = take_numbers(c, f->tendon_lanes);
   }

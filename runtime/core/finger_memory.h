@@ -65,29 +65,35 @@ typedef struct extension_row {
   const double* parameters;
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
-  size_t offset;         /* of its memory among the effect_memory; not of signals */
+  size_t offset;         /* of its memory among the effect_memory; not of signals and memory rows */
   double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
   double* next_slopes;
-  int in_layer; /* 1: of friction, the kernels advance what it remembers */
 } extension_row;
 
-/* Slots that slide at all times, at most one row's place at each, so that the kernels take four at a time. */
-typedef struct sliding_layer {
-  double *displacement, *distance; /* [n × M + N] as in presliding_step.h; 1 where nothing slides */
-  uint32_t* offset; /* [n × M + N] where the numbers of the place begin in the extensions' memory; behind all of them
-                       where nothing slides */
-  unsigned char* taken; /* [(n × M + N) / 4] 1: something slides among the four */
-} sliding_layer;
-
-/* The rows by what they act on, each part in the description's order: signals, friction, torques. */
+/* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
 typedef struct extension_rows {
   extension_row* row;
-  size_t signals, friction, torques; /* how many of each */
-  size_t sliding, yielding;          /* places in the layers that follow */
-  sliding_layer acting, overruled;   /* the latter: a row everywhere, where another one names the place */
-  int only_slides;                   /* every friction row stands in the layers: what acts is their share alone */
-  unsigned char* is_named;           /* [n × M + N] 1: a row of an effect that yields names the place */
+  size_t signals, friction, torques, memory; /* how many of each */
+  int gripped;                               /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
 } extension_rows;
+
+/* One of the elements side by side, by slot [n × M + N]; the edge and the pulley of a slot share its numbers. */
+typedef struct friction_element {
+  double* share;                    /* w; 0: there is no such element */
+  double *stiffness, *per_distance; /* κ, 0 in relative form; 1/D, 0 in absolute form */
+  double* relaxation_time;          /* T; 0: none */
+  double *kept, *stiff, *soft;      /* a, g·κ, g/D of the present step */
+} friction_element;
+
+/* Places whose friction has a memory. */
+typedef struct friction_memory {
+  size_t elements;   /* side by side, 0: there is no memory */
+  double compliance; /* of the cords, 1/k_c, m/N; 0: rigid */
+  int relaxes;       /* some place has a relaxation time */
+  double step;       /* that kept, stiff, soft are of, s */
+  double* remembers; /* [n × M + N] 1 or 0 */
+  friction_element element[MODEL_MAX_ELEMENTS];
+} friction_memory;
 
 /* All that follows from the parameters; filled in one place, derived_numbers.c. Arrays of [n × M] have a row a joint.
  */
@@ -140,7 +146,8 @@ enum {
   STATE_STARTED_AT,      /* s, first sample; with contact.drift, else 0 */
   STATE_UNWELL,          /* 1 where a sensor fails or a joint is not watched; with sensor_fault, else 0 */
   STATE_START_OPEN,      /* 1 while there is anything to learn of the start; with bias.start_share, else 0 */
-  STATE_SCALARS = 16     /* a multiple of 4: the rows stay aligned */
+  STATE_STEP,            /* Δt of the last sample, s; 0 of the first */
+  STATE_SCALARS = 20     /* a multiple of 4: the rows stay aligned */
 };
 
 #define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
@@ -227,11 +234,25 @@ typedef struct finger_state {
   double *recent_force, *recent_position;            /* [M] f̄ and x0 at the recent mark */
   double* sensor;                                    /* [SENSOR_ROWS × M]; this and the next with sensor_fault only */
   double* watch;                                     /* [N] joint_watch of the last sample */
-  double* extension;                                 /* as the extensions ask for */
+  /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
+  double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
+  double *by_turning, *by_limit; /* [2 × (n × M + N)] ∂F/∂c0, ∂F/∂lim of the last sample */
+  double *tension,
+      *tension_change; /* [2 × (n × M + N)] f behind a place, N; [n × M + N] of f_B; with cord_stretch only */
+  double* extension;   /* as the extensions ask for */
 } finger_state;
 
 /* Which lanes of a row stand for something; the others hold 0, unless they are tracked along. */
-typedef enum row_lanes { ROW_OF_JOINTS, ROW_OF_TENDONS, ROW_OF_SLOTS, ROW_OF_PARTS, ROW_OF_EXTENSIONS } row_lanes;
+typedef enum row_lanes {
+  ROW_OF_JOINTS,
+  ROW_OF_TENDONS,
+  ROW_OF_SLOTS,
+  ROW_OF_MEMORY, /* of slots, where friction has a memory */
+  ROW_OF_ELEMENTS,
+  ROW_OF_CORDS,
+  ROW_OF_PARTS,
+  ROW_OF_EXTENSIONS
+} row_lanes;
 
 /* A row of the state, or some of a kind: where finger_state points to it, and what may stand in a saved one. */
 typedef struct state_row {
@@ -290,20 +311,22 @@ typedef struct finger_scratch {
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
   double* watch;  /* [N] likewise */
-  double* inverse_routing; /* [n × M] R⁺ of the rows in use */
-  double* leverage;        /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;      /* [M] 1: the others determine the angles */
-  double* row_in_use;      /* [M] 1 or 0 */
-  double* angle_shift;     /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;   /* no row in use belongs to a failing sensor */
-  int unwell;              /* as in the state, after this sample */
-  double* extension;       /* the memory of the extensions after this sample */
-  double *kept, *others, *whole_edge, *whole_pulley; /* [n × M + N] of what slides: share left of where it was before
-                                                        this sample, what the other rows make of F, that times |F| of
-                                                        the law; with such rows only */
-  double *grip, *bias_grip, *slides;    /* [n × M + N] what friction rows make of F and b, 1 where a slot never sticks;
-                                           with    such rows only */
-  effect_sample sample;                 /* as the extensions see it */
+  double* inverse_routing;           /* [n × M] R⁺ of the rows in use */
+  double* leverage;                  /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;                /* [M] 1: the others determine the angles */
+  double* row_in_use;                /* [M] 1 or 0 */
+  double* angle_shift;               /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;             /* no row in use belongs to a failing sensor */
+  int unwell;                        /* as in the state, after this sample */
+  double* extension;                 /* the memory of the extensions after this sample */
+  double *edge_loss, *pulley_loss;   /* [n × M] N, what a tendon loses there */
+  double *grip, *bias_grip;          /* [n × M + N] what friction rows make of F and b; with extensions only */
+  double *whole_edge, *whole_pulley; /* [n × M + N] grip·|F| of the law; with extensions only */
+  double* own_limit;                 /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
+  double *travelled, *turning, *kept; /* [n × M + N] Δ; with what cords beyond have stretched; the share left of what
+                                        was held before this sample; this and the next with a memory only */
+  double *element, *by_turning, *by_limit, *tension, *tension_change; /* as in the state, after this sample */
+  effect_sample sample;                                               /* as the extensions see it */
   double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 
@@ -328,6 +351,7 @@ struct tendonfmu_finger {
   double* state;                          /* [state_count], what `remembered` points into */
   size_t state_count;
   extension_rows extensions;
+  friction_memory memory;
   derived_numbers derived;
   finger_state remembered;
   finger_scratch scratch;

@@ -1,5 +1,7 @@
 #include "model_image.h"
 
+#include "effect_facts.h"
+
 #include <string.h>
 
 #include "bytes.h"
@@ -111,13 +113,13 @@ static void walk_finger(walk* w) {
   }
 }
 
-static effect_place place_of(uint32_t joint, uint32_t tendon) {
-  return (effect_place){joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE};
+static uint32_t place_at(uint32_t number) {
+  return number ? number - 1 : EFFECT_NOWHERE;
 }
 
 effect_place model_extension_place(const model_shape* shape, uint32_t index) {
   const uint32_t* row = shape->extensions + (size_t)index * MODEL_EXTENSION_WORDS;
-  return place_of(row[1], row[2]);
+  return (effect_place){place_at(row[1]), place_at(row[2]), place_at(row[3])};
 }
 
 size_t model_effect_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
@@ -322,53 +324,69 @@ static int check_shape(const unsigned char* words, model_shape* shape, message_l
   return r.overrun || r.left ? refuse(message, "model image with a damaged shape: number of words") : 0;
 }
 
-static int place_is_sound(const effect_type* effect, const model_shape* shape, uint32_t joint, uint32_t tendon) {
+static int place_is_sound(const effect_type* effect, const model_shape* shape, const uint32_t place[3]) {
+  const uint32_t joint = place[0], tendon = place[1], level = place[2];
   const int at_joint = joint != 0, at_tendon = tendon != 0;
-  if (joint > shape->joints || tendon > shape->tendons || (effect->joint == PLACE_REFUSED && at_joint) ||
-      (effect->joint == PLACE_REQUIRED && !at_joint) || (effect->tendon == PLACE_REFUSED && at_tendon) ||
-      (effect->tendon == PLACE_REQUIRED && !at_tendon)) {
+  if (joint > shape->joints || tendon > shape->tendons || level > shape->joints || (level && !effect->level) ||
+      (effect->joint == PLACE_REFUSED && at_joint) || (effect->joint == PLACE_REQUIRED && !at_joint) ||
+      (effect->tendon == PLACE_REFUSED && at_tendon) || (effect->tendon == PLACE_REQUIRED && !at_tendon)) {
     return 0;
   }
   switch (effect->rule) {
     case PLACES_EXACTLY_ONE: return at_joint != at_tendon;
     case PLACES_AT_MOST_ONE: return !(at_joint && at_tendon);
     case PLACES_NOT_LAST_JOINT: return joint < shape->joints;
+    case PLACES_LEVEL_ALONE: return !level || !(at_joint || at_tendon);
     default: return 1;
   }
 }
 
-/* whether such a row, of an effect that yields, stands without a place as one before it does */
-static int is_everywhere_twice(const effect_type* effect, const unsigned char* row, uint32_t* everywhere) {
-  if (!effect->yields || load_u32(row + 4) || load_u32(row + 8)) {
-    return 0;
+/* rows of the table before the i-th, and it, that are the same */
+static uint32_t same_rows(const unsigned char* table, uint32_t i) {
+  const size_t size = 4 * MODEL_EXTENSION_WORDS;
+  uint32_t same = 1;
+  for (uint32_t k = 0; k < i; ++k) {
+    same += memcmp(table + k * size, table + i * size, size) == 0;
   }
-  const int again = *everywhere == effect->id;
-  *everywhere = effect->id;
-  return again;
+  return same;
+}
+
+static effect_place stored_place(const unsigned char* row) {
+  return (effect_place){place_at(load_u32(row + 4)), place_at(load_u32(row + 8)), place_at(load_u32(row + 12))};
+}
+
+static int check_extension(const unsigned char* table, uint32_t i, model_shape* shape, message_line message) {
+  const unsigned char* row = table + 4 * MODEL_EXTENSION_WORDS * (size_t)i;
+  const effect_type* effect = effect_by_id(load_u32(row));
+  const uint32_t place[3] = {load_u32(row + 4), load_u32(row + 8), load_u32(row + 12)};
+  if (!effect) {
+    return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
+  }
+  if (!place_is_sound(effect, shape, place)) {
+    return refuse_value(message, "model image: joint of an extension", place[0], "a place where such an effect can be");
+  }
+  const uint32_t same = effect->most ? same_rows(table, i) : 0;
+  if (same > (uint32_t)effect->most) {
+    return refuse(message, "model image with more extensions of one effect at a place than that may have");
+  }
+  if (effect == &effect_presliding && same > shape->elements) {
+    shape->elements = same;
+  }
+  shape->stretches |= effect == &effect_cord_stretch;
+  shape->effect_memory += effect->kind == EFFECT_SIGNAL ? 0 : model_effect_memory(effect, shape, stored_place(row));
+  return 0;
 }
 
 static int check_extensions(const unsigned char* image, model_shape* shape, message_line message) {
-  const unsigned char* row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
-  uint32_t everywhere = 0;
-  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
-    const effect_type* effect = effect_by_id(load_u32(row));
-    if (!effect) {
-      return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
+  const unsigned char* table = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
+  for (uint32_t i = 0; i < shape->extension_count; ++i) {
+    if (check_extension(table, i, shape, message)) {
+      return -1;
     }
-    const uint32_t joint = load_u32(row + 4), tendon = load_u32(row + 8);
-    if (!place_is_sound(effect, shape, joint, tendon) || load_u32(row + 12)) {
-      return refuse_value(message, "model image: joint of an extension", joint, "a place where such an effect can be");
-    }
-    if (is_everywhere_twice(effect, row, &everywhere)) {
-      return refuse(message, "model image with two extensions of one effect everywhere, expected one");
-    }
-    shape->effect_memory +=
-        effect->kind == EFFECT_SIGNAL ? 0 : model_effect_memory(effect, shape, place_of(joint, tendon));
   }
-  row = image + MODEL_HEADER_BYTES + 4u * (size_t)shape->word_count;
-  for (uint32_t i = 0; i < shape->extension_count; ++i, row += 4 * MODEL_EXTENSION_WORDS) {
-    const effect_place place = place_of(load_u32(row + 4), load_u32(row + 8));
-    shape->extension_memory += model_extension_memory(effect_by_id(load_u32(row)), shape, place);
+  for (uint32_t i = 0; i < shape->extension_count; ++i) {
+    const unsigned char* row = table + 4 * MODEL_EXTENSION_WORDS * (size_t)i;
+    shape->extension_memory += model_extension_memory(effect_by_id(load_u32(row)), shape, stored_place(row));
   }
   return 0;
 }

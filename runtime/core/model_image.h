@@ -12,7 +12,7 @@
  *          48  u32       e, number of extensions, 0..1024
  *          52  u32       p, number of parameters
  *          56  u32[w]    shape words: which friction exists (below)
- *              u32[4·e]  table of extensions: effect id, joint (1..n) or 0, tendon (1..m) or 0, 0
+ *              u32[4·e]  table of extensions: effect id, joint (1..n) or 0, tendon (1..m) or 0, level (1..n) or 0
  *              zeros up to a multiple of 8
  *              f64[p]    parameter values in canonical order (model_item)
  *
@@ -33,6 +33,7 @@ enum {
   MODEL_VERSION = 1,
   MODEL_HEADER_BYTES = 56,
   MODEL_EXTENSION_WORDS = 4,
+  MODEL_MAX_ELEMENTS = 2,    /* rows of presliding at one place */
   MODEL_DIRECTION_SHARES = 3 /* of a direction of uncertainty, beyond one a tendon */
 };
 
@@ -49,6 +50,8 @@ typedef struct model_shape {
   /* filled by model_read_header(): what the memory of a finger depends on */
   uint32_t edge_count, edge_law_count;    /* edges with friction, their laws */
   uint32_t most_points[MODEL_MAX_JOINTS]; /* largest number of working points before each joint; 0 without angles */
+  uint32_t elements;                      /* most rows of presliding at one place: 0..MODEL_MAX_ELEMENTS */
+  int stretches;                          /* 1: with cord_stretch */
   size_t effect_memory;                   /* numbers that extensions on friction and torques remember */
   size_t extension_memory;                /* all that the extensions remember */
 } model_shape;

@@ -177,12 +177,8 @@ static double add_magnitude(const place_laws* p, int negative, double speed, dou
 /* F where the place moves, 0 where it sticks */
 static double read_friction(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
   const double v = f->scratch.velocity[p->slot], speed = v < 0.0 ? -v : v;
-  const int gripped = f->extensions.friction > 0;
-  const double grip = gripped ? f->scratch.grip[p->slot] : 1.0;
-  if (gripped && f->scratch.slides[p->slot] != 0.0) {
-    const int negative = sliding_side(v, p->threshold, f->remembered.side_before[p->slot]);
-    d->base[p->place] = add_magnitude(p, negative, speed, grip, d->friction, &d->friction_count);
-  } else if (f->remembered.moving[p->slot] == 0.0) {
+  const double grip = f->extensions.friction ? f->scratch.grip[p->slot] : 1.0;
+  if (f->remembered.moving[p->slot] == 0.0) {
     d->base[p->place] = 0.0;
   } else {
     const double sign = v < 0.0 ? -1.0 : 1.0;

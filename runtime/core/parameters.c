@@ -101,7 +101,7 @@ model_item parameter_item(const model_shape* shape, uint32_t index) {
 
 static parameter_range range_of_effect(const model_item* item, uint32_t offset) {
   const effect_parameter* p = &item->effect->parameters[offset];
-  const int at_joint = item->place.joint != EFFECT_NOWHERE;
+  const int at_joint = item->place.joint != EFFECT_NOWHERE && item->place.tendon == EFFECT_NOWHERE;
   const char* elsewhere = at_joint ? p->unit_at_joint : is_everywhere(item->place) ? p->unit_everywhere : NULL;
   return (parameter_range){elsewhere ? elsewhere : p->unit, p->minimum, p->maximum, p->above_minimum, 1};
 }
@@ -206,9 +206,31 @@ static void note_threshold(check* c, const model_item* item) {
   }
 }
 
+/* of the first numbers of some effects exactly one is above 0 */
+static int check_one_of(const check* c, const model_item* item) {
+  const double* values = c->values + item->first;
+  const uint32_t count = (uint32_t)item->effect->one_of;
+  uint32_t above = 0, last = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    above += values[k] > 0.0;
+    last = values[k] > 0.0 ? k : last;
+  }
+  if (!count || above == 1) {
+    return 0;
+  }
+  say_value(c->message, item, item->first + last, values[last]);
+  message_text(c->message, above ? ": expected 0 beside " : ": expected above 0, here or in ");
+  message_text(c->message, item->effect->parameters[above ? 0 : 1].name);
+  return -1;
+}
+
 /* a row without a place that counts distances by thresholds */
 static int check_extension(const check* c, const model_item* item) {
-  if (!item->effect->yields || !is_everywhere(item->place) || !c->threshold.count) {
+  if (check_one_of(c, item)) {
+    return -1;
+  }
+  if (!item->effect->parameters[0].unit_everywhere || !is_everywhere(item->place) || !c->threshold.count ||
+      c->values[item->first] == 0.0) {
     return 0;
   }
   say_value(c->message, &c->threshold, c->threshold.first, 0.0);

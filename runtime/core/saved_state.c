@@ -94,6 +94,7 @@ static int scalars_are_sound(const tendonfmu_finger* f, const unsigned char* sta
                             [STATE_RECENT_AT] = {-rest_time, rest_time, 0},
                             [STATE_STARTED_AT] = {-drift_time, drift_time, 0},
                             [STATE_UNWELL] = {0.0, sensors, 1},
+                            [STATE_STEP] = {0.0, 2.0 * LARGEST_TIME, 0},
                             [STATE_START_OPEN] = {0.0, has->has_start_share ? 1.0 : 0.0, 1}};
   for (size_t k = 0; k < STATE_SCALARS; ++k) {
     const state_row row = {.low = rules[k].low, .high = rules[k].high, .whole = rules[k].whole, .spare_lanes = 1};

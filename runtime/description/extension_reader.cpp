@@ -20,6 +20,7 @@ const elsewhere no_extensions[] = {
     {"joint_friction", "it is the law friction of a joint"},
     {"joint_load_friction", "it is the law load_friction of a joint"},
     {"cover_stiffness", "it is the number cover.stiffness of a joint"},
+    {"relaxation", "it is the number relaxation_time of presliding"},
     {"contact", "it belongs to a recording, not to a finger"},
     {"unknown", "it belongs to a recording, not to a finger"},
 };
@@ -48,6 +49,9 @@ void check_keys(const json_node& extension, const effect_type& effect) {
   }
   if (effect.tendon != PLACE_REFUSED) {
     keys.emplace_back("tendon");
+  }
+  if (effect.level) {
+    keys.emplace_back("level");
   }
   for (std::uint32_t i = 0; i < effect.parameter_count; ++i) {
     keys.emplace_back(effect.parameters[i].name);
@@ -81,33 +85,44 @@ std::uint32_t read_joint_before_another(const json_node& node, std::uint32_t joi
 }
 
 struct effect_position {
-  std::uint32_t joint, tendon; /* from 1; 0: none */
+  std::uint32_t joint, tendon, level; /* from 1; 0: none */
 };
 
 effect_position read_position(const json_node& extension, const effect_type& effect, std::uint32_t joints,
                               std::uint32_t tendons) {
   const json_node joint = extension.member("joint"), tendon = extension.member("tendon");
   if (effect.rule == PLACES_NOT_LAST_JOINT) {
-    return {read_joint_before_another(joint, joints), 0u};
+    return {read_joint_before_another(joint, joints), 0u, 0u};
   }
-  if (effect.rule != PLACES_AS_SAID && !joint.absent() && !tendon.absent()) {
+  if (effect.rule == PLACES_LEVEL_ALONE && !extension.member("level").absent()) {
+    const json_node level = extension.member("level");
+    if (!joint.absent() || !tendon.absent()) {
+      throw description_error(level.path() + ": not allowed beside joint or tendon; a level has all tendons");
+    }
+    return {0u, 0u, read_number(level, joints, PLACE_OPTIONAL, range_of("joint", joints))};
+  }
+  if ((effect.rule == PLACES_EXACTLY_ONE || effect.rule == PLACES_AT_MOST_ONE) && !joint.absent() && !tendon.absent()) {
     throw description_error(tendon.path() + ": not allowed beside joint; " + effect.name + " acts at one of them");
   }
   if (effect.rule == PLACES_EXACTLY_ONE && joint.absent() && tendon.absent()) {
     joint.refuse(range_of("joint", joints) + ", or tendon in its place");
   }
   return {read_number(joint, joints, effect.joint, range_of("joint", joints)),
-          read_number(tendon, tendons, effect.tendon, range_of("tendon", tendons))};
+          read_number(tendon, tendons, effect.tendon, range_of("tendon", tendons)), 0u};
 }
 
-/* refuses a row that stands in the table already, of an effect that is there once a place */
-void check_once(const json_node& extension, const effect_type& effect, const effect_position& at,
+/* refuses a row that stands in the table already as often as its effect may at a place */
+void check_most(const json_node& extension, const effect_type& effect, const effect_position& at,
                 const std::vector<std::uint32_t>& table) {
-  for (std::size_t row = 0; effect.once && row < table.size(); row += MODEL_EXTENSION_WORDS) {
-    if (table[row] == effect.id && table[row + 1] == at.joint && table[row + 2] == at.tendon) {
+  int same = 0;
+  for (std::size_t row = 0; effect.most && row < table.size(); row += MODEL_EXTENSION_WORDS) {
+    same += table[row] == effect.id && table[row + 1] == at.joint && table[row + 2] == at.tendon &&
+            table[row + 3] == at.level;
+    if (same == effect.most) {
       const json_node name = extension.member("effect");
-      throw description_error(name.path() + " = \"" + effect.name + "\": expected once" +
-                              (at.joint || at.tendon ? " a place" : "") + ", and extensions[" +
+      throw description_error(name.path() + " = \"" + effect.name + "\": expected " +
+                              (effect.most == 1 ? "once" : "twice at most") +
+                              (at.joint || at.tendon || at.level ? " a place" : "") + ", and extensions[" +
                               std::to_string(row / MODEL_EXTENSION_WORDS + 1) + "] is the same");
     }
   }
@@ -126,8 +141,8 @@ void read_extensions(const json_node& list, std::uint32_t joints, std::uint32_t 
     const effect_type* effect = read_effect(extension.expect_object().member("effect"));
     check_keys(extension, *effect);
     const effect_position at = read_position(extension, *effect, joints, tendons);
-    check_once(extension, *effect, at, table);
-    table.insert(table.end(), {effect->id, at.joint, at.tendon, 0u});
+    check_most(extension, *effect, at, table);
+    table.insert(table.end(), {effect->id, at.joint, at.tendon, at.level});
   }
 }
 

@@ -2,12 +2,17 @@
 
 #include <algorithm>
 
+#include "refusal.h"
+
 namespace tendonfmu::estimation {
 
 sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger)
     : unknowns_(unknowns),
       finger_(finger),
       memory_((parameter_derivative_size(finger) + sizeof(double) - 1) / sizeof(double)) {
+  if (finger->memory.elements > 0) {
+    throw refused("friction with a memory (presliding): its derivative by the numbers is not known here");
+  }
   parameter_derivative_place(finger, memory_.data(), &derivative_);
   terms_.reserve(6 * derivative_.places);
   if (finger->derived.settings.remembers_entry_load) {

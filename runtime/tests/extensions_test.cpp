@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "model_inside.h"
-#include "presliding_step.h"
 
 namespace {
 
@@ -128,11 +127,12 @@ TEST(Presliding, EverywhereIsThatOfEveryPlaceByItsThreshold) {
 
 TEST(Places, OfARowAreTheSlotsThatItActsOn) {
   Finger finger(test_finger::image());
-  const effect_place places[] = {{0, EFFECT_NOWHERE},
-                                 {1, EFFECT_NOWHERE},
-                                 {EFFECT_NOWHERE, 0},
-                                 {EFFECT_NOWHERE, 2},
-                                 {EFFECT_NOWHERE, EFFECT_NOWHERE}};
+  constexpr auto nowhere = EFFECT_NOWHERE;
+  const effect_place places[] = {{0, nowhere, nowhere},
+                                 {1, nowhere, nowhere},
+                                 {nowhere, 0, nowhere},
+                                 {nowhere, 2, nowhere},
+                                 {nowhere, nowhere, nowhere}};
   for (const effect_place& place : places) {
     extension_row row{};
     row.effect = effect_by_name("friction_drift");
@@ -148,76 +148,6 @@ TEST(Places, OfARowAreTheSlotsThatItActsOn) {
       EXPECT_TRUE(!acts || found == member[slot]) << "slot " << slot;
     }
   }
-}
-
-// --- places that slide at all times ---------------------------------------------------------------------------------
-
-std::vector<const extension_row*> sliding_rows(const tendonfmu_finger* finger) {
-  std::vector<const extension_row*> rows;
-  for (std::size_t r = 0; r < finger->extensions.friction; ++r) {
-    const extension_row* row = finger->extensions.row + finger->extensions.signals + r;
-    if (row->effect->slides) {
-      rows.push_back(row);
-    }
-  }
-  return rows;
-}
-
-// What the kernels make of them four at a time, every row remembers as its own advance() says, to the bit.
-void expect_own_memory(const Finger& finger) {
-  const auto rows = sliding_rows(finger);
-  ASSERT_FALSE(rows.empty());
-  const Motion motion(400);
-  bool slid = false;
-  for (std::size_t k = 0; k < 400; ++k) {
-    std::vector<std::vector<double>> before;
-    for (const extension_row* row : rows) {
-      before.emplace_back(row->memory, row->memory + row->memory_count);
-    }
-    ASSERT_EQ(finger.take(motion.time[k], motion.row(k)), TENDONFMU_OK);
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      std::vector<double> after(before[r].size());
-      rows[r]->effect->advance(rows[r]->place, rows[r]->parameters, &finger.handle->scratch.sample, before[r].data(),
-                               after.data());
-      ASSERT_EQ(std::memcmp(after.data(), rows[r]->memory, after.size() * sizeof(double)), 0)
-          << "sample " << k << ", row " << r;
-      slid |= after[0] != 0.0;
-    }
-    for (std::size_t slot = 0; slot < finger.handle->slots && finger.handle->extensions.only_slides; ++slot) {
-      if (finger.handle->scratch.slides[slot] == 0.0) {
-        ASSERT_EQ(finger.handle->scratch.grip[slot], 1.0) << "sample " << k << ", beside what slides: slot " << slot;
-      }
-    }
-  }
-  EXPECT_TRUE(slid);
-}
-
-void expect_own_memory_everywhere(const std::vector<unsigned char>& image) {
-  for (const char* kernel : test_finger::kernels()) {
-    for (int source = 1; source <= 3; ++source) {
-      SCOPED_TRACE(std::string(kernel) + ", source " + std::to_string(source));
-      Finger finger(image);
-      tendonfmu_set_kernel(finger, kernel);
-      tendonfmu_set_kinematics_source(finger, source);
-      expect_own_memory(finger);
-    }
-  }
-}
-
-TEST(SlidingPlaces, AreThoseOfTheirRows) {
-  const std::string everywhere = R"({"effect": "presliding", "displacement": 0.05})";
-  const std::string named = R"({"effect": "presliding", "joint": 2, "displacement": 0.02},
-    {"effect": "gravity", "joint": 1, "sine": 0.02}, {"effect": "inertia", "joint": 1, "inertia": 1e-5},
-    {"effect": "presliding", "tendon": 1, "displacement": 1e-4})";
-  // the row everywhere goes on remembering the places that it leaves to the other one
-  const std::string both = R"({"effect": "presliding", "tendon": 2, "displacement": 3e-4},
-    {"effect": "friction_drift", "amplitude": 0.3, "time_constant": 2}, )" +
-                           everywhere + R"(, {"effect": "presliding", "joint": 1, "displacement": 0.02})";
-  for (const std::string& rows : {everywhere, named, both}) {
-    expect_own_memory_everywhere(image_with(rows));
-  }
-  expect_own_memory_everywhere(
-      image_with(everywhere, R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)"));
 }
 
 // --- derivatives ----------------------------------------------------------------------------------------------------

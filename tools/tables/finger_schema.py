@@ -43,6 +43,10 @@ RULES: Mapping[str, Schema] = {
 PLACES: Mapping[str, Schema] = {
     "exactly one": {"oneOf": [{"$ref": "#/$defs/at_joint"}, {"$ref": "#/$defs/at_tendon"}]},
     "at most one": {"not": {"$ref": "#/$defs/at_both"}},
+    "level alone": {
+        "if": {"required": ["level"], "properties": {"level": {"type": "integer"}}},
+        "then": {"properties": {"joint": NULL, "tendon": NULL}},
+    },
 }
 
 
@@ -220,14 +224,14 @@ def units_of(number: Row) -> str:
 
 
 def _effect(facts: Facts, effect: Row) -> Schema:
-    places = [key for key in ("joint", "tendon") if effect[key] != "refused"]
+    places = [key for key in ("joint", "tendon", "level") if effect.get(key, "refused") != "refused"]
     needed = [key for key in places if effect[key] == "required"]
     needed += [number["key"] for number in effect["numbers"] if "required" in number]
     place: Schema = {
         key: {
             "type": "integer" if effect[key] == "required" else ["integer", "null"],
             "minimum": 1,
-            "maximum": facts.keys["limits"][f"{key}s"],
+            "maximum": facts.keys["limits"]["tendons" if key == "tendon" else "joints"],
             "description": f"Number of the {key}, from 1",
         }
         for key in places

@@ -21,7 +21,6 @@ from tendonfmu.diagnosis import (
     estimation_recordings,
     events_of,
     learn_numbers,
-    make_grid,
     predicted_of,
     series_of,
     settled,
@@ -44,7 +43,7 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
-from tendonfmu.recordings import FitRecording, Recording, Signals, at_rows
+from tendonfmu.recordings import FitRecording, Recording, Signals, at_rows, make_grid
 
 DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
 JUDGED = 45.0  # s, in all, to judge it on

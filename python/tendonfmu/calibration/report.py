@@ -50,9 +50,6 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": found.verdict,
         "causes": [{key: card[key] for key in shown} for card in cards_of(found, names_of(found))[: len(found.causes)]],
-        "signals": found.signals,
-        "smoothing": {"cutoff": found.smoothing.cutoff, "every": found.smoothing.every},
-        "fits_sliding": found.fits_sliding,
         "recordings": [Path(each).name for each in found.recordings],
         "tests": [Path(each).name for each in found.tests],
         "unexplained": found.unexplained.description,

@@ -1,7 +1,7 @@
 """Find what a model gets wrong, which cause it has, and what correcting it gains (`tendonfmu diagnose`).
 
-- `inputs` reads and checks recordings; `signal_choice` chooses signals, delay and presliding to start with.
-- `series` averages recordings over blocks of time; `view` turns a description and recordings into columns.
+- `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
+- `samples` is what runs of the core are compared with, `series` its signals; `view` turns both into columns.
 - `cause` is what the search names, from the candidate that is tried to the page.
 - `selection` judges candidates, `calibration` all corrections of sensors together; `search` adds what a description
   lacks, `change_search` what has changed since a reference.
@@ -16,21 +16,17 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .cause import Cause, CausePlace, ChangedSize, Evidence, Sensor, Where
-    from .contact_scan import events_of, without_blocks
+    from .contact_scan import events_of
     from .diagnosis import diagnose
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion
-    from .extension_fit import FitSettings, learn_numbers, with_known
+    from .extension_fit import FitSettings, with_known
     from .gain import squared_residual
     from .history import History, Line, diagnose_history, share_of
     from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes
     from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
-    from .series import make_grid
-    from .signal_choice import estimation_recordings
     from .sizes import size_at
-    from .sliding import settled, without_stuck
-    from .view import predicted_of, series_of
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

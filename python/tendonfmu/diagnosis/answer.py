@@ -17,7 +17,6 @@ from tendonfmu.diagnosis.pictures import Compared, evidence, residual_views, whi
 from tendonfmu.diagnosis.result import Diagnosis, Unexplained
 from tendonfmu.diagnosis.selection import SIGNIFICANCE
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.diagnosis.signal_choice import Estimation
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases
 
@@ -39,7 +38,6 @@ class Asked:
 
 def answered(
     asked: Asked,
-    chosen: Estimation,
     gain: Gain,
     compared: tuple[Series, Numbers, Numbers],  # the series, and what is left without and with the causes [B, n]
     *,
@@ -61,12 +59,11 @@ def answered(
         held_out=gain.held_out,
         seconds=0.0,
         seed=asked.seed,
-        signals=chosen.words,
-        smoothing=chosen.signals,
         least_gain=asked.least_gain,
         nominal=gain.nominal,
         extended=gain.extended,
         bias_only_rms=gain.bias_only_rms,
+        delivered=gain.delivered,
         gain=gain.value,
         steps=gain.steps,
         causes=tuple(causes),

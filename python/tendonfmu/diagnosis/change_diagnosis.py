@@ -13,23 +13,22 @@ from itertools import pairwise
 import numpy as np
 from scipy import stats
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
+from tendonfmu.diagnosis.base import Base
 from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
-from tendonfmu.diagnosis.extension_fit import fit_numbers, with_known
+from tendonfmu.diagnosis.extension_fit import with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.result import Diagnosis, Event, Experiment, SteadyLoad, Unexplained
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
-from tendonfmu.diagnosis.series import Series, make_grid
-from tendonfmu.diagnosis.signal_choice import Estimation, estimation_recordings
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
 from tendonfmu.diagnosis.steady_load import steady_load
-from tendonfmu.diagnosis.view import residual_alone
-from tendonfmu.estimate import Choice
 from tendonfmu.statistics import Interval
 
 LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
@@ -39,37 +38,36 @@ FEWEST = 4  # least number of stretches on either side
 REPEAT = "Repeat the motions of the reference exactly, at the same load and pretension."
 
 
-def diagnose_change(asked: Asked, chosen: Estimation) -> Diagnosis:
+def diagnose_change(asked: Asked, base: Base) -> Diagnosis:
     """Find what has changed since the reference."""
-    return _Changes(asked, chosen).diagnosis()
+    return _Changes(asked, base).diagnosis()
 
 
-def sizes_now(asked: Asked, chosen: Estimation, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+def sizes_now(asked: Asked, base: Base, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
     """Return how large these effects are in the new recordings, named or not."""
-    return _Changes(asked, chosen).sizes(keys)
+    return _Changes(asked, base).sizes(keys)
 
 
 class _Changes:
     """Everything that is reported of a change."""
 
-    def __init__(self, asked: Asked, chosen: Estimation) -> None:
-        self._asked, self._given, self._chosen = asked, asked.given, chosen
-        finger = replace(self._given.finger, data=chosen.signals.description(self._given.finger.data))
-        self._reference = list(chosen.recordings)
+    def __init__(self, asked: Asked, base: Base) -> None:
+        self._asked, self._given, self._base = asked, asked.given, base
+        self._reference = list(base.samples.recordings)
         self._now, self._held, self._tests = (
-            estimation_recordings(finger, recordings, chosen.signals)
-            for recordings in (self._given.whole, self._given.training, self._given.tests)
+            list(each) for each in (asked.given.whole, asked.given.training, asked.given.tests)
         )
-        self._all = [*self._reference, *self._now, *self._tests]
-        self._grid = make_grid(self._all)
+        everything = [*self._reference, *self._now, *self._tests]
+        samples = Samples.of(base.model.data, everything, asked.settings.threads)
+        self._all = samples.as_rests_demand(base.model.data)
 
     def diagnosis(self) -> Diagnosis:
         """Return the diagnosis; its duration is still 0."""
         phases = self._asked.phases
         with phases.start("contact"):
-            out = self._without_events()
+            samples = self._without_events()
         with phases.start("changes") as step:
-            self._search = self._searching(out)
+            self._search = self._searching(samples)
             self._search.run(step)
         with phases.start("gain on unseen data"):
             dropped = self._verified()
@@ -83,32 +81,23 @@ class _Changes:
         listed = [sized(search, changes, k) for k in range(len(changes))]
         return [(change.key, change.changed) for change in listed if change.changed is not None]
 
-    def _without_events(self) -> Flags:
-        """Return the blocks that lie in contact or a stall [B]."""
-        names = {str(recording.path) for recording in self._all[len(self._reference) :]}
-        events, out = events_of(self._chosen.model.data, self._all, self._grid, self._asked.seed)
+    def _without_events(self) -> Samples:
+        """Return the samples without contact and stalls."""
+        names = {str(recording.path) for recording in self._all.recordings[len(self._reference) :]}
+        events, out = events_of(self._base.model.data, self._all, self._asked.seed)
         self._events = tuple(event for event in events if event.recording in names)
         self._usual = tuple(event for event in events if event.recording not in names)
-        return out
+        return self._all.without(out)
 
     def _changed_events(self) -> Sequence[Event]:
         durations = [sum(recording.duration for recording in side) for side in (self._now, self._reference)]
         return unusual(self._events, self._usual, durations[0] / durations[1])
 
-    def _searching(self, out: Flags) -> ChangeSearch:
+    def _searching(self, samples: Samples) -> ChangeSearch:
         first, last = len(self._reference), len(self._reference) + len(self._now)
-        now, tests = range(first, last), range(last, len(self._all))
-        return ChangeSearch(
-            self._chosen.model.data,
-            self._all,
-            self._grid,
-            self._chosen.least,
-            now,
-            tests,
-            out,
-            self._asked.least_gain,
-            self._asked.seed,
-        )
+        now, tests = range(first, last), range(last, len(samples.recordings))
+        asked = self._asked
+        return ChangeSearch(self._base.model.data, samples, self._base.least, now, tests, asked.least_gain, asked.seed)
 
     # --- verified on unseen data ---
 
@@ -153,7 +142,7 @@ class _Changes:
         """Return the changes as learned without the samples that they are judged on."""
         search = self._search
         held = np.zeros(len(search.series.time), dtype=bool)
-        for segment in self._grid.segments:
+        for segment in self._all.grid.segments:
             number = segment.recording - len(self._reference)
             if 0 <= number < len(self._held):
                 held[segment.blocks] = segment.mean(self._held[number].held_out[segment.part]) > 0.0
@@ -161,28 +150,16 @@ class _Changes:
             return search.causes
         return search.moved_on(search.grams(unseen=held))
 
-    def _online(self, changes: Sequence[Cause]) -> Data:
-        """Return the reference model with changes, with the bias at the start of the new recordings."""
-        data: Data = self._search.now_data(changes)
-        if (data.get("bias") or {}).get("initial_torque") is not None:
-            own = [
-                replace(recording, train=recording.train & other.train)
-                for recording, other in zip(self._now, self._held, strict=True)
-            ]
-            settings = replace(self._asked.settings, choice=Choice(only=("bias.initial_torque*",)))
-            data = fit_numbers(data, own, settings).data
-        return self._chosen.online(data)
-
     def _written(self, changes: Sequence[Cause]) -> Data:
-        """Return the same with what is known of its numbers."""
-        return with_known(self._online(changes), self._given.whole, self._asked.settings)
+        """Return the reference model with changes, with what is known of its numbers."""
+        return with_known(self._search.now_data(changes), self._given.whole, self._asked.settings)
 
     # --- what is reported ---
 
     def _result(self, dropped: Sequence[Cause]) -> Diagnosis:
         given, search = self._given, self._search
         learned = self._learned()
-        models = [self._online(learned[:k]) for k in range(len(learned) + 1)]
+        models = [self._search.now_data(learned[:k]) for k in range(len(learned) + 1)]
         gain = self._measured(models)
         harmful = [k for k, (one, other) in enumerate(pairwise(gain.steps)) if other > one]
         if harmful:  # it helps together with what is wrong in both, but not alone
@@ -198,7 +175,6 @@ class _Changes:
         views, load = self._views(), self._load()
         return answered(
             self._asked,
-            self._chosen,
             gain,
             (self._now_series(), *views),
             causes=causes,
@@ -230,7 +206,10 @@ class _Changes:
             [without_events(recording, self._events) for recording in recordings]
             for recordings in (self._given.training, self._given.tests)
         )
-        return measure_gain(models[0], models[-1], now, tests, between=models[1:-1], seed=self._asked.seed)
+        asked = self._asked
+        return measure_gain(
+            models[0], models[-1], now, tests, between=models[1:-1], seed=asked.seed, threads=asked.settings.threads
+        )
 
     def _compared(self) -> list[Compared]:
         """Return, for each change, what is left without it and with it."""
@@ -250,11 +229,9 @@ class _Changes:
 
     def _views(self) -> tuple[Numbers, Numbers]:
         """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
-        search, series = self._search, self._now_series()
-        before = residual_alone(search.data, series)
-        if not search.causes:
-            return before, before
-        return before, residual_alone(search.data, replace(series, target=series.target - search.moved()))
+        search = self._search
+        before = search.samples.residual(search.data)
+        return before, search.samples.residual(search.now_data()) if search.causes else before
 
     def _warnings(self) -> list[str]:
         folds, judged = self._search.folds, self._search.judged

@@ -29,11 +29,11 @@ from tendonfmu.diagnosis.reference import (
     less_reference,
     outside,
 )
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import Grid, block_prediction, exact_model, sample_blocks
-from tendonfmu.diagnosis.view import look, nominal_scale, residual_alone
+from tendonfmu.diagnosis.series import exact_model
+from tendonfmu.diagnosis.view import look
 from tendonfmu.model import moment_arms
-from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Grams, Interval, Products
 
 MOST_CHANGES = 4
@@ -54,34 +54,34 @@ class ChangeSearch(CauseSearch):
     def __init__(
         self,
         data: Data,
-        recordings: Sequence[FitRecording],
-        grid: Grid,
+        samples: Samples,
         least: LeastSizes,
         now: Sequence[int],
         tests: Sequence[int],
-        left_out: Flags,
         least_gain: float,
         seed: int,
     ) -> None:
-        """Prepare all columns."""
-        # left_out: [B]
+        """Prepare all columns; `samples` are those of the reference and all new recordings."""
         super().__init__(MOST_CHANGES)
         self._least_gain = least_gain
-        self.data, self._recordings, self._grid = data, recordings, grid
-        view = self._view = look(data, recordings, grid, least, left_out)
+        self.data, self.samples = data, samples
+        view = self._view = look(data, samples, least)
         self.series = view.series
         self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
         self._new = {*now, *tests}
-        force, then = grid.forces(view.predicted), set(np.unique(self.series.recording).tolist()) - self._new
+        force, then = (
+            samples.grid.forces(view.predicted.recordings),
+            set(np.unique(self.series.recording).tolist()) - self._new,
+        )
         self._repeats = find_repeats(self.series, force, sorted(then), sorted(self._new))
         shift = self._level_shift() @ np.linalg.pinv(moment_arms(data))
         background, scale = background_columns(
-            data, self.series, force - shift, view.columns, residual_alone(data, self.series), seed
+            data, self.series, force - shift, view.columns, samples.residual(data), seed
         )
-        shared = np.concatenate([view.columns.nominal, background], axis=2)
+        shared = np.concatenate([view.nominal, background], axis=2)
         self._shared = less_reference(shared, self.series, self._repeats)
         self._target = less_reference(self.series.target, self.series, self._repeats)
-        self._scale = np.concatenate([nominal_scale(data), scale])
+        self._scale = np.concatenate([view.scale, scale])
         self.numbers = numbers_of(data)
         self._values = self._both() * self.sides.now[:, None, None]
         self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
@@ -104,7 +104,7 @@ class ChangeSearch(CauseSearch):
 
     def _both(self) -> Array:
         """Return the columns of what the description lacks, then those of its own numbers [B, n, c + u]."""
-        return np.concatenate([self._view.columns.values, self._view.columns.nominal], axis=2)
+        return np.concatenate([self._view.columns.values, self._view.nominal], axis=2)
 
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
@@ -282,7 +282,7 @@ class ChangeSearch(CauseSearch):
         kept = [change for k, change in enumerate(self.causes) if k != number]
         shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
         nominal = np.concatenate([self._shared, *shared], axis=2)
-        products = Products(self.folds, nominal, of[only], self._view.splines)
+        products = Products(self.folds, nominal, of[only], self.samples.splines)
         scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
         return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
 
@@ -316,7 +316,7 @@ class ChangeSearch(CauseSearch):
         key = b"" if unseen is None else unseen.tobytes()
         if key not in self._known:
             folds, judged = (self.folds, self.judged) if unseen is None else folds_of_unseen(self._informative, unseen)
-            self._known[key] = (Products(folds, self._shared, self._values, self._view.splines), judged)
+            self._known[key] = (Products(folds, self._shared, self._values, self.samples.splines), judged)
         return self._known[key]
 
     def terms(self, changes: Sequence[Cause]) -> list[Term]:
@@ -340,9 +340,8 @@ class ChangeSearch(CauseSearch):
 
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
-        blocks = sample_blocks(self._grid, self._recordings, self._new)
-        after, before = (block_prediction(data, self._recordings, blocks) for data in (self.now_data(), self.data))
-        return np.asarray(after - before)
+        moved = self.samples.left(self.data) - self.samples.left(self.now_data())
+        return np.where(self.sides.now[:, None], moved, 0.0)
 
     @property
     def informative(self) -> Flags:
@@ -356,8 +355,9 @@ class ChangeSearch(CauseSearch):
 
     def torque_left(self, means: bool = False) -> Numbers:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
-        whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in self._recordings]
-        left = self._grid.means(whole)
+        recordings = self.samples.recordings
+        whole = [recording.target - exact_model(self.data, recording, jumps=False) for recording in recordings]
+        left = self.samples.grid.means(whole)
         if self.causes:
             moved = self.moved()
             mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)

@@ -31,15 +31,15 @@ _MOST_LEVERAGE = 0.999  # of a direction in a stretch: beyond, there is nothing 
 class Confirmation:
     """The residual of a description, and what refitting it can explain."""
 
-    def __init__(self, series: Series, folds: Folds, splines: Splines, trends: Splines, nominal: Columns) -> None:
+    def __init__(self, series: Series, folds: Folds, splines: Splines, nominal: Columns) -> None:
         """Prepare both tests."""
-        # splines: [B, s]; trends: [B, t]; nominal: [B, n, u]
+        # splines: [B, s]; nominal: [B, n, u]
         joints = series.target.shape[1]
-        white = whitener(series, residual_of(series, trends, nominal))
+        white = whitener(series, residual_of(series, splines, nominal))
         plain = Whitener(np.zeros((0, joints)), np.ones(joints), series.used)
         self._tests = [
             _ClusterTest(series, folds, splines, nominal, plain),
-            _ClusterTest(series, folds, trends, nominal, white),
+            _ClusterTest(series, folds, splines, nominal, white),
         ]
 
     def p_value(self, columns: Columns, tried: int) -> float:

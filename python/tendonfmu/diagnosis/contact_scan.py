@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.remainder_features import features, run_starts
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import Event
-from tendonfmu.diagnosis.series import Grid, Series
-from tendonfmu.diagnosis.view import bias_of, residual_alone, series_of
+from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.series import Series
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Folds, Interval, Splines, blocks_of, make_folds, paired_gain
 
@@ -226,14 +226,12 @@ def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
 # --- recordings without events ---------------------------------------------------------------------------------------
 
 
-def events_of(
-    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, seed: int
-) -> tuple[tuple[Event, ...], Flags]:
+def events_of(data: Data, samples: Samples, seed: int) -> tuple[tuple[Event, ...], Flags]:
     """Find the stretches that no friction explains in the residual of a model."""
     # returns blocks that lie in an event [B]
-    series = series_of(data, recordings, grid)
-    names = [str(recording.path) for recording in recordings]
-    events = scan_events(series, residual_alone(data, series), bias_of(data, series), names, seed=seed)
+    series = samples.series(data)
+    names = [str(recording.path) for recording in samples.recordings]
+    events = scan_events(series, samples.residual(data), samples.splines, names, seed=seed)
     return events, left_out(series, events, names)
 
 
@@ -253,18 +251,6 @@ def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecor
         if event.recording == str(recording.path):
             inside |= (recording.time >= event.start) & (recording.time <= event.end)
     return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
-
-
-def without_blocks(recording: FitRecording, number: int, grid: Grid, out: Flags) -> FitRecording:
-    """Return a recording that does not train on the samples of some blocks."""
-    # out: [B]
-    train = recording.train.copy()
-    for segment in grid.segments:
-        if segment.recording == number:
-            begin = segment.part.start
-            rows = np.flatnonzero(np.repeat(out[segment.blocks], segment.samples))
-            train[begin + rows] = False
-    return replace(recording, train=train)
 
 
 # --- what leaving them out gains --------------------------------------------------------------------------------------

@@ -17,29 +17,29 @@ from time import perf_counter
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.answer import Asked
+from tendonfmu.diagnosis.base import find_base
 from tendonfmu.diagnosis.change_diagnosis import diagnose_change
 from tendonfmu.diagnosis.extension_diagnosis import diagnose_extension
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
 from tendonfmu.diagnosis.result import Diagnosis
-from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import own_fault
 from tendonfmu.model import FingerSource
 from tendonfmu.recordings import RecordingSource
 from tendonfmu.tasks import Phases, PhaseState
 
 LEAST_GAIN = 0.03
-SIGNALS = "signals, delay and presliding"
+BASE = "delay, position-dependent torque and memory of friction"
 PHASES = {
-    SIGNALS: 20.0,
+    BASE: 20.0,
     "contact": 8.0,
     "causes": 30.0,
     "gain on unseen data": 20.0,
     "what is left": 10.0,
     "next experiment": 12.0,
 }
-CHANGE_PHASES = {SIGNALS: 20.0, "contact": 8.0, "changes": 20.0, "gain on unseen data": 20.0}
+CHANGE_PHASES = {BASE: 20.0, "contact": 8.0, "changes": 20.0, "gain on unseen data": 20.0}
 
 
 def diagnose(
@@ -63,9 +63,9 @@ def diagnose(
         settings = FitSettings(threads=jobs, path=given.finger.path)
         kinematic = find_kinematic_causes(given, least_gain, seed)
         given = kinematic.corrected(given)
-        with phases.start(SIGNALS):
-            chosen = choose(given.finger, given.reference or given.whole, settings)
+        with phases.start(BASE):
+            base = find_base(given.finger, given.reference or given.whole, settings, least_gain)
         asked = Asked(given, least_gain, seed, settings, phases)
         with own_fault("diagnosis"):  # all input has been checked and fitted once
-            diagnosis = diagnose_change(asked, chosen) if given.reference else diagnose_extension(asked, chosen)
+            diagnosis = diagnose_change(asked, base) if given.reference else diagnose_extension(asked, base)
             return replace(kinematic.in_diagnosis(diagnosis), seconds=perf_counter() - begun)

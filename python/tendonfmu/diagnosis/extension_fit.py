@@ -1,48 +1,48 @@
-"""How the extended finger is fitted: the nominal description with the terms of the accepted causes, all numbers again.
+"""How a description's numbers are fitted: by what runs of the core leave, without a learning bias.
 
-Likelihood, bias settings and samples are those of the nominal fit (`FrictionFit`, method batch). The numbers are not
-judged one by one here, so that a selection can fit many times.
+The likelihood is that of `estimate.memory_fit`; noise is correlated over some blocks, so that so many count as one.
+Derivatives are differences between runs. Between two computations of them Broyden's rank-one update keeps them good
+enough (Broyden, Math. Comp. 19, 1965), and a fit begins with those of a similar model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
 from tendonfmu.diagnosis.effects.terms import changed_law
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,
     Estimator,
-    FrictionFitOptions,
-    Interrupted,
-    Learned,
-    Settings,
+    Linearised,
+    MemoryProblem,
+    State,
     Structure,
-    Watch,
+    bounded_step,
     build_structure,
     get_number,
-    learn_batch,
+    guess_prior,
+    own_copy,
+    set_number,
     unknown_names,
     unknowns,
     with_known_numbers,
     with_values,
 )
-from tendonfmu.model import effects, finger_from_data, law_path, moment_arms, native, number_of
+from tendonfmu.model import effects, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
+from tendonfmu.statistics import MEMORY
 
-MOST_SAMPLES = 20_000  # samples that a fit learns from, about
-PRIOR = 1.0  # prior standard deviation, in units of each number's expected magnitude
-MOST_PASSES = 60  # over the recordings
-TOLERANCE = 0.3  # length of the last step, in standard errors of all unknowns together
-# The same for models that are only compared. Noise is correlated over some 20 samples, and these standard errors do not
-# know it: they are several times too small.
-ROUGH_TOLERANCE = 0.5
+MOST_STEPS = 20
+LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -63,87 +63,158 @@ class FittedModel:
     # the description that says how large each number may be: its values are the standard deviations of the prior
     given: Mapping[str, Any]
     values: Mapping[str, float]  # by path of an estimated number, SI units
-    cost: float  # ½ Σ e²/S including the prior
+    cost: float = float("nan")  # Σ e² with the prior, (N·m)²
     warnings: tuple[str, ...] = ()  # sentences
     fixed: tuple[str, ...] = ()  # paths of numbers that no fit of this model changes
+    # derivatives of what is left by the unknowns, by their keys [R, n]; of the samples it was fitted to
+    slopes: Mapping[str, Numbers] = field(default_factory=dict, repr=False, compare=False)
+    scale: Numbers = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)  # of the unknowns [u]
+
+    def columns(self, samples: Samples) -> tuple[Array, Numbers]:
+        """Return the derivatives of the torque by the unknowns [B, n, u], 0 where not used, and their scale [u]."""
+        joints = len(self.data["joints"])
+        columns = np.zeros((samples.grid.blocks, joints, len(self.slopes)), dtype=np.float32)
+        for k, slope in enumerate(self.slopes.values()):
+            columns[samples.used, :, k] = -slope
+        return columns, self.scale
 
 
 def fit_numbers(
     data: Mapping[str, Any],
-    recordings: Sequence[FitRecording],
+    samples: Samples,
     settings: FitSettings = FitSettings(),
     *,
     given: Mapping[str, Any] | None = None,
     fixed: tuple[str, ...] = (),
-    begin: Mapping[str, Any] | None = None,
+    known: Mapping[str, Numbers] | None = None,
+    rough: bool = False,
 ) -> FittedModel:
-    """Fit the numbers of a description to the samples of `FitRecording.train`; one without numbers stays as it is.
+    """Fit the numbers of a description, starting at its own; one without numbers stays as it is.
 
-    `begin` is the same description with better numbers, from which the search starts.
+    `known` are derivatives of a similar model, to begin with. A rough fit does not compute them anew at its end.
     """
-    # The recordings are those of `predicted_forces`: they lack the noise, which a term that scales with the force would
-    # otherwise fit by shrinking the force.
+    # The samples have the forces that the model predicts: they lack the noise, which a term that scales with the force
+    # would otherwise fit by shrinking the force.
     if not unknowns(data):
-        return FittedModel(data=data, given=data, values={}, cost=float("nan"))
+        return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
     if fixed:
         settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    every = _thinning(recordings, MOST_SAMPLES)
-    structure, learned = _learned(_with_noise(data, every), recordings, settings, origin, begin, every, ROUGH_TOLERANCE)
-    numbers = np.asarray(learned.estimator.values(learned.z))
-    finger = with_values(structure, numbers)
+    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
+    problem = _Problem(structure, samples)
+    fit = problem.fit
+    state, linearised = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
+    numbers = fit.estimator.values(np.clip(fit.scale.unknowns(state.u), *fit.bounds))
     return FittedModel(
-        data=finger.data if every == 1 else {**finger.data, "bias": {**finger.data["bias"], **_noise(data)}},
+        data=with_values(structure, numbers).data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
-        cost=float(learned.cost),
-        warnings=tuple(learned.warnings),
+        cost=state.cost,
         fixed=fixed,
+        slopes=problem.known(linearised),
+        scale=np.where(fit.scale.log, np.log(10.0), fit.scale.size),
     )
 
 
-def learn_numbers(
-    data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings, *, given: Mapping[str, Any]
-) -> tuple[Structure, Learned]:
-    """Fit the numbers of a description and return everything known about the fit."""
-    return _learned(data, recordings, settings, given, None, _thinning(recordings, MOST_SAMPLES), TOLERANCE)
+class _Problem:
+    """A fit of a structure, with derivatives that other fits know."""
+
+    def __init__(self, structure: Structure, samples: Samples) -> None:
+        estimator = Estimator(structure.start.image, structure.group, structure.scale)
+        self.fit = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
+        self.fit.blocks = self.fit.blocks / MEMORY
+        self.fit.mean, self.fit.known = guess_prior(self.fit)
+        self.keys = [key_of(structure.start.data, name) for name in unknown_names(estimator)]
+        self._unit = np.where(self.fit.scale.log, 1.0, self.fit.scale.size)  # of a coordinate
+
+    def linearised(self, state: State, known: Mapping[str, Numbers]) -> Linearised:
+        """Return the derivatives at a state; those that are known are taken as they are."""
+        rows = len(state.residual)
+        shared = {k for k, key in enumerate(self.keys) if key in known and len(known[key]) == rows}
+        columns = np.empty((*state.residual.shape, len(state.u)))
+        missing = [k for k in range(len(state.u)) if k not in shared]
+        columns[:, :, missing] = self.fit.drift.without(self.fit.columns(state.u, missing))
+        for k in shared:
+            columns[:, :, k] = known[self.keys[k]] * self._unit[k]
+        return self.fit.of_columns(state, columns)
+
+    def known(self, linearised: Linearised) -> dict[str, Numbers]:
+        """Return the derivatives by their keys [R, n], for another fit."""
+        return {key: linearised.columns[:, :, k] / self._unit[k] for k, key in enumerate(self.keys)}
+
+    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
+        """Return derivatives that agree with the last step: Broyden's update, in coordinates of their own size."""
+        step = tried.u - state.u
+        missed = tried.residual - state.residual - linearised.columns @ step
+        columns = linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+        return self.fit.of_columns(tried, columns)
+
+
+def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
+    """Return the derivatives of a torque by the numbers that a fit estimates [B, n, u], and the scale of these [u]."""
+    if not unknowns(data):
+        return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
+    problem = _Problem(build_structure(finger_from_data(data, Path("finger")), Choice()), samples)
+    fit = problem.fit
+    chosen = [k for k, unknown in enumerate(fit.estimator.unknowns) if not unknown.path.startswith("bias.")]
+    return fit.slopes(fit.state(fit.mean), fit.runs)[:, :, chosen], fit.scale.size[chosen]
+
+
+def key_of(data: Data, name: str) -> str:
+    """Return a name of an unknown that another description has, too: rows of `extensions` by effect and place."""
+    if not name.startswith("extensions["):
+        return name
+    head, _, last = name.partition(".")
+    number = int(head[len("extensions[") : -1]) - 1
+    rows = data["extensions"]
+
+    def mark(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        return tuple(row.get(key) for key in ("effect", "joint", "tendon", "level"))
+
+    same = sum(mark(row) == mark(rows[number]) for row in rows[:number])
+    return f"{mark(rows[number])} {same}.{last}"
+
+
+def _minimised(
+    problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool
+) -> tuple[State, Linearised]:
+    """Go down from coordinates `begin` [u] (Levenberg, Marquardt); return where it ends, and the derivatives there."""
+    fit = problem.fit
+    state, damping = fit.state(begin), 1e-3
+    linearised, is_fresh = problem.linearised(state, known), not known
+    for _ in range(MOST_STEPS if len(begin) else 0):
+        gradient = linearised.gradient + fit.known @ (state.u - fit.mean)
+        matrix = linearised.information + fit.known
+        step = bounded_step(matrix, gradient, damping, fit.lower - state.u, fit.upper - state.u)
+        tried = fit.state(state.u + step)
+        fall = state.cost - tried.cost
+        if fall > 0.0:
+            linearised, state, damping = problem.moved_on(state, linearised, tried), tried, max(damping / 5.0, 1e-6)
+        if fall > LEAST_FALL * float(fit.blocks.sum()):
+            is_fresh = False
+        elif not (is_fresh or rough):
+            linearised, is_fresh = problem.linearised(state, {}), True
+        elif fall >= 0.0 or damping > 1.0:
+            break
+        else:
+            damping *= 10.0
+    return state, linearised
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
     """Return a fitted description with what recordings tell of its numbers (`estimated`)."""
-    own = [_with_own_target(data, recording) for recording in recordings]
-    return with_known_numbers(finger_from_data(data, settings.path), own).data
-
-
-def _learned(
-    data: Mapping[str, Any],
-    recordings: Sequence[FitRecording],
-    settings: FitSettings,
-    given: Mapping[str, Any],
-    begin: Mapping[str, Any] | None,
-    every: int,
-    tolerance: float,
-) -> tuple[Structure, Learned]:
-    recordings = [_thinned(_with_own_target(data, recording), every) for recording in recordings]
-    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), given)
-    # a diagnosis has its own noise model, so the effective number of samples does not matter
-    fit = FrictionFitOptions(prior=PRIOR, tolerance=tolerance, threads=settings.threads)
-    options = Settings(fit, passes=MOST_PASSES, effective=False)
-    try:
-        start = None if begin is None else _start_at(structure, begin, settings)
-        return structure, learn_batch(structure, recordings, Watch(None), options, start)
-    except Interrupted:  # the intermediate result of a partial fit is of no use
-        raise KeyboardInterrupt from None
+    return with_known_numbers(finger_from_data(data, settings.path), recordings).data
 
 
 def fit_extended(
     nominal: FittedModel,
     causes: Sequence[Term],
-    recordings: Sequence[FitRecording],
+    samples: Samples,
     settings: FitSettings = FitSettings(),
-    begin: Mapping[str, Any] | None = None,
+    begin: FittedModel | None = None,
+    rough: bool = False,
 ) -> FittedModel:
-    """Fit the nominal model with the causes' terms, all numbers again, starting at the nominal fit or at `begin`."""
+    """Fit the nominal model with the causes' terms, all numbers again; those that `begin` has start there."""
     causes = possible(nominal.data, causes)
     if not causes:
         return nominal
@@ -151,7 +222,22 @@ def fit_extended(
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
     estimated = {number.path for number in unknowns(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
-    return fit_numbers(data, recordings, settings, given=nominal.given, fixed=fixed, begin=begin)
+    known = None if begin is None else begin.slopes
+    if begin is not None:
+        data = carried(data, begin.data)
+    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, known=known, rough=rough)
+
+
+def carried(data: Data, known: Data) -> Mapping[str, Any]:
+    """Return a description with the numbers that another one has, too."""
+    theirs = {key_of(known, number.path): number.path for number in unknowns(known)}
+    result = own_copy(data)
+    for number in unknowns(data):
+        path = theirs.get(key_of(data, number.path))
+        for own in (number.path, number.with_path):
+            if own is not None and path is not None:
+                set_number(result, own, float(get_number(known, path)))
+    return result
 
 
 def cause_parameters(
@@ -195,57 +281,12 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
+        if needs_presliding(cause) and not any(row["effect"] == PRESLIDING for row in memory_of(data)):
+            continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)
             kept.append(cause)
     return kept
-
-
-def _start_at(
-    structure: Structure, begin: Mapping[str, Any], settings: FitSettings
-) -> Callable[[Sequence[str]], Numbers] | None:
-    """Return the unknowns of a description with the same numbers as the start of a fit; None if it has others."""
-    image = finger_from_data(begin, settings.path).image
-    if len(native.Instance(image).parameters()) != len(structure.group):
-        return None
-    estimator = Estimator(image, structure.group, structure.scale)
-    known = dict(zip(unknown_names(estimator), estimator.start, strict=True))
-    same = known.keys() == {*unknown_names(Estimator(structure.start.image, structure.group, structure.scale))}
-    return (lambda names: np.array([known[name] for name in names])) if same else None
-
-
-def _with_own_target(data: Mapping[str, Any], recording: FitRecording) -> FitRecording:
-    """Return the recording with the external torque that makes its target follow from its forces."""
-    groups = recording.recording.groups
-    known = groups["tendon_force"] @ moment_arms(data) - recording.target
-    given = groups.get("external_torque", np.zeros_like(known))
-    if np.allclose(known, given, rtol=1e-9, atol=1e-9 * float(np.abs(recording.target).max(initial=0.0))):
-        return recording
-    return replace(recording, recording=replace(recording.recording, groups={**groups, "external_torque": known}))
-
-
-def _thinning(recordings: Sequence[FitRecording], most: int) -> int:
-    """Return of how many samples a fit learns from one."""
-    return max(1, -(-sum(int(recording.train.sum()) for recording in recordings) // most))
-
-
-def _with_noise(data: Mapping[str, Any], every: int) -> Mapping[str, Any]:
-    """Return the description with less noise, so that the bias follows one of `every` samples as fast as all."""
-    if every == 1:
-        return data
-    less = {key: value / np.sqrt(every) for key, value in _noise(data).items()}
-    return {**data, "bias": {**(data.get("bias") or {}), **less}}
-
-
-def _noise(data: Mapping[str, Any]) -> dict[str, float]:
-    return {key: number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force")}
-
-
-def _thinned(recording: FitRecording, every: int) -> FitRecording:
-    """Train on every `every`-th sample."""
-    if every == 1:
-        return recording
-    return replace(recording, train=recording.train & (np.arange(len(recording.train)) % every == 0))
 
 
 def _coarser(path: str) -> list[str]:

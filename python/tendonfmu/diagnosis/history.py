@@ -26,13 +26,13 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked
+from tendonfmu.diagnosis.base import find_base
 from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.change_diagnosis import sizes_now
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
-from tendonfmu.diagnosis.signal_choice import choose
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
@@ -201,8 +201,8 @@ def sizes_in(
     given, named = kinematic.corrected(given), [tuple(key) for key in json.loads(keys)]
     settings = FitSettings(threads=1, path=given.finger.path)
     asked = Asked(given, 0.0, seed, settings, Phases({}))
-    chosen = choose(given.finger, given.reference, settings)
-    sizes = sizes_now(asked, chosen, [key for key in named if key not in kinematic.known])
+    base = find_base(given.finger, given.reference, settings, least_gain)
+    sizes = sizes_now(asked, base, [key for key in named if key not in kinematic.known])
     sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
     return {
         "recording": recording,

@@ -93,11 +93,11 @@ def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
     """Return the bounds of the magnitudes [d]."""
     signs = np.array(variant.signs)
     low, high = np.where(signs > 0, 0.0, -np.inf), np.where(signs < 0, 0.0, np.inf)
-    return low, np.minimum(high, LARGEST_SECANT) if variant.secant_rows else high
+    return low, np.minimum(high, LARGEST_SECANT) if variant.full is not None else high
 
 
 def _step(variant: Variant) -> float:
-    return abs(float(next(iter(variant.shape.values())))) if variant.secant_rows and variant.shape else 1.0
+    return abs(float(next(iter(variant.shape.values())))) if variant.full is not None and variant.shape else 1.0
 
 
 def _alike(by_place: Sequence[Sequence[Proposal]]) -> Iterator[list[Proposal]]:
@@ -146,7 +146,7 @@ class Number:
 
 
 def numbers_of(data: Data) -> list[Number]:
-    """Return the numbers in the order of `candidate_columns.nominal_directions`."""
+    """Return the numbers in the order of `extension_fit.number_columns`."""
     unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
     return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
 

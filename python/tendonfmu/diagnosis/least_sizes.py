@@ -1,6 +1,6 @@
 """What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
 
-Play and the distance of presliding must be several times the noise of the positions. A delay must be more than half a
+Play must be several times the noise of the positions. A delay must be more than half a
 sample; forces that are early must be so by more than velocities lag that are computed from positions.
 """
 
@@ -16,11 +16,13 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.effects import Candidate, Place, Term
 from tendonfmu.diagnosis.hypotheses import LARGEST_SECANT
-from tendonfmu.model import extended_row
+from tendonfmu.model import extended_row, moment_arms
+from tendonfmu.recordings import FitRecording, zero_phase
 
 OF_NOISE = 4.0  # standard deviations of the position noise
 OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
 NEVER_NEGATIVE = ("preload_friction", "load_friction")  # all their places together
+NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
 BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
 
 
@@ -37,7 +39,7 @@ class LeastSizes:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
         if effect == "time_delay":
             return OF_SAMPLE * self.step
-        if effect in ("backlash", "presliding"):
+        if effect == "backlash":
             if joint is not None:
                 return OF_NOISE * float(self.joint_noise[joint - 1])
             if tendon is not None:
@@ -59,8 +61,6 @@ class LeastSizes:
 
     def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""
-        if cause.effect == "presliding":  # its size is the distance that was tried, not the magnitude
-            return True
         least = self.least(*cause.key)
         return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 
@@ -70,6 +70,28 @@ class LeastSizes:
         if effect in NEVER_NEGATIVE and sum(row["coulomb"] for row in rows if row) < 0.0:
             return False
         return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
+
+
+def least_sizes(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float, lag: float = 0.0
+) -> LeastSizes:
+    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
+    joints: list[Numbers] = []
+    tendons: list[Numbers] = []
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        angle, force = recording.model.joint_angle, groups["tendon_force"]
+        reached = (
+            groups["tendon_position"] - force / stiffness
+            if "tendon_position" in groups
+            else angle @ moment_arms(data).T
+        )
+        for part in recording.parts:
+            rate = 1.0 / float(np.median(np.diff(recording.time[part])))
+            for values, noise in ((angle[part], joints), (reached[part], tendons)):
+                noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, lag)
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:

@@ -9,6 +9,7 @@ Two methods look at it:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
@@ -18,8 +19,9 @@ from scipy.signal import welch
 from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.remainder_features import GROUPS, LAW, Features, Finding, features, tree_states
+from tendonfmu.diagnosis.remainder_features import GROUPS, LAW, Features, Finding, features, run_starts, tree_states
 from tendonfmu.diagnosis.remainder_learner import Learner
+from tendonfmu.diagnosis.remainder_states import planted
 from tendonfmu.diagnosis.result import Unexplained
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics import (
@@ -52,6 +54,7 @@ class Remainder:
     description: str
     prediction: Numbers  # N·m [B, n], 0 where not used
     findings: tuple[Finding, ...]  # the parts that are certain
+    planted: float = math.nan  # share of the variance of planted states that the learner finds
 
 
 def measure_remainder(
@@ -93,7 +96,21 @@ def measure_remainder(
     text = described(series, residual, prediction, certain, share) if certain else ""
     square = np.sum(learner.target**2, axis=0)
     beyond = gain - learner.gains(law_alone)
-    return Remainder(share, gain, beyond, square, p_value, text, prediction, tuple(certain))
+    planted = _planted_share(learner, series, residual, seed)
+    return Remainder(share, gain, beyond, square, p_value, text, prediction, tuple(certain), planted)
+
+
+def _planted_share(learner: Learner, series: Series, residual: Numbers, seed: int) -> float:
+    """Return the share of the variance of planted states, as large as the residual, that the learner finds."""
+    random, rows = np.random.default_rng(seed), learner.folds.rows
+    joints = residual.shape[1]
+    states = np.concatenate([planted(series, run_starts(series.segment), random) for _ in range(joints)], axis=1)
+    states -= states[rows].mean(axis=0)
+    hosts = np.repeat(residual, states.shape[1] // joints, axis=1)
+    states *= hosts[rows].std(axis=0) / np.maximum(states[rows].std(axis=0), 1e-12)
+    with_states, hosts_alone = (learner.of(each).predicted(learner.columns) for each in (hosts + states, hosts))
+    missed = states[rows] - (with_states - hosts_alone)
+    return float(np.clip(1.0 - np.sum(missed**2) / max(float(np.sum(states[rows] ** 2)), 1e-300), 0.0, 1.0))
 
 
 def _predicted(learner: Learner, seen: Features, states: tuple[Numbers, Numbers], seed: int) -> tuple[Numbers, Numbers]:
@@ -248,27 +265,25 @@ def _stretch(coordinate: Numbers, power: Numbers) -> tuple[float, float] | None:
 # --- what is unknown -------------------------------------------------------------------------------------------------
 
 
-def unexplained_of(
-    left: Remainder, looked_at: Numbers, everything: Numbers, least_gain: float, explained: float
-) -> Unexplained:
+def unexplained_of(left: Remainder, everything: Numbers, least_gain: float, explained: float) -> Unexplained:
     """Return the share of the remaining variance that unseen stretches show to be no noise, and whether it matters.
 
     It matters where it is material and more than a friction law of another form would bring, or larger than such a law
     may be off.
     """
-    # looked_at, everything: sums of squares [n] of what is left, (N·m)²; explained: the same of the torque, all joints
-    part = np.divide(looked_at, everything, out=np.zeros_like(looked_at), where=everything > 0.0)
-    shares = np.clip(np.array(left.share), 0.0, 1.0) * part
+    # everything: sums of squares [n] of what is left, (N·m)²; explained: the same of the torque, all joints
+    shares = np.clip(np.array(left.share), 0.0, 1.0)
     whole = float(everything.sum())
     share = float(shares @ everything) / whole if whole > 0.0 else 0.0
-    square = float(left.square.sum()) * (whole / float(looked_at.sum()) if looked_at.any() else 1.0)
+    square = float(left.square.sum())
     gain = _rms_gain(left.gain.sum(axis=1), share, square)
     beyond = left.beyond.sum(axis=1)
     apart = _rms_gain(beyond, float(beyond.sum()) / square if square > 0.0 else 0.0, square)
     large = float(left.gain.sum()) > LAW_ERROR**2 * explained
     certain = bool(left.findings) and gain.value >= least_gain and gain.low > 0.0
     unknown = certain and (large or (apart.value >= least_gain and apart.low > 0.0))
-    return Unexplained(share, left.description if unknown else "", tuple(shares.tolist()), left.p_value, unknown, gain)
+    words = left.description if unknown else ""
+    return Unexplained(share, words, tuple(shares.tolist()), left.p_value, unknown, gain, planted=left.planted)
 
 
 def _rms_gain(gain: Numbers, share: float, square: float) -> Interval:

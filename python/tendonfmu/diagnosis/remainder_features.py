@@ -17,6 +17,7 @@ from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
 from tendonfmu.arrays import Numbers
+from tendonfmu.diagnosis.remainder_states import states_of
 from tendonfmu.statistics import Line
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ GROUPS = {
     "friction over force": "direction of motion and tendon force together (friction that changes with the load)",
     "acceleration": "acceleration or products of velocities (inertial torques)",
     "travel": "the travel since the last reversal (hysteresis)",
+    "elastic": "a state that is elastic until it slips, with or without leaking away (friction with another memory)",
     "memory of direction": "the directions of motion of the last seconds (a long hysteresis)",
     "memory of speed": "how fast the finger moved in the last seconds (friction with memory)",
     "memory of angle": "where the joint was in the last seconds (creep)",
@@ -70,7 +72,7 @@ GROUPS = {
 }
 # What a friction law depends on, and not on time: motion, load, and travel since a reversal. In these every real law
 # differs a little from every description, also where nothing is missing.
-LAW = ("velocity", "friction over force", "acceleration", "travel", "rest", "tendon")
+LAW = ("velocity", "friction over force", "acceleration", "travel", "elastic", "rest", "tendon")
 HISTORY = (0.1, 1.0, 10.0)  # s, for the trees
 
 
@@ -88,6 +90,7 @@ def features(series: Series, *, force: Numbers | None = None, torque: Numbers | 
         _of_forces,
         _of_accelerations,
         _of_memory,
+        _of_states,
         _of_slides,
         _of_time,
         _of_tendons,
@@ -303,6 +306,11 @@ def _of_memory(series: Series, states: _States) -> _Made:
         fresh = np.exp(-travel / (0.3 * stroke))
         columns = [rested, rested * side, rested * moving, rested * side * fresh]
         yield "rest", _joint(joint), np.stack(columns, axis=1)
+
+
+def _of_states(series: Series, states: _States) -> _Made:
+    for who, values in states_of(series, run_starts(series.segment)):
+        yield "elastic", who, values
 
 
 def _of_slides(series: Series, states: _States) -> _Made:

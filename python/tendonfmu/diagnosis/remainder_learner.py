@@ -10,6 +10,7 @@ learned from ordinary held-out predictions they find something in pure noise.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import combinations
 
 import numpy as np
@@ -37,15 +38,27 @@ class Learner:
         table = self._span.without(seen.values[folds.rows]).astype(np.float32)
         spread = table.std(axis=0)
         self._table = table / np.where(spread > 1e-4, spread, np.inf)
-        self.target = self._span.without(residual[folds.rows])
         self.folds = folds
         self.columns = np.arange(table.shape[1])
         rows = [folds.fold == number for number in range(folds.folds)]
         self._rows = rows
         self._count = np.array([int(inside.sum()) for inside in rows])
         self._gram = np.array([(self._table[inside].T @ self._table[inside]).astype(np.float64) for inside in rows])
-        self._score = np.array([self._table[inside].T.astype(np.float64) @ self.target[inside] for inside in rows])
-        self._whole_gram, self._whole_score = self._gram.sum(axis=0), self._score.sum(axis=0)
+        self._whole_gram = self._gram.sum(axis=0)
+        self._learn(residual)
+
+    def _learn(self, residual: Numbers) -> None:
+        self.target = self._span.without(residual[self.folds.rows])
+        self._score = np.array(
+            [self._table[inside].T.astype(np.float64) @ self.target[inside] for inside in self._rows]
+        )
+        self._whole_score = self._score.sum(axis=0)
+
+    def of(self, residual: Numbers) -> Learner:
+        """Return the learner of other residuals [B, n]."""
+        other = copy(self)
+        other._learn(residual)
+        return other
 
     def predicted(self, columns: Indices) -> Numbers:
         """Return predictions of unseen folds [R, n], N·m, with the best penalty for each joint."""

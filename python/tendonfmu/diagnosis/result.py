@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.cause import NO_GAIN, Cause, ChangedSize, Where
-from tendonfmu.recordings import Signals
 from tendonfmu.statistics import Interval
 
 ABSORBED = 0.01  # of an effect's variance: if less survives the refit, it is not visible, however large it is
@@ -78,11 +78,12 @@ class Unexplained:
     unknown: bool = False  # whether something material and certain is left
     gain: Interval = NO_GAIN  # on unseen stretches: 1 − rms without what can be predicted / rms with it
     map: RemainderMap | None = None  # if something is unknown
+    planted: float = math.nan  # share of the variance of planted states that the learner finds
 
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """Rms per joint of the residual before the bias update, N·m, on training and test samples."""
+    """Rms per joint of what a model leaves without a learning bias, N·m, on training and test samples."""
 
     train_rms: tuple[float, ...]
     test_rms: tuple[float, ...]
@@ -139,11 +140,11 @@ class Diagnosis:
     held_out: bool  # whether the test data are parts of the training recordings
     seconds: float
     seed: int
-    signals: str  # what was estimated from, in words
     least_gain: float  # share of the rms that a cause must remove
     nominal: ModelErrors  # rms of the two models per joint
     extended: ModelErrors
-    bias_only_rms: tuple[float, ...]  # test rms per joint if only the bias is removed, N·m
+    bias_only_rms: tuple[float, ...]  # test rms per joint without any friction, N·m
+    delivered: tuple[ModelErrors, ModelErrors]  # rms of the nominal and the extended model with the bias, as FMUs
     noise_floor: tuple[float, ...]  # part of the extended model's test rms that nothing predicts, per joint, N·m
     floor_source: str  # how the noise floor was determined
     gain: Interval  # over all joints on the test data: 1 − rms of the extended / rms of the nominal model
@@ -165,8 +166,6 @@ class Diagnosis:
     tested: int = 0  # effects at places
     # share of the rms on the training recordings that leaving `events` out removes; None without events
     event_gain: Interval | None = None
-    smoothing: Signals = field(default_factory=Signals)  # the same as numbers
-    fits_sliding: bool = False  # whether the numbers of the extended model were fitted only where everything slides
     kind: str = "model"  # "model": what the model lacks
     references: tuple[str, ...] = ()  # names of the reference recordings
     repeated: int = 0  # number of motions of the reference that were repeated exactly

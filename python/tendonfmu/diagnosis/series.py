@@ -1,68 +1,21 @@
 """How recordings and models look to a diagnosis: averaged over short blocks of time.
 
-The estimator's model of a joint is y_k = T_k + b_k + e_k with b_k = b_{k−1} + Δb_k + w_k (runtime/include/
-tendonfmu_estimation.h). With G_k = T_k + Σ Δb up to k, y − G is a slow bias plus noise. A diagnosis looks only at G and
-at its derivatives by the numbers of the description.
+G_k = T_k + Σ Δb up to k is a model's torque with all jumps of fig. 5. A diagnosis looks only at what it leaves, y − G.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tendonfmu.arrays import Array, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.model import moment_arms, native, number_of, without_learning
-from tendonfmu.recordings import FitRecording, delayed_torque
-from tendonfmu.statistics import BlockSeries, SampleBlocks
-
-SHORTEST_STEP = 0.01  # s; shortest block
-MOST_BLOCKS = 12_000
-_STRETCH = 4000  # samples of a run at a time, so that its outputs stay in the processor's cache
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of a recording without a gap, cut into blocks with equally many samples."""
-
-    recording: int  # its number, from 0
-    part: slice  # its samples there
-    first: int  # first block in the whole series, and number of blocks
-    count: int
-    samples: int  # samples of a block
-
-    @property
-    def blocks(self) -> slice:
-        return slice(self.first, self.first + self.count)
-
-    def mean(self, values: Array) -> Array:
-        """Return block means [count, ...] of values [samples of the part, or as many as the blocks have, ...]."""
-        whole = values[: self.count * self.samples]
-        return np.asarray(whole.reshape(self.count, self.samples, *whole.shape[1:]).mean(axis=1))
-
-
-@dataclass(frozen=True)
-class Grid:
-    """All segments, one after another; they are the estimator's recordings. `step` is the length of a block, s."""
-
-    segments: tuple[Segment, ...]
-    step: float
-
-    @property
-    def blocks(self) -> int:
-        return sum(segment.count for segment in self.segments)
-
-    def means(self, values: Sequence[Array]) -> Array:
-        """Return block means [B, ...] of values [N, ...] of each recording."""
-        return np.concatenate([segment.mean(values[segment.recording][segment.part]) for segment in self.segments])
-
-    def forces(self, recordings: Sequence[FitRecording]) -> Numbers:
-        """Return block means of the tendon forces, N [B, m]."""
-        return self.means([recording.recording.groups["tendon_force"] for recording in recordings])
+from tendonfmu.recordings import FitRecording, Grid, Segment, delayed_torque
+from tendonfmu.statistics import BlockSeries
 
 
 @dataclass(frozen=True)
@@ -77,36 +30,10 @@ class Series(BlockSeries):
     travel: Numbers  # travel since the joint last reversed, rad [B, n]
 
 
-def make_grid(recordings: Sequence[FitRecording]) -> Grid:
-    """Cut recordings into blocks of about 10 ms."""
-    duration = sum(recording.duration for recording in recordings)
-    step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
-    segments, first = [], 0
-    for number, recording in enumerate(recordings):
-        samples = max(1, round(step / float(np.median(np.diff(recording.time)))))
-        for part in recording.parts:
-            count = (part.stop - part.start) // samples
-            if count and recording.train[part].any():
-                segments.append(Segment(number, part, first, count, samples))
-                first += count
-    return Grid(tuple(segments), step)
-
-
-def sample_blocks(
-    grid: Grid, recordings: Sequence[FitRecording], chosen: Collection[int] | None = None
-) -> SampleBlocks:
-    """Return the grid's block of each sample, −1 for none; only in some of the recordings if `chosen` is given."""
-    numbers_of = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
-    for segment in grid.segments:
-        if chosen is None or segment.recording in chosen:
-            numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
-            numbers_of[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
-    return SampleBlocks(tuple(numbers_of), grid.blocks)
-
-
 def _image(data: Mapping[str, Any]) -> Any:
     """Return the image of a description with a bias that only jumps and without contact detection."""
-    return native.image_from_json(json.dumps(without_learning(data, "forget_rate", "entry_load")))
+    bare = without_learning(data, "entry_load")
+    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
 
 
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
@@ -121,72 +48,11 @@ def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool
     return residual
 
 
-def block_prediction(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
-    """Return block means of G of a description, less the torque of forces used beyond the measured ones, N·m [B, n]."""
-    sums = np.zeros((blocks.count, len(data["joints"])))
-    finger, arms = native.Instance(_image(data)), moment_arms(data)
-    for recording, block in zip(recordings, blocks.of, strict=True):
-        for part in recording.parts:
-            if (block[part] < 0).all():
-                continue
-            finger.reset()
-            finger.set_kinematics_source(recording.kinematics)
-            for begin in range(part.start, part.stop, _STRETCH):
-                rows = slice(begin, min(begin + _STRETCH, part.stop))
-                arrays = recording.arrays(rows)
-                # τ − T_eff; T_eff is T with all jumps so far if the bias learns nothing
-                whole = arrays["tendon_force"] @ arms - finger.run(arrays)["compensated_torque"]
-                _add_up(sums, block[rows], whole)
-    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
-
-
-def _add_up(sums: Numbers, block: NDArray[np.int64], values: Numbers) -> None:
-    inside = block >= 0
-    if inside.any():
-        first, own = int(block[inside][0]), block[inside]
-        for j in range(sums.shape[1]):
-            totals = np.bincount(own - first, weights=values[inside, j])
-            sums[first : first + len(totals), j] += totals
-
-
-def block_late_forces(
-    data: Mapping[str, Any],
-    recordings: Sequence[FitRecording],
-    blocks: SampleBlocks,
-    delay: float,
-    prediction: Numbers,
-) -> Numbers:
-    """Return the change of y − G [B, n] (N·m) if forces are measured `delay` s later than they act."""
-    late = [_with_late_forces(recording, delay) for recording in recordings]
-    moved = _block_torque(data, late, blocks) - _block_torque(data, recordings, blocks)
-    return np.asarray(moved - (block_prediction(data, late, blocks) - prediction))
-
-
-def _with_late_forces(recording: FitRecording, delay: float) -> FitRecording:
-    groups = dict(recording.recording.groups)
-    force = groups["tendon_force"].copy()
-    for part in recording.parts:
-        time = recording.time[part]
-        for i in range(force.shape[1]):
-            force[part, i] = np.interp(time - delay, time, groups["tendon_force"][part, i])
-    groups["tendon_force"] = force
-    return replace(recording, recording=replace(recording.recording, groups=groups))
-
-
-def _block_torque(data: Mapping[str, Any], recordings: Sequence[FitRecording], blocks: SampleBlocks) -> Numbers:
-    """Return block means of τ = Rᵀ f [B, n], N·m."""
-    arms = moment_arms(data)
-    sums = np.zeros((blocks.count, arms.shape[1]))
-    for recording, block in zip(recordings, blocks.of, strict=True):
-        _add_up(sums, block, recording.recording.groups["tendon_force"] @ arms)
-    return np.asarray(sums / np.maximum(blocks.sizes(), 1)[:, None])
-
-
 # --- the series -------------------------------------------------------------------------------------------------------
 
 
-def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, torque: Numbers) -> Series:
-    """Average the signals over the blocks of a grid."""
+def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers) -> Series:
+    """Average the signals over the blocks of a grid; `left` is what a description leaves of the torque [B, n], N·m."""
     whole = [recordings[segment.recording] for segment in grid.segments]
     pieces = list(zip(grid.segments, whole, strict=True))
     threshold, arms = number_of(data, "velocity_threshold.joint"), moment_arms(data)
@@ -195,7 +61,7 @@ def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], gri
         time=grid.means([recording.time for recording in recordings]),
         recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
         segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
-        target=grid.means([recording.target for recording in recordings]) - torque,
+        target=left,
         used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
         step=grid.step,
         angle=grid.means([recording.model.joint_angle for recording in recordings]),

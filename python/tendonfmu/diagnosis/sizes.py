@@ -62,9 +62,10 @@ def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
 
 def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
     """Return the travel of presliding at all places, whose number is a time: time × threshold of motion."""
-    if [unit for _, unit in parameters.values()] != ["s"]:
+    times = [value for path, (value, unit) in parameters.items() if path.endswith(".displacement") and unit == "s"]
+    if not times:
         return ""
-    ((time, _),) = parameters.values()
+    time = max(times)
     tendon, joint = (quantity(time * threshold, unit) for threshold, unit in zip(thresholds, ("m", "rad"), strict=True))
     return f"over {tendon} at tendons, {joint} at joints"
 

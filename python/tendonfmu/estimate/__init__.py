@@ -10,6 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
+    from .core_runs import CoreRuns, Direction, with_angles
     from .estimates import known_numbers
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate
@@ -25,17 +26,22 @@ if TYPE_CHECKING:
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
-    from .methods import (
+    from .learning import (
         FitProgress,
         FrictionFitOptions,
         Interrupted,
         Learned,
         Settings,
         Watch,
-        learn_batch,
         unknown_names,
     )
+    from .memory import has_memory
+    from .memory_choice import choose_memory
+    from .memory_fit import Linearised, MemoryProblem, State, bounded_step
+    from .memory_methods import guess_prior
+    from .methods import learn_batch
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
+    from .slow_drift import SlowDrift, slowest_drift
     from .structure import (
         MAGNITUDES,
         Choice,

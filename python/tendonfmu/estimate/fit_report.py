@@ -10,7 +10,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
 from tendonfmu.estimate.files import FIT_REPORT
-from tendonfmu.estimate.methods import Learned, unknown_names
+from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import Fitted
 from tendonfmu.files import counted, finite
 from tendonfmu.model import Finger, native

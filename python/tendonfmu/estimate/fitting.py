@@ -27,18 +27,10 @@ from tendonfmu.estimate.files import (
     with_previous_values,
 )
 from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
-from tendonfmu.estimate.given_numbers import is_worse, movement
+from tendonfmu.estimate.given_numbers import is_worse, is_worse_unseen, movement
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
-from tendonfmu.estimate.methods import (
-    FrictionFitOptions,
-    Interrupted,
-    Learned,
-    Settings,
-    Watch,
-    learn_batch,
-    learn_ekf,
-    unknown_names,
-)
+from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Settings, Watch, unknown_names
+from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
@@ -214,6 +206,7 @@ class FrictionFit(Configured):
             effective=options.effective_samples,
             previous=previous,
             noise=number_of(self.start_.data, "bias.noise_std"),
+            torque=float(np.sqrt(np.mean([np.mean(each.target[each.train] ** 2) for each in self.recordings_]))),
         )
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         try:
@@ -245,7 +238,10 @@ class FrictionFit(Configured):
 
     def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str], is_estimated: bool) -> None:
         self.training_ = self._evaluated(learned)
-        keeps = is_worse(self.training_)
+        if learned.memory is None:
+            keeps = is_worse(self.training_)
+        else:
+            keeps = is_worse_unseen(self.start_.data, self.description_.data, self.recordings_)
         if keeps:
             learned = replace(learned, z=learned.estimator.start)
             self.training_ = self._evaluated(learned)

@@ -4,15 +4,31 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from tendonfmu.arrays import Data
+from tendonfmu.estimate.core_runs import CoreRuns
 from tendonfmu.estimate.evaluation import Evaluation, residual_entry
+from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted
+from tendonfmu.recordings import FitRecording
 
 FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
+
+
+def is_worse_unseen(given: Data, fitted: Data, recordings: Sequence[FitRecording]) -> bool:
+    """Return whether fitted numbers leave more of the samples held out than the given ones, without a learning bias."""
+    unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
+    if not unseen:
+        return False
+    runs = CoreRuns(fitted, unseen)
+    drift = SlowDrift(runs.time, runs.stretch, runs.used)
+    left, before = (drift.without(each.residual()) for each in (runs, runs.of(given)))
+    return float(np.sum(left**2)) > float(np.sum(before**2))
 
 
 def is_worse(training: Sequence[Evaluation]) -> bool:

@@ -4,10 +4,6 @@ Both first fit with each sample counting as one. If the residuals are then not w
 of an effective number of samples (`sample_weights`), by joint and stretch of a recording, and the fit is repeated
 with these weights: they shift the balance of data and prior, the estimates and their covariance.
 
-The prior is a Gaussian about the given numbers with covariance C + (s · size)²: C is that of an earlier fit, if any,
-and s, by how much the numbers are off, is the one under which the data are most likely (`_most_likely`). So numbers
-that the data do not contradict stay. What is reported as known does not rest on s: it counts numbers as known to within
-C and CHANGE if they were estimated before, else to within their size.
 
 The residuals are measured once, at the first fit. A fit that the prior holds back has residuals of a wrong model, which
 are more strongly correlated.
@@ -16,108 +12,31 @@ are more strongly correlated.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
-from tendonfmu.estimate.files import PreviousFit
+from tendonfmu.estimate.learning import (
+    FitProgress,
+    FrictionFitOptions,
+    Interrupted,
+    Learned,
+    Settings,
+    Watch,
+    unknown_names,
+)
+from tendonfmu.estimate.memory import has_memory
+from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
+from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
 from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.files import counted
-from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
 Start = Callable[[Sequence[str]], Numbers]
-
-
-_LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended at 0 in a previous fit leave it
-CHANGE = 0.02  # of a number that was estimated before: what wear, temperature and another instrument may have changed
-_MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
-_GUESS = 1.0  # of a number that nobody has estimated
-_SPREADS = np.geomspace(1e-3, _GUESS, 31)
-_CLEARLY = 2.0  # by which the log likelihood must rise before numbers leave where they were (Edwards 1972: support)
-
-
-@dataclass(frozen=True)
-class FrictionFitOptions(FitOptions):
-    """Options of `FrictionFit`."""
-
-    threads: int = option(0, Number(0, whole=True), "of a batch; 0: all cores")
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a fit is made."""
-
-    options: FrictionFitOptions
-    passes: int  # most passes over the data
-    effective: bool = True  # whether samples count for their share of an effective number
-    previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
-    noise: float = 0.0  # torque noise of the description (N·m)
-
-
-@dataclass(frozen=True)
-class FitProgress:
-    """Progress of a fit."""
-
-    phase: str  # phase in words
-    iteration: int  # number of the pass
-    done: int  # samples of this phase
-    total: int
-    cost: float  # cost so far; NaN if unknown
-
-
-@dataclass(frozen=True)
-class Learned:
-    """A finished estimation."""
-
-    estimator: Estimator  # unknowns, and their conversion into numbers of the description
-    z: Numbers  # [u] estimate
-    covariance: Numbers  # [u, u] of z, prior included
-    prior: Numbers  # [u, u] covariance of what was known before
-    information: Numbers  # [u, u] of the data alone
-    cost: float  # negative log likelihood with the prior; NaN for the filter
-    iterations: int  # number of steps, and of passes over the data
-    passes: int
-    converged: bool  # whether the method converged
-    weights: list[Numbers]  # by recording, [N, n] the weight of each sample
-    innovations: list[Numbers]  # by recording, [N, n] standardised innovations, if the method computes them; else empty
-    warnings: list[str]  # sentences
-
-
-class Interrupted(Exception):
-    """The estimation was stopped."""
-
-    def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
-        super().__init__("stopped")
-        self.estimator, self.z, self.cost, self.by_user = estimator, z, cost, by_user
-
-
-class Watch:
-    """Passes progress on, and records a wish to stop, such as a Ctrl-C while the library computes."""
-
-    def __init__(self, progress: Callable[[FitProgress], bool | None] | None) -> None:
-        self._progress = progress
-        self.stopped, self.by_user = False, False
-
-    def __call__(self, progress: FitProgress) -> bool:
-        """Report progress; return whether to continue."""
-        try:
-            answer = self._progress(progress) if self._progress is not None else None
-        except KeyboardInterrupt:
-            self.by_user = True
-            answer = False
-        self.stopped = self.stopped or answer is False
-        return not self.stopped
-
-
-def unknown_names(estimator: Estimator) -> list[str]:
-    """Name the unknowns of an estimator."""
-    return [unknown.name for unknown in estimator.unknowns]  # [u]
 
 
 def _estimator(structure: Structure) -> Estimator:
@@ -172,19 +91,10 @@ def _measured_weights(
     for number, (place, part) in enumerate(added):
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
         step = float(np.median(np.diff(recordings[place].time[part])))
-        stroke = _stroke_time(recordings[place].model.joint_speed[part], step)
+        stroke = stroke_time(recordings[place].model.joint_speed[part], step)
         measured = sample_weights(innovation / np.sqrt(variance)[:, None], step, stroke)
         weights[place][part] = np.minimum(measured, most)
     return weights
-
-
-def _stroke_time(joint_speed: Numbers, step: float) -> float:
-    """Return the mean time (s) between reversals of any joint."""
-    reversals = 1
-    for speed in joint_speed.T:
-        moving = speed[np.abs(speed) > _MOVES * np.abs(speed).max(initial=0.0)]
-        reversals += np.count_nonzero(np.diff(np.sign(moving)))
-    return step * len(joint_speed) / reversals
 
 
 def learn_batch(
@@ -194,10 +104,12 @@ def learn_batch(
     # start: [u]
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
+    if has_memory(structure.start.data):
+        return learn_with_memory(structure, estimator, recordings, watch, settings, begin)
     added = _add_recordings(estimator, recordings)
-    prior = _Prior.of(estimator, settings)
+    prior = Prior.of(estimator, settings)
     given = settings.options.prior
-    covariance = prior.of_spread(_GUESS if given is None else given)
+    covariance = prior.of_spread(GUESS if given is None else given)
     result = _fitted(estimator, begin, covariance, settings, watch, "")
     steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
@@ -212,7 +124,7 @@ def learn_batch(
             _, gradient, information = estimator.evaluate(result.z)
             passes += 1
             pull = information @ (result.z - estimator.start) - gradient
-            covariance = _most_likely(information, pull, prior)
+            covariance = most_likely(information, pull, prior)
         what = ", with effective samples" if is_coloured else ""
         result = _fitted(estimator, result.z, covariance, settings, watch, what)
         steps, passes = steps + result.steps, passes + result.passes
@@ -237,12 +149,14 @@ def learn_batch(
 def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Learned:
     """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
     estimator, settings = _estimator(structure), Settings(FrictionFitOptions(), passes=1)
+    if has_memory(structure.start.data):
+        return learned_with_memory_at(structure, estimator, recordings, settings)
     added = _add_recordings(estimator, recordings)
     weights = _measured_weights(estimator, estimator.start, recordings, added, settings)
     for number, (place, part) in enumerate(added):
         estimator.set_weights(number, weights[place][part.start])
     cost, _, information = estimator.evaluate(estimator.start)
-    prior = _Prior.of(estimator, settings)
+    prior = Prior.of(estimator, settings)
     return Learned(
         estimator=estimator,
         z=estimator.start,
@@ -259,72 +173,6 @@ def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Lear
     )
 
 
-@dataclass(frozen=True)
-class _Prior:
-    """What is known of the unknowns before the data: a Gaussian about the estimator's start."""
-
-    covariance: Numbers  # [u, u] C of an earlier fit; 0 where nothing is known
-    size: Numbers  # [u] expected magnitude
-    estimated: Flags  # [u] whether an earlier fit has estimated it
-
-    @classmethod
-    def of(cls, estimator: Estimator, settings: Settings) -> _Prior:
-        start, scale, names = estimator.start, estimator.scale, unknown_names(estimator)
-        covariance, estimated = np.zeros((len(names),) * 2), np.zeros(len(names), dtype=bool)
-        previous = settings.previous
-        if previous is None:
-            return cls(covariance, scale, estimated)
-        known = [unknown.path in previous.values for unknown in estimator.unknowns]
-        estimated = np.array([name in previous.names for name in names] if len(previous.names) else known, dtype=bool)
-        size = np.where(estimated, np.maximum(np.abs(start), _LEAST * scale), scale)
-        is_bias = np.array([name.startswith("bias.") for name in names], dtype=bool)
-        size[is_bias] = np.maximum(size[is_bias], settings.noise)
-        place = {name: k for k, name in enumerate(previous.names)}
-        both = [k for k, name in enumerate(names) if name in place and estimated[k]]
-        before = [place[names[k]] for k in both]
-        covariance[np.ix_(both, both)] = previous.covariance[np.ix_(before, before)]
-        return cls(covariance, size, estimated)
-
-    def of_spread(self, spread: float | Numbers, share: float = 1.0) -> Numbers:
-        """Return the covariance [u, u] if numbers are off by `spread` of their size, beside a share of C."""
-        return share * self.covariance + np.diag((spread * self.size) ** 2)
-
-    def reported(self, given: float | None) -> Numbers:
-        """Return the covariance [u, u] that standard errors rest on."""
-        return self.of_spread(np.where(self.estimated, CHANGE, _GUESS) if given is None else given)
-
-    def posterior(self, information: Numbers) -> Numbers:
-        """Return the covariance [u, u] of the estimate by the information [u, u] of the data and what was known."""
-        return np.asarray(np.linalg.inv(information + _inverse(self.reported(None))), dtype=np.float64)
-
-
-def _inverse(covariance: Numbers) -> Numbers:
-    """Invert a covariance whose correlations are rounded: no direction counts as better known than by 1e-6."""
-    root = np.sqrt(np.diag(covariance))
-    value, turn = np.linalg.eigh(covariance / np.outer(root, root))
-    turned = turn / root[:, None]
-    return np.asarray((turned / np.maximum(value, 1e-6)) @ turned.T)
-
-
-def _most_likely(information: Numbers, pull: Numbers, prior: _Prior) -> Numbers:
-    """Return the prior's covariance [u, u] under which the data are most likely (empirical Bayes).
-
-    information [u, u] and pull [u] = information · (estimate by the data alone − start).
-    """
-    scale = prior.size
-    information, pull = information * np.outer(scale, scale), pull * scale
-
-    def log_likelihood(covariance: Numbers) -> float:
-        scaled = covariance / np.outer(scale, scale)
-        both = np.eye(len(scale)) + information @ scaled
-        return 0.5 * float(pull @ scaled @ np.linalg.solve(both, pull) - np.linalg.slogdet(both)[1])
-
-    shares = (0.0, 1.0) if prior.covariance.any() else (0.0,)
-    least, *others = (prior.of_spread(spread, share) for share in shares for spread in _SPREADS)
-    best = max(others, key=log_likelihood)
-    return best if log_likelihood(best) > log_likelihood(least) + _CLEARLY else least
-
-
 def _fitted(
     estimator: Estimator,
     begin: Numbers,
@@ -335,7 +183,7 @@ def _fitted(
 ) -> BatchResult:
     """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
     best, best_cost = begin, float("nan")
-    estimator.set_known(_inverse(prior))  # [u, u]
+    estimator.set_known(inverse(prior))  # [u, u]
 
     def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
         nonlocal best, best_cost
@@ -367,6 +215,11 @@ def learn_ekf(
     structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
+    if has_memory(structure.start.data):
+        raise InputError(
+            f"{structure.start.path}: presliding: the Kalman filter does not know friction that remembers; "
+            "expected --method batch, or a description without presliding"
+        )
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)
     innovations: list[Numbers] = []
@@ -375,8 +228,8 @@ def learn_ekf(
             learner.begin_pass()
         innovations = _filter_once(learner, estimator, recordings, watch, number)
     z, covariance = learner.z, learner.covariance
-    prior, given = _Prior.of(estimator, settings), settings.options.prior
-    begun = _GUESS if given is None else given
+    prior, given = Prior.of(estimator, settings), settings.options.prior
+    begun = GUESS if given is None else given
     plain = np.diag(1 / (begun * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
@@ -389,8 +242,8 @@ def learn_ekf(
         mean = first if settings.previous is None else estimator.start
         pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
         information = share * information
-        about = _most_likely(information, pull, prior) if given is None else prior.of_spread(given)
-        found = np.asarray(np.linalg.inv(information + _inverse(about)), dtype=np.float64)
+        about = most_likely(information, pull, prior) if given is None else prior.of_spread(given)
+        found = np.asarray(np.linalg.inv(information + inverse(about)), dtype=np.float64)
         z = _within(estimator, mean + found @ pull)
         covariance = prior.posterior(information) if given is None else found
     return Learned(
@@ -458,7 +311,7 @@ def _learner(structure: Structure, estimator: Estimator, settings: Settings, sta
         scale = np.where(np.isnan(scale), own, scale)
         image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
     try:
-        prior = _GUESS if settings.options.prior is None else settings.options.prior
+        prior = GUESS if settings.options.prior is None else settings.options.prior
         return Learner(image, structure.group, scale, prior_std=prior, parameter_drift=settings.options.drift)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

@@ -57,7 +57,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
         [finger.numbered(text) for text in texts] for texts in (choice.only, choice.fix, choice.share, choice.scale)
     )
     choice = Choice(choice.sides, only, fix, share, scale)
-    data = _model_alone(with_sides(finger.data, choice.sides))
+    data = model_alone(with_sides(finger.data, choice.sides))
     numbers = estimable_numbers(data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
@@ -82,7 +82,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
     )
 
 
-def _model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
+def model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Remove `contact.uncertainty*`, `sensor_fault` and `estimated`."""
     data = {key: value for key, value in data.items() if key not in ("sensor_fault", "estimated")}
     contact = data.get("contact") or {}

@@ -12,17 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Data, Indices, Numbers, rounded
+from tendonfmu.estimate.core_runs import with_angles
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
-from tendonfmu.estimate.methods import Learned
+from tendonfmu.estimate.learning import Learned, MemoryEvidence
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import NEVER, native
+from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import error_directions
 
 LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions
@@ -70,10 +72,14 @@ def parameter_uncertainty(
 ) -> tuple[list[list[list[float]]], dict[str, Any]]:
     """Compute the uncertainty of the friction torque: by joint up to four lists of m + 3 numbers, and the report."""
     known = known_of(learned.covariance, learned.information)
-    estimator = Estimator(structure.start.image, structure.group, structure.scale)
-    scores, block_time = block_scores(structure, learned.z, data, training, learned.weights)
+    if learned.memory is None:
+        estimator = Estimator(structure.start.image, structure.group, structure.scale)
+        scores, block_time = block_scores(structure, learned.z, data, training, learned.weights)
+        motion: Motion | RememberedMotion = Motion(estimator, learned.z, data, known)
+    else:
+        scores, block_time = learned.memory.scores()
+        motion = RememberedMotion(learned.memory, data, known)
     scores = scores @ known.factor
-    motion = Motion(estimator, learned.z, data, known)
     trained, held = ([np.flatnonzero(getattr(each.recording, which)) for each in training] for which in ROLES)
     seen = {"train": motion.look(training, trained), "loaded": motion.look(training, trained, LOAD)}
     if any(len(rows) for rows in held):
@@ -182,9 +188,54 @@ class Motion:
         return self.estimator.jacobian(number, self.z, 0, len(arrays["time"]))[2]
 
 
-def friction_parts(data: Data, arrays: Mapping[str, Numbers]) -> Numbers:
+def friction_parts(data: Data, arrays: Mapping[str, Numbers], kinematics: int = 3) -> Numbers:
     """Compute [K, n, m + 3] the parts of T due to each tendon, joint friction, load friction and cover (N·m)."""
     joints, tendons = len(data["joints"]), len(data["tendons"])
     none = [[[0.0] * (tendons + 3)]] * joints
     asked = {**data, "contact": {"threshold": [NEVER] * joints, "uncertainty": none}, "sensor_fault": None}
-    return np.asarray(native.Instance.from_description(asked, 3).run(arrays, parts=True)["friction_parts"])
+    return np.asarray(native.Instance.from_description(asked, kinematics).run(arrays, parts=True)["friction_parts"])
+
+
+@dataclass(frozen=True)
+class RememberedMotion:
+    """Evaluates blocks of recordings with friction that remembers, whose torque needs all samples before."""
+
+    memory: MemoryEvidence
+    data: Data
+    known: Known
+
+    def look(self, recordings: Sequence[Evaluation], rows: Sequence[Indices], load: float = 1.0) -> Seen:
+        """Evaluate every k-th of the blocks that lie in the rows, at `load` times the recorded tendon forces."""
+        problem, minimum = self.memory.problem, self.memory.minimum
+        grid = problem.runs.grid
+        inside = grid.means([_flags(len(each.recording.time), own) for each, own in zip(recordings, rows, strict=True)])
+        chosen = np.flatnonzero(inside == 1.0)
+        chosen = chosen[:: max(1, math.ceil(len(chosen) / _SAMPLES))]
+        loaded = [_loaded(each, load) for each in recordings]
+        slopes = problem.slopes(minimum.state, problem.runs if load == 1.0 else problem.runs.over(loaded))[chosen]
+        parts = grid.means([_parts(self.data, each) for each in loaded])[chosen]
+        return Seen(parts.transpose(1, 0, 2), (slopes @ self.known.factor).transpose(1, 0, 2))
+
+
+def _flags(samples: int, rows: Indices) -> Numbers:
+    flags = np.zeros(samples)
+    flags[rows] = 1.0
+    return flags
+
+
+def _loaded(evaluation: Evaluation, load: float) -> FitRecording:
+    """Return a recording with its angles and `load` times its forces."""
+    recording = evaluation.recording
+    if load == 1.0:
+        return recording
+    groups = {**recording.recording.groups, "tendon_force": load * recording.recording.groups["tendon_force"]}
+    heavier = replace(recording, recording=replace(recording.recording, groups=groups))
+    return with_angles(heavier, np.nan_to_num(evaluation.model.joint_angle))
+
+
+def _parts(data: Data, recording: FitRecording) -> Numbers:
+    """Compute [N, n, m + 3] the parts of T of all samples; 0 outside the parts without a gap (N·m)."""
+    parts = np.zeros((*recording.target.shape, len(data["tendons"]) + 3))
+    for part in recording.parts:
+        parts[part] = friction_parts(data, recording.arrays(part), recording.kinematics)
+    return parts

@@ -14,7 +14,8 @@ from tendonfmu.estimate.estimation import Unknown as FittedUnknown
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
-from tendonfmu.estimate.methods import Learned, learned_at
+from tendonfmu.estimate.learning import Learned
+from tendonfmu.estimate.methods import learned_at
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, values_of
 from tendonfmu.model import Finger, number_of
 from tendonfmu.recordings import FitRecording

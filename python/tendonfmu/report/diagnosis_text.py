@@ -141,6 +141,9 @@ def error_sentence(diagnosis: Diagnosis) -> str:
     bias = together(diagnosis.bias_only_rms)
     if math.isfinite(bias):
         text += f" Without any friction model it would be {rounded(factor * bias)} {unit}."
+    with_bias = [factor * together(each.test_rms) for each in diagnosis.delivered]
+    if all(map(math.isfinite, with_bias)):
+        text += f" With the bias, as the FMU runs, {rounded(with_bias[0])} and {rounded(with_bias[1])} {unit} remain."
     return text
 
 
@@ -150,6 +153,11 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     if left is None:
         return ""
     noise = f"but it is correlated over {left.memory}, not white" if left.memory else "so for these sensors it is noise"
+    planted = diagnosis.unexplained.planted
+    if math.isfinite(planted):
+        noise += (
+            f"; of hidden states that were planted for a test the learner finds {100.0 * planted:.0f} % of the variance"
+        )
     if left.predictable <= 0.0:
         return f"{left.text(left.whole)} {unit} remain. No recorded signal predicts any of it, {noise}."
     little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else "; it is too small to matter"
@@ -361,7 +369,6 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield from hidden_sentences(diagnosis, names)
     for event in diagnosis.events:
         yield f"left out: {Path(event.recording).name}, {event.start:.2f} to {event.end:.2f} s: {event.description}"
-    yield f"numbers estimated from {diagnosis.signals}"
     yield f"next: {next_sentence(diagnosis)}"
 
 

@@ -11,7 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import error_directions, intervals, paired_gain, quintic
-    from .block_grams import Grams, Products, standard_error
+    from .block_grams import MEMORY, Grams, Products, bounded, standard_error
     from .blocks import (
         FEWEST_STRETCHES,
         STRETCH,

@@ -22,7 +22,8 @@ typedef enum place_rule {
   PLACES_AS_SAID,     /* each key by its own need */
   PLACES_EXACTLY_ONE, /* joint or tendon, not both */
   PLACES_AT_MOST_ONE, /* joint, tendon or neither */
-  PLACES_NOT_LAST_JOINT
+  PLACES_NOT_LAST_JOINT,
+  PLACES_LEVEL_ALONE /* level, or joint and tendon as said */
 } place_rule;
 
 typedef struct effect_parameter {
@@ -40,35 +41,32 @@ typedef struct effect_parameter {
 
 /* Where a row of the description's extensions acts; 0-based, EFFECT_NOWHERE where the key is absent. */
 typedef struct effect_place {
-  uint32_t joint, tendon;
+  uint32_t joint, tendon, level;
 } effect_place;
 
 static inline int is_everywhere(effect_place place) {
-  return place.joint == EFFECT_NOWHERE && place.tendon == EFFECT_NOWHERE;
+  return place.joint == EFFECT_NOWHERE && place.tendon == EFFECT_NOWHERE && place.level == EFFECT_NOWHERE;
 }
 
 /* What an effect sees of a finger and one sample. Rows of [n × lanes] have a row a joint. */
 typedef struct effect_sample {
   size_t joints, tendons, lanes;
-  int first;                            /* 1: the first sample */
-  int source;                           /* kinematics source 1, 2, 3 */
-  double time, step;                    /* s; step is meaningless at the first sample */
-  const double* angle;                  /* [n] rad */
-  const double* velocity;               /* [n] rad/s */
-  const double* tendon_velocity;        /* [n × lanes] ẋ_ij, m/s; in advance() only */
-  const double *travel, *tendon_travel; /* [n] rad, [n × lanes] m since the sample before, as a position filter says;
-                                           NULL: velocity·step; in advance() only */
-  const double* force;                  /* [m] f0, N */
-  const double* moment_arm;             /* [n × lanes] r_ij, m */
-  const double* rest_angle;             /* [n] of the covers, rad; 0 without one */
-  const double* axis_cosine;            /* [n × n] of the angle between the axes of two joints; 1 without links */
+  int first;                                /* 1: the first sample */
+  int source;                               /* kinematics source 1, 2, 3 */
+  double time, step;                        /* s; step is meaningless at the first sample */
+  const double* angle;                      /* [n] rad */
+  const double* velocity;                   /* [n] rad/s */
+  const double* tendon_velocity;            /* [n × lanes] ẋ_ij, m/s; in advance() only */
+  const double* force;                      /* [m] f0, N */
+  const double* moment_arm;                 /* [n × lanes] r_ij, m */
+  const double* rest_angle;                 /* [n] of the covers, rad; 0 without one */
+  const double* axis_cosine;                /* [n × n] of the angle between the axes of two joints; 1 without links */
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
 
 /* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
 typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
-  const double* motion; /* [n] of the travel with a position filter, else of the velocity; in advance_slope() only */
 } effect_direction;
 
 /* The signals of a sample while they are brought in order: rows that an effect may change. */
@@ -84,18 +82,15 @@ typedef struct effect_signals {
   double* position_behind;                      /* [m] of directions: receives the same of this sample; NULL: not */
 } effect_signals;
 
-/* What an effect makes of the friction at one place: F = share·|F(v)| where it slides at all times, else factor times
- * what fig. 5 gives. */
+/* A factor of the friction at one place, of F and of b. */
 typedef struct effect_grip {
-  int slides;         /* 1: never sticks */
-  double kept;        /* of what slides: share of where it was before this sample that is left */
-  double value;       /* share or factor */
+  double value;
   double by_velocity; /* s/m or s/rad */
-  double by_motion;   /* the same, where it depends on the travel; with a position filter 1/m or 1/rad */
   double by_parameter[EFFECT_MAX_PARAMETERS];
 } effect_grip;
 
-typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL } effect_kind;
+/* EFFECT_MEMORY: numbers alone, which friction_memory.h reads. */
+typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL, EFFECT_MEMORY } effect_kind;
 
 typedef struct effect_type {
   const char* name; /* as in a description */
@@ -104,10 +99,9 @@ typedef struct effect_type {
   int order; /* of signals: rows act in the order of these, whatever theirs */
   place_need joint, tendon;
   place_rule rule;
-  int once;   /* 1: at most once a place */
-  int yields; /* 1: a row without a place leaves a place to the row that names it, and needs both thresholds above 0 */
-  int slides; /* 1: of friction, where it never sticks: its memory is that of presliding_step.h, which the kernels
-                 advance four places at a time in place of advance() */
+  int level;  /* 1: it may stand at a level */
+  int most;   /* rows of the same place; 0: any number */
+  int one_of; /* of its first numbers exactly one is above 0; 0: no such rule */
   uint32_t parameter_count;
   const effect_parameter* parameters;
 
@@ -136,9 +130,11 @@ typedef struct effect_type {
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);
-  /* Of friction: the slot with whose velocity number k of its memory has its sign. Where presliding acts there, the
-   * number is presliding's share in place of the sign. torque() must be linear in the memory; NULL: not so. */
+  /* Of friction: the slot with whose velocity number k of its memory has its sign. Where friction has a memory there,
+   * the number builds up as friction of this size would; at joints the size enters the limit there, and the number is
+   * 0. torque() must be linear in the memory; NULL: not so. */
   size_t (*slot)(effect_place place, size_t joints, size_t lanes, size_t k);
+  double (*size)(effect_place place, const double* parameters, const effect_sample* sample); /* N, N·m */
 
   /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
    * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's; of a finger's

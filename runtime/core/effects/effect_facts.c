@@ -58,8 +58,15 @@ const effect_parameter pulley_eccentricity_numbers[3] = {
   {.name = "turns", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
 };
 
-const effect_parameter presliding_numbers[1] = {
-  {.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 0.0001, .scale_everywhere = 0.05},
+const effect_parameter presliding_numbers[4] = {
+  {.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0001, .scale_everywhere = 0.05},
+  {.name = "stiffness", .unit = "N/m", .unit_at_joint = "N.m/rad", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 10000.0, .scale_everywhere = 0.0},
+  {.name = "relaxation_time", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
+  {.name = "share", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
+};
+
+const effect_parameter cord_stretch_numbers[1] = {
+  {.name = "stiffness", .unit = "N/m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 1.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 100000.0, .scale_everywhere = 0.0},
 };
 
 const effect_parameter friction_drift_numbers[2] = {
@@ -98,6 +105,7 @@ const effect_type* const all_effects[EFFECT_COUNT] = {
   &effect_moment_arm_variation,
   &effect_pulley_eccentricity,
   &effect_presliding,
+  &effect_cord_stretch,
   &effect_friction_drift,
   &effect_tendon_nonlinearity,
   &effect_backlash,

@@ -20,6 +20,10 @@ static size_t slot(effect_place place, size_t joints, size_t lanes, size_t k) {
   return joints * lanes + place.joint;
 }
 
+static double size(effect_place place, const double* parameters, const effect_sample* sample) {
+  return parameters[0] * fabs(sample->force[place.tendon]);
+}
+
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   torque[place.joint] += parameters[0] * memory[0] * fabs(sample->force[place.tendon]);
@@ -33,5 +37,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 
 const effect_type effect_load_friction = {
     LOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .memory_count = 1, .advance = advance,
-    .torque = torque,    .slope = slope,        .slot = slot,
+    .torque = torque,    .slope = slope,        .slot = slot,      .size = size,
 };

@@ -2,6 +2,8 @@
 
 #include "effect_facts.h"
 
+#include <math.h>
+
 #include "effect_parts.h"
 
 /* Friction of a tendon that does not scale with its force (a tight sheath, a seal): before joint j' the tendon loses
@@ -34,6 +36,12 @@ static void advance(effect_place place, const double* parameters, const effect_s
 static size_t slot(effect_place place, size_t joints, size_t lanes, size_t k) {
   (void)joints;
   return (from_joint(place) + k) * lanes + place.tendon;
+}
+
+static double size(effect_place place, const double* parameters, const effect_sample* sample) {
+  (void)place;
+  (void)sample;
+  return fabs(parameters[COULOMB]);
 }
 
 /* adds own times what is lost before each joint itself, and before times what is lost before the joints before it */
@@ -75,5 +83,5 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 const effect_type effect_preload_friction = {
     PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
     .advance = advance,     .torque = torque,      .by_parameter = by_parameter,
-    .slope = slope,         .slot = slot,
+    .slope = slope,         .slot = slot,          .size = size,
 };

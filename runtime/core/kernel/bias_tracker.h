@@ -181,7 +181,7 @@ COLD_STATIC void bias_steps(tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     jump_joints(f, j, quad_set(settings->joint_threshold));
   }
-  if (f->extensions.friction) {
+  if (f->extensions.gripped) {
     grip_jumps(f);
   }
   sum_bias_jumps(f);

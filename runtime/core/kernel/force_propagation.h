@@ -2,7 +2,7 @@
  */
 #pragma once
 
-#include "sliding_places.h"
+#include "friction_elements.h"
 #include "slot_view.h"
 
 /* the speeds at which effects begin to move and come to rest: v_min, apart by the hysteresis after the first sample */
@@ -63,7 +63,7 @@ HOT_INLINE double angle_before(const double* angle, size_t j) {
 HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad velocity, quad_mask moving, double angle) {
   slot_view* view = f->scratch.view + slot / 4;
   const int moves = quad_mask_bits(moving), known = (int)view->key[0];
-  const int held = known < 0 || f->extensions.friction; /* what slides may be on another side than it remembers */
+  const int held = known < 0 || f->extensions.gripped; /* what slides may be on another side than it remembers */
   const int resting = held ? negative_bits(quad_load(f->remembered.side + slot)) : known;
   const int negative = (negative_bits(velocity) & moves) | (resting & ~moves);
   const quad q = quad_set(angle);
@@ -74,10 +74,10 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
   return view;
 }
 
-/* lanes whose law is that of the sign of v; places with presliding have no hysteresis */
+/* lanes whose law is that of the sign of v; places with a memory have no hysteresis */
 HOT_INLINE quad_mask takes_side(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad speed,
                                 double threshold) {
-  if (!f->extensions.friction) {
+  if (!f->extensions.gripped) {
     return moving;
   }
   const quad_mask fast = quad_greater(speed, quad_set(threshold)), slides = slides_at(f, slot);
@@ -89,30 +89,24 @@ HOT_INLINE quad when_moving(quad_mask moving, quad magnitude, quad velocity) {
   return quad_keep(moving, quad_with_sign(magnitude, velocity));
 }
 
-/* F of four slots from |F| of the law: as fig. 5 has it, or ζ·|F| of what slides at all times, and what the friction
+/* F of four slots from |F| of the law: as fig. 5 has it, or |F| itself where it has a memory, and what the friction
  * rows make of it */
 HOT_INLINE quad acting_friction(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad magnitude,
                                 quad velocity) {
   const quad by_motion = when_moving(moving, magnitude, velocity);
-  if (!f->extensions.friction) {
+  if (!f->extensions.gripped) {
     return by_motion;
   }
   return quad_mul(quad_load(f->scratch.grip + slot), quad_select(slides_at(f, slot), magnitude, by_motion));
 }
 
-/* |F| of what slides as it would be at ζ = 1 */
-HOT_INLINE quad whole_magnitude(const tendonfmu_finger* f, size_t slot, quad magnitude) {
-  return quad_mul(quad_load(f->scratch.others + slot), magnitude);
-}
-
 /* |F| of the lanes that stick, which is what stiction can hold */
 HOT_INLINE void keep_stuck(const tendonfmu_finger* f, double* to, size_t slot, quad_mask moving, quad magnitude) {
   quad stuck = quad_drop(moving, magnitude);
-  if (f->extensions.friction) {
+  if (f->extensions.gripped) {
     const quad_mask slides = slides_at(f, slot);
-    const quad whole =
-        f->derived.settings.bounds_presliding ? quad_drop(moving, whole_magnitude(f, slot, magnitude)) : quad_set(0.0);
-    stuck = quad_select(slides, whole, quad_mul(quad_load(f->scratch.grip + slot), stuck));
+    const quad held = quad_mul(quad_load(f->scratch.grip + slot), stuck);
+    stuck = f->derived.settings.bounds_presliding ? held : quad_drop(slides, held);
   }
   quad_store(to + slot, stuck);
 }
@@ -123,8 +117,8 @@ HOT_INLINE void keep_magnitude(const tendonfmu_finger* f, double* stuck, double*
   if (f->derived.settings.bounds_friction) {
     keep_stuck(f, stuck, slot, moving, magnitude);
   }
-  if (f->extensions.friction && f->derived.settings.has_start_share) {
-    quad_store(whole + slot, whole_magnitude(f, slot, magnitude));
+  if (f->extensions.gripped && f->derived.settings.has_start_share) {
+    quad_store(whole + slot, quad_mul(quad_load(f->scratch.grip + slot), magnitude));
   }
 }
 
@@ -135,11 +129,7 @@ HOT_INLINE int nothing_acts(const tendonfmu_finger* f, size_t slot, quad_mask mo
   if (f->derived.settings.bounds_friction) {
     acts |= f->derived.can_hold[slot / 4];
   }
-  if (f->extensions.friction) {
-    const quad share = quad_abs(quad_load(f->scratch.grip + slot));
-    acts |= quad_mask_bits(quad_both(slides_at(f, slot), quad_greater(share, quad_set(0.0))));
-  }
-  return !acts;
+  return !(acts | quad_mask_bits(slides_at(f, slot)));
 }
 
 /* F_B and F_A of four tendons at joint j, from slot `at` on; returns whether any of them comes to rest or begins to
@@ -218,6 +208,16 @@ HOT_INLINE quad acting_force(quad force, tendon_kinds kinds) {
   return kinds.any ? quad_select(kinds.bidirectional, quad_abs(force), force) : force;
 }
 
+/* what four tendons lose at a slot: F times the force that acts there, or what is remembered of it */
+HOT_INLINE quad loss_at(tendonfmu_finger* f, size_t slot, size_t row, const double* friction, quad acting,
+                        quad before) {
+  const quad value = quad_load(friction + slot), loss = quad_mul(acting, value);
+  if (!f->memory.elements) {
+    return loss;
+  }
+  return quad_select(slides_at(f, slot), loss_of_memory(f, slot, row, value, acting, before), loss);
+}
+
 /* f_A and f_B along four tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
  * in eqs. (8) and (10), accumulated into tendon_friction [n] and load [n] */
 HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds, quad* tendon_friction, quad* load) {
@@ -228,14 +228,19 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds
   quad lost = zero, force = without_slack(quad_load(s->force + i), kinds, &slack);
   for (size_t at = i, j = 0; j < f->joints; at += lanes, ++j) {
     const quad force_at = acting_force(force, kinds); /* f_A,j−1 */
-    const quad edge_loss = quad_mul(force_at, quad_load(s->edge + at));
+    const quad edge_loss = loss_at(f, at, EDGES, s->edge, force_at, force);
     force = without_slack(quad_sub(force, edge_loss), kinds, &slack);
+    keep_tension(f, at, EDGES, force);
     const quad force_between = acting_force(force, kinds); /* f_Bj */
     lost = quad_add(lost, edge_loss);
+    quad_store(s->edge_loss + at, edge_loss);
     if (at < last) {
-      const quad pulley_loss = quad_mul(force_between, quad_load(s->pulley + at + lanes));
+      const size_t behind = at + lanes;
+      const quad pulley_loss = loss_at(f, behind, PULLEYS, s->pulley, force_between, force);
       force = without_slack(quad_sub(force, pulley_loss), kinds, &slack);
+      keep_tension(f, behind, PULLEYS, force);
       lost = quad_add(lost, pulley_loss);
+      quad_store(s->pulley_loss + behind, pulley_loss);
     }
     tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
     load[j] = quad_add(load[j], force_between);
@@ -257,6 +262,23 @@ HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, qua
   }
 }
 
+/* the joints' own friction of eq. (8), from T_jv0 and T_jvf·Σ f_B; where it has a memory both in the same proportion */
+HOT_INLINE quad own_friction(tendonfmu_finger* f, size_t j, quad sum) {
+  const finger_scratch* s = &f->scratch;
+  const quad joint = quad_load(s->joint_friction + j), load = quad_mul(quad_load(s->load_friction + j), sum);
+  const quad both = quad_add(joint, load);
+  if (!f->memory.elements) {
+    return both;
+  }
+  const quad_mask slides = slides_at(f, f->joints * f->tendon_lanes + j);
+  const quad limit = limit_of(quad_add(both, quad_load(s->own_limit + j))), held = torque_of_memory(f, j, limit);
+  const quad share = quad_div(held, quad_max(limit, quad_set(1e-300))); /* of a limit of 0 nothing is held */
+  const quad part = quad_select(slides, share, quad_set(1.0));
+  quad_store(s->joint_friction + j, quad_mul(part, joint));
+  quad_store(s->load_friction + j, quad_mul(part, quad_load(s->load_friction + j)));
+  return quad_select(slides, held, both);
+}
+
 /* T_j of eq. (10), with the joint's own friction and cover of eq. (8) */
 HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
@@ -269,8 +291,7 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad bend = quad_sub(quad_load(s->angle + j), quad_load(d->cover_rest + j));
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);
-    const quad sum = quad_sums(load + j), load_friction = quad_mul(quad_load(s->load_friction + j), sum);
-    const quad joint_friction = quad_add(quad_load(s->joint_friction + j), load_friction);
+    const quad sum = quad_sums(load + j), joint_friction = own_friction(f, j, sum);
     quad_store(s->load + j, sum);
     quad_store(s->friction + j, quad_add(quad_add(quad_sums(tendon_friction + j), joint_friction), cover));
   }

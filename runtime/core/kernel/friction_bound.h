@@ -37,9 +37,9 @@ HOT_INLINE void torque_parts(tendonfmu_finger* f) {
   for (size_t i = 0; i < lanes; i += 4) {
     quad lost = quad_set(0.0);
     for (size_t at = i, j = 0; j < n; at += lanes, ++j) {
-      lost = quad_add(lost, quad_mul(quad_load(s->force_at + at), quad_load(s->edge + at)));
+      lost = quad_add(lost, quad_load(s->edge_loss + at));
       if (j + 1 < n) {
-        lost = quad_add(lost, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley + at + lanes)));
+        lost = quad_add(lost, quad_load(s->pulley_loss + at + lanes));
       }
       quad_store(s->part + at, quad_mul(quad_load(f->derived.moment_arm + at), lost));
     }

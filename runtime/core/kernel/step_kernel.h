@@ -10,7 +10,6 @@
 #include "kinematics.h"
 #include "position_filter.h"
 #include "sensor_fault.h"
-#include "sliding_places.h"
 #include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
@@ -67,7 +66,7 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step)
   }
   if (filters_position(f)) {
     filter_positions(f, s->angle, step, joint_velocity, s->travel + f->joints * f->tendon_lanes);
-    if (f->extensions.friction) {
+    if (f->memory.elements) {
       relative_velocities(f, s->travel);
     }
   } else if (source != TENDONFMU_JOINT_VELOCITIES) {
@@ -183,8 +182,8 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   } else {
     forget_transitions(f);
   }
-  if (f->extensions.friction) {
-    copy_row(s->side_before, s->side, f->slots); /* derivatives of what slides at all times read it */
+  if (f->extensions.gripped) {
+    copy_row(s->side_before, s->side, f->slots); /* derivatives of what has a memory read it */
   }
   remember_slots(f, time);
   copy_row(s->angle, f->scratch.angle, f->joint_lanes);
@@ -210,6 +209,10 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   if (f->shape.extension_count) {
     remember_extensions(f);
   }
+  if (f->memory.elements) {
+    remember_elements(f);
+  }
+  s->scalar[STATE_STEP] = is_first(f) ? 0.0 : time - s->scalar[STATE_TIME];
   s->scalar[STATE_TIME] = time;
   s->scalar[STATE_VELOCITY_GAIN] = velocity_gain;
 }
@@ -369,13 +372,13 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   const double velocity_gain = find_kinematics(f, time, step);
   if (f->shape.extension_count) {
     follow_signals(f, step, velocity_gain);
-    advance_sliding_places(f, step, first);
+    if (f->memory.elements) {
+      turn_places(f, step, first);
+    }
     advance_extensions(f, time, step);
     follow_memories(f);
   }
-  if (f->extensions.friction) {
-    find_grips(f);
-  }
+  find_grips(f);
   speed_thresholds(f, first);
   const int transitions = friction_values(f);
   total_friction(f);

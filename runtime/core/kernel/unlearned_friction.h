@@ -10,7 +10,7 @@
 /* 1 − what this sample's motion leaves of the start, four slots */
 HOT_INLINE quad turned_share(const tendonfmu_finger* f, size_t slot) {
   const quad one = quad_set(1.0), by_moving = quad_keep(moving_now(f, slot), one);
-  if (!f->extensions.friction) {
+  if (!f->extensions.gripped) {
     return by_moving;
   }
   const quad_mask slides = slides_at(f, slot);
@@ -27,7 +27,7 @@ static inline int can_move(const tendonfmu_finger* f, size_t slot) {
   return moves;
 }
 
-/* the first sample: what sticks, or slides in presliding, is in an unknown state */
+/* the first sample: what sticks, or has a memory, is in an unknown state */
 COLD_STATIC void begin_start_left(tendonfmu_finger* f) {
   double* left = f->scratch.start_left;
   for (size_t slot = 0; slot < f->slots; slot += 4) {
@@ -38,12 +38,12 @@ COLD_STATIC void begin_start_left(tendonfmu_finger* f) {
   }
 }
 
-/* By how much a slot's effect may differ from what the model assumes: |F| of what slides, which begins at ζ = 0;
+/* By how much a slot's effect may differ from what the model assumes: |F| of what has a memory, which begins at 0;
  * else twice that of the sample, in which it moves, since b of a first exit took it as standing that way already. */
 HOT_INLINE quad whole_friction(const tendonfmu_finger* f, const double* friction, const double* whole, size_t slot,
                                size_t at) {
   const quad sample = quad_abs(quad_load(friction + at)), of_sample = quad_add(sample, sample);
-  if (!f->extensions.friction) {
+  if (!f->extensions.gripped) {
     return of_sample;
   }
   const quad_mask slides = slides_at(f, slot);

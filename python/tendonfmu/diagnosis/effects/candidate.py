@@ -60,10 +60,7 @@ class Variant:
     rows: tuple[Mapping[str, Any], ...] = ()
     # numbers of laws without a meaning at strength zero: path of the law -> Stribeck velocity
     settings: Mapping[str, float] | None = None
-    secant_rows: tuple[Mapping[str, Any], ...] = ()  # the rows at full strength, if there is no derivative
-    scaled: tuple[str, ...] = ()  # keys of `secant_rows` that grow with the magnitude
-    most: float = math.inf  # largest value of these keys, of either sign
-    only_joint: int | None = None  # the only joint whose torque the rows change, from 1
+    full: Callable[[float], dict[str, Any]] | None = None  # magnitude -> the description with a term of no derivative
     late: float = 0.0  # by how much forces come later than positions, s
 
     @cached_property
@@ -74,31 +71,35 @@ class Variant:
     @property
     def secant(self) -> dict[str, Any] | None:
         """The description with the term, if its column is a difference of torques."""
-        return self.with_secants([self]) if self.secant_rows else None
+        return self.full(1.0) if self.full is not None else None
 
-    def with_secants(self, variants: Sequence[Variant]) -> dict[str, Any]:
-        """Return the description with the terms of several of its variants at full strength."""
-        return apply_edits(self.base, (), [row for variant in variants for row in variant.secant_rows], {})
+    def at(self, magnitudes: Sequence[float]) -> dict[str, Any]:
+        """Return the description with the term at exactly these magnitudes, one per column."""
+        result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
+        for column, magnitude in zip(self.columns, magnitudes, strict=True):
+            for path, share in column.numbers.items() if magnitude else ():
+                add_to_number(result, path, magnitude * share)
+        return result
 
     @property
     def paths(self) -> tuple[str, ...]:
         """First number of each column; "" for a column at full strength."""
-        return ("",) if self.secant_rows else tuple(column.path for column in self.columns)
+        return ("",) if self.full is not None else tuple(column.path for column in self.columns)
 
     @property
     def signs(self) -> tuple[int, ...]:
         """Expected sign of each column's magnitude."""
-        return (1,) if self.secant_rows else tuple(column.sign for column in self.columns)
+        return (1,) if self.full is not None else tuple(column.sign for column in self.columns)
 
     @property
     def expected(self) -> tuple[float, ...]:
         """Magnitudes of an ordinary effect."""
-        return (1.0,) if self.secant_rows else tuple(column.expected for column in self.columns)
+        return (1.0,) if self.full is not None else tuple(column.expected for column in self.columns)
 
     @property
     def count(self) -> int:
         """Number of columns."""
-        return 1 if self.secant_rows else len(self.columns)
+        return 1 if self.full is not None else len(self.columns)
 
     def extended(self, magnitudes: Sequence[float]) -> dict[str, Any]:
         """Return the description with the term at these magnitudes, one per column, none of its numbers at zero."""
@@ -106,12 +107,8 @@ class Variant:
         # start from a number that is present.
         if len(magnitudes) != self.count:
             raise InputError(f"magnitudes: {counted(len(magnitudes), 'number')}; expected {self.count}, one per column")
-        if self.secant_rows:
-            factor = min(max(float(magnitudes[0]), 0.2), 5.0)
-            rows = [dict(row) for row in self.secant_rows]
-            for row in rows:
-                row |= {key: min(max(row[key] * factor, -self.most), self.most) for key in self.scaled}
-            return apply_edits(self.base, (), rows, {})
+        if self.full is not None:
+            return self.full(min(max(float(magnitudes[0]), 0.2), 5.0))
         result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
         for column, magnitude in zip(self.columns, magnitudes, strict=True):
             value = max(_present(column, float(magnitude)), column.least)

@@ -24,6 +24,11 @@ def tendons(data: Data, kinematics: int = 1) -> list[Place]:
     return [Place(tendon=i) for i in range(1, len(data["tendons"]) + 1)]
 
 
+def nowhere(data: Data, kinematics: int = 1) -> list[Place]:
+    """Return no place: the effect is found in another way than by its columns."""
+    return []
+
+
 def whole_finger(data: Data, kinematics: int = 1) -> list[Place]:
     return [Place()]
 

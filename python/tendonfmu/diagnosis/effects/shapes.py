@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,12 +14,10 @@ from tendonfmu.diagnosis.effects.places import (
     kind_shape,
     lacks_drop,
     laws_at,
-    rubbing_parts,
-    thresholds,
 )
 from tendonfmu.diagnosis.effects.terms import ANGLES
 from tendonfmu.diagnosis.span import Span
-from tendonfmu.model import EFFECT_NUMBERS, Effect, moment_arms, velocity_threshold
+from tendonfmu.model import EFFECT_NUMBERS, Effect, velocity_threshold
 
 Grid = list[dict[str, float]]
 
@@ -34,13 +32,9 @@ _APART = 2.0  # rad, over the joint's range, between neighbours in the grid: hal
 _MOST_PULLEYS = 60  # a joint that turns many times, or angles that the arms do not determine, would ask for millions
 _FEWEST = 1.5 * 2.0 * np.pi  # rad, over the joint's range, of a fast pulley: less looks like any function
 _HARDENINGS = (0.01, 0.2)  # hardening·e²/(k·e) at the largest force, e = f/k
-_DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (signal_choice.py)
+_DELAYS = (0.002, 0.01)  # s; larger delays are scanned for (base.py)
 _LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s
 _LEAST_STEPS, _MOST_STEPS = 0.5, 60.0  # samples: the smallest visible delay, and what the model remembers
-OF_TRAVEL = (0.002, 0.008, 0.03, 0.12)  # distances of presliding, of the median travel between reversals
-LONGEST = 0.1  # of the median travel between reversals: friction that builds up over more is a spring
-_TIMES = (0.3, 3.0)  # distances of presliding at one place, times the distance everywhere
-_SLOWEST = 1e-9  # m/s or rad/s: a threshold of 0 has no scale
 
 
 def either(*shapes: Shape) -> Callable[[Data, Place, Span], Grid]:
@@ -120,74 +114,3 @@ def play(data: Data, place: Place, span: Span) -> Grid:
     at_joint = place.joint is not None
     low, high = span.angle[(place.joint or 1) - 1] if at_joint else span.position[(place.tendon or 1) - 1]
     return [{"width": share * float(high - low)} for share in _PLAYS] if high > low else []
-
-
-# --- presliding -------------------------------------------------------------------------------------------------------
-
-
-def presliding_places(data: Data, kinematics: int) -> list[Place]:
-    """Return everywhere if no place has presliding, else the single places."""
-    if not row_places(data, "presliding") and rubbing_parts(data) and min(thresholds(data)) > _SLOWEST:
-        return [Place()]
-    return rubbing_parts(data)
-
-
-def presliding(data: Data, place: Place, span: Span) -> Grid:
-    """Return the grid: everywhere in s, which is multiplied by the threshold of motion; at a place in m or rad."""
-    if place == Place():
-        usual = usual_time(data, span)
-        return [{"displacement": share * usual} for share in OF_TRAVEL] if usual > 0 else []
-    everywhere = next((row for row in data.get("extensions") or [] if is_everywhere(row)), None)
-    if everywhere is not None:
-        present = float(everywhere["displacement"]) * _threshold(data, place)
-        return [{"displacement": factor * present} for factor in _TIMES]
-    travel = _travel(place, span)
-    return [{"displacement": share * travel} for share in OF_TRAVEL[1:]] if travel > 0 else []
-
-
-def usual_time(data: Data, span: Span) -> float:
-    """Return the travel between reversals over the threshold of motion, s: the median over the places with friction."""
-    times = [_travel(place, span) / max(_threshold(data, place), _SLOWEST) for place in rubbing_parts(data)]
-    return float(np.median([time for time in times if time > 0] or [0.0]))
-
-
-def of_joints(data: Data) -> dict[Place, float]:
-    """Return distances of presliding for the joints' own friction beside presliding everywhere, rad; none if known."""
-    # presliding everywhere links them to those of tendons by the thresholds of motion; turning a joint so far moves its
-    # tendons by their distance
-    rows = [row for row in data.get("extensions") or [] if row["effect"] == "presliding"]
-    everywhere = next((row for row in rows if is_everywhere(row)), None)
-    places = rubbing_parts(data)
-    if everywhere is None or any(row.get("joint") for row in rows) or all(place.tendon is None for place in places):
-        return {}
-    along = float(everywhere["displacement"]) * thresholds(data)[0]
-    arms = np.abs(moment_arms(data))
-    turns = [place for place in places if place.joint is not None and arms[:, place.joint - 1].any()]
-    return {place: along / float(arms[:, (place.joint or 1) - 1].max()) for place in turns}
-
-
-def is_spring(data: Data, span: Span) -> bool:
-    """Return whether some presliding of a fitted description is so long that it stands for a spring."""
-    for row in data.get("extensions") or []:
-        if row["effect"] == "presliding":
-            place = Place(row.get("joint"), row.get("tendon"))
-            travel = usual_time(data, span) if is_everywhere(row) else _travel(place, span)
-            if float(row["displacement"]) > LONGEST * travel > 0.0:
-                return True
-    return False
-
-
-def is_everywhere(row: Mapping[str, object]) -> bool:
-    """Return whether a row of `extensions` is presliding at all places."""
-    return row["effect"] == "presliding" and row.get("joint") is None and row.get("tendon") is None
-
-
-def _travel(place: Place, span: Span) -> float:
-    if place.joint is not None:
-        return float(span.travel[place.joint - 1])
-    return float(span.tendon_travel[(place.tendon or 1) - 1])
-
-
-def _threshold(data: Data, place: Place) -> float:
-    tendon, joint = thresholds(data)
-    return joint if place.joint is not None else tendon

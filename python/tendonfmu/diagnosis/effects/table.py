@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from tendonfmu.diagnosis.effects import places, shapes, terms, words
 from tendonfmu.diagnosis.effects.candidate import Candidate
-from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where
+from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where, nowhere
 from tendonfmu.errors import InputError
 
 CANDIDATES: tuple[Candidate, ...] = (
@@ -221,10 +221,37 @@ CANDIDATES: tuple[Candidate, ...] = (
         ),
         excited_by="many small reversals at low speed, with travels around the distance over which friction builds up",
         coordinate="travel",
-        possible_places=shapes.presliding_places,
-        make=terms.presliding,
-        size=words.of("over {}", "displacement"),
-        find_shapes=shapes.presliding,
+        possible_places=nowhere,
+        make=terms.row(),
+        size=words.presliding,
+        common=True,
+    ),
+    Candidate(
+        name="relaxation",
+        title="friction held at rest decays",
+        explanation=(
+            "After a stop the torque that friction holds fades: cords creep, grease flows, contacts settle. Hold the "
+            "finger after a stroke and watch the tendon forces."
+        ),
+        excited_by="strokes with pauses of very different length, and the same strokes fast and slow",
+        coordinate="travel",
+        possible_places=nowhere,
+        make=terms.row(),
+        size=words.of("within {}", "relaxation_time"),
+        common=True,
+    ),
+    Candidate(
+        name="cord_stretch",
+        title="cords stretch between the joints",
+        explanation=(
+            "Between its pulleys a cord stretches with the force that friction makes it carry, so pulleys turn while "
+            "joints stand. Look at how far a pulley near the motor turns when a joint is held and the motor pulls."
+        ),
+        excited_by="changes of the pretension with the joints at rest",
+        coordinate="force",
+        possible_places=nowhere,
+        make=terms.row(),
+        size=words.of("cords of {}", "stiffness"),
         common=True,
     ),
     Candidate(
@@ -280,7 +307,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         ),
         excited_by="strokes of all joints at several pretensions",
         coordinate="force",
-        possible_places=lambda data, kinematics: [],
+        possible_places=nowhere,
         make=terms.row(),
         size=words.of("a largest correction of {}", "correction"),
     ),

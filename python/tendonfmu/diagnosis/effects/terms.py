@@ -63,8 +63,11 @@ def secant(number: str, *, scaled: bool = True, most: float = math.inf) -> Make:
     """Return a row without a useful derivative at zero: its column is a finite difference."""
 
     def make(name: str, data: Data, place: Place, shape: Shape) -> Variant:
-        rows = (_row(name, place, {number: float(shape[number])}),)
-        return Variant(data, shape, secant_rows=rows, scaled=(number,) if scaled else (), most=most)
+        def full(factor: float) -> dict[str, Any]:
+            value = float(shape[number]) * (factor if scaled else 1.0)
+            return apply_edits(data, (), [_row(name, place, {number: min(max(value, -most), most)})], {})
+
+        return Variant(data, shape, full=full)
 
     return make
 
@@ -78,11 +81,6 @@ def delay(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     """Return a delay; its column is the effect of a delay on forces that the model explains."""
     # At a reversal the two differ in the sign of the time since.
     return replace(secant("delay", most=_LONGEST)(name, data, place, shape), late=float(shape["delay"]))
-
-
-def presliding(name: str, data: Data, place: Place, shape: Shape) -> Variant:
-    """Return presliding over a distance; presliding in a joint changes the torque of this joint alone."""
-    return replace(secant("displacement", scaled=False)(name, data, place, shape), only_joint=place.joint)
 
 
 # --- friction laws ----------------------------------------------------------------------------------------------------

@@ -32,6 +32,12 @@ def quantity(value: float, unit: str, *, sign: bool = False) -> str:
     return f"{plus}{text.replace('-', '−')}{NBSP}{sized}"
 
 
+def presliding(numbers: Sizes) -> str:
+    """Return over what friction builds up, or how stiff it is before it slips."""
+    name, text = ("displacement", "over {}") if "displacement" in numbers else ("stiffness", "a stiffness of {}")
+    return text.format(" and ".join(dict.fromkeys(quantity(*number) for number in numbers[name])))
+
+
 def _one(numbers: Sizes, name: str) -> tuple[float, str]:
     return numbers[name][0]
 

@@ -2,7 +2,7 @@
 
 The question is about two causes that look alike, or about one that refitting absorbs. The model predicts a recording
 for every entry of a menu. The columns of the causes in it come from the C core, as in a diagnosis. All numbers of the
-model, the slow bias and the other cause then explain as much of a cause as they can, in the new recording and in the
+model, a constant and the other cause then explain as much of a cause as they can, in the new recording and in the
 old ones together. What is left is the Schur complement of their Gram matrix. Its ratio to the noise says how far apart
 the two predictions will be. This is the T-optimality of Atkinson and Fedorov, "The design of experiments for
 discriminating between two rival models", Biometrika 62 (1975).
@@ -23,15 +23,15 @@ from tendonfmu.diagnosis.cause import Where
 from tendonfmu.diagnosis.effects import Candidate, Term
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.names import Names, at_place, names_in
 from tendonfmu.diagnosis.result import Experiment
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
 from tendonfmu.model import NativeError, moment_arms, number_of
 from tendonfmu.recordings import FitRecording, Model, Recording
-from tendonfmu.statistics import Span as SplineSpan
-from tendonfmu.statistics import regular_blocks, spline_basis
 
 Progress = Callable[[int, int], None]
 
@@ -41,7 +41,6 @@ NONE = "None of the available experiments can"
 LISTED = 2  # further effects that a sentence names
 _RATE = 50.0  # 1/s, of a predicted recording
 _LEAST_RATE, _MOST_SAMPLES = 10.0, 3200
-_BLOCK = 0.02  # s
 _OLD_SECONDS = 60.0  # of each old recording that is used, s
 _BETTER = 1.5  # times the present distance
 _FAINTEST = 0.01  # times the noise: smaller values are rounding errors
@@ -157,15 +156,12 @@ def plan_experiments(
 class _Seen:
     """What one or several recordings show."""
 
-    gram: Numbers  # products of all columns over the noise, without the slow bias [c, c]
-    whole: Numbers  # the same about their means
+    gram: Numbers  # products of all columns over the noise, about their means [c, c]
     power: Numbers  # of the columns by joint [c, n]
     blocks: int  # number of blocks
 
     def __add__(self, other: _Seen) -> _Seen:
-        return _Seen(
-            self.gram + other.gram, self.whole + other.whole, self.power + other.power, self.blocks + other.blocks
-        )
+        return _Seen(self.gram + other.gram, self.power + other.power, self.blocks + other.blocks)
 
 
 class _Laboratory:
@@ -184,9 +180,9 @@ class _Laboratory:
         self.kinematics = recordings[0].kinematics
         given = [number_of(data, "bias.noise_std")] * len(data["joints"]) if noise is None else list(noise)
         self.noise = np.maximum(np.array(given, dtype=float), 1e-9)
-        self.constant_bias = number_of(data, "bias.drift_variance") == 0
         self.candidates = [_restricted(candidate, data, span) for candidate in _asked(questions)]
         self.columns: CandidateColumns | None = None
+        self.nominal_count = 0
         self.old = sum(
             (self._look(_shortened(recording)) for recording in recordings[1:3]), self._look(_shortened(recordings[0]))
         )
@@ -209,20 +205,20 @@ class _Laboratory:
         return [self._answer(question, entry, new) for question in self.questions]
 
     def _look(self, recording: FitRecording) -> _Seen:
-        blocks = regular_blocks([recording.time], [recording.parts], _BLOCK)
-        columns = candidate_columns(self.data, [recording], blocks, candidates=self.candidates, span=self.span)
-        self.columns = columns
-        values = np.concatenate([columns.nominal, columns.values], axis=2).astype(np.float64) / self.noise[:, None]
-        time = np.bincount(blocks.of[0], weights=recording.time) / blocks.sizes()
-        rest = _without_bias(time, values, self.constant_bias)
-        flat, all_ = (part.reshape(-1, part.shape[2]) for part in (rest, values - values.mean(axis=0)))
-        return _Seen(flat.T @ flat, all_.T @ all_, np.einsum("bjc,bjc->cj", rest, rest), blocks.count)
+        samples = Samples.of(self.data, [recording])
+        columns = candidate_columns(self.data, samples, candidates=self.candidates, span=self.span)
+        nominal, _ = number_columns(self.data, samples)
+        self.columns, self.nominal_count = columns, nominal.shape[2]
+        values = np.concatenate([nominal, columns.values], axis=2).astype(np.float64) / self.noise[:, None]
+        rest = samples.drift.without(values)
+        flat = rest.reshape(-1, rest.shape[2])
+        return _Seen(flat.T @ flat, np.einsum("bjc,bjc->cj", rest, rest), len(rest))
 
     def _answer(self, question: Question, entry: Entry, new: _Seen) -> Answer:
         both = self.old + new
         left, before = self._left(question, both.gram), self._left(question, self.old.gram)
         direction = self._direction(question.cause)
-        whole = float(direction @ both.whole @ direction)
+        whole = float(direction @ both.gram @ direction)
         return Answer(
             question=question,
             entry=entry,
@@ -233,15 +229,10 @@ class _Laboratory:
 
     def _left(self, question: Question, gram: Numbers) -> float:
         """Return the power of the cause at its magnitudes that neither the model nor the rival explains."""
-        explaining = list(range(self._offset))
+        explaining = list(range(self.nominal_count))
         if question.rival is not None:
             explaining += self._all_columns(question.rival)
         return _schur(gram, self._direction(question.cause), explaining)
-
-    @property
-    def _offset(self) -> int:
-        assert self.columns is not None
-        return int(self.columns.nominal.shape[2])
 
     def _proposals(self, cause: Term) -> list[Proposal]:
         """Return the shapes of the cause at its place, its own first."""
@@ -262,13 +253,15 @@ class _Laboratory:
         assert self.columns is not None
         proposal = self._proposals(cause)[0]
         given = list(cause.magnitudes) if len(cause.magnitudes) else list(proposal.variant.expected)
-        direction = np.zeros(self._offset + self.columns.values.shape[2])
-        direction[self._offset + proposal.columns.start : self._offset + proposal.columns.stop] = given
+        direction = np.zeros(self.nominal_count + self.columns.values.shape[2])
+        direction[self.nominal_count + proposal.columns.start : self.nominal_count + proposal.columns.stop] = given
         return direction
 
     def _all_columns(self, cause: Term) -> list[int]:
         proposals = self._proposals(cause)
-        return list(range(self._offset + proposals[0].columns.start, self._offset + proposals[-1].columns.stop))
+        return list(
+            range(self.nominal_count + proposals[0].columns.start, self.nominal_count + proposals[-1].columns.stop)
+        )
 
     def _rows(self, cause: Term, seen: _Seen) -> float:
         """Return the number of blocks times joints in which the cause makes a noticeable torque."""
@@ -291,13 +284,6 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
     along = axes[:, kept].T @ (mixed[used] / length[used])
     left = whole - float(np.sum(along**2 / power[kept]))
     return max(left, 0.0)
-
-
-def _without_bias(time: Numbers, values: Numbers, constant: bool) -> Numbers:
-    """Return values [B, n, c] without a slow bias: a constant, or cubic splines with the knots of the diagnosis."""
-    splines = np.ones((len(time), 1)) if constant else spline_basis(time, float(time[-1] - time[0]))
-    flat = SplineSpan(splines).without(values.reshape(len(values), -1))
-    return flat.reshape(values.shape)
 
 
 def _asked(questions: Sequence[Question]) -> list[Term]:

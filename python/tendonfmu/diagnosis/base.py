@@ -1,0 +1,216 @@
+"""Where a search starts: a fitted description with memory, its delay and position-dependent torque settled.
+
+1. A delay between forces and positions is scanned for: derivatives find a large one neither before nor after friction
+   with a memory has been fitted to it.
+2. Torque that depends on the angles and not on the direction comes before friction, which takes it up otherwise.
+3. Friction with a memory is fitted, whether the description has it or not. What it lacked is a cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
+from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
+from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
+from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
+from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.selection import Selection
+from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.view import View, look
+from tendonfmu.estimate import choose_memory
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
+from tendonfmu.recordings import FitRecording
+
+LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
+FINE = 0.001  # s
+LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
+CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
+CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
+POSITION = ("cover_stiffness", "cover_hardening", "gravity", "joint_coupling")  # torque that depends on angles alone
+DISTANCES = (5e-5, 5e-4)  # m, of presliding beside which a delay is scanned for
+DELAY = by_name("time_delay")
+
+
+@dataclass(frozen=True)
+class Base:
+    """What the search starts from."""
+
+    samples: Samples
+    least: LeastSizes  # sizes that the sensors can show
+    nominal: FittedModel  # the given structure
+    start: tuple[tuple[Term, ...], ...]  # delay, position-dependent torque and memory that the description lacks
+    model: FittedModel  # fitted with `start`
+    settings: FitSettings
+
+    @property
+    def terms(self) -> list[Term]:
+        return [term for terms in self.start for term in terms]
+
+    def look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+        """Return what a model that was fitted to the samples lacks."""
+        return look(model.data, self.samples, self.least, candidates, model)
+
+    def without(self, out: Flags) -> Base:
+        """Return the base fitted without some blocks [B]."""
+        samples = self.samples.without(out)
+        nominal, model = (
+            refitted(replace(each, slopes={}), samples, self.settings) for each in (self.nominal, self.model)
+        )
+        return replace(self, samples=samples, nominal=nominal, model=model)
+
+
+def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
+    """Fit a model again, at the forces that it predicts."""
+    return fit_numbers(
+        model.data,
+        samples.at_predicted_forces(model.data),
+        settings,
+        given=model.given,
+        fixed=model.fixed,
+        known=model.slopes,
+        rough=rough,
+    )
+
+
+def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
+    """Fit the given description, and find what it lacks of delay, position-dependent torque and memory."""
+    samples = Samples.of(given.data, recordings, settings.threads)
+    nominal = fit_numbers(given.data, samples, settings)
+    samples = samples.as_rests_demand(nominal.data)
+    nominal = refitted(nominal, samples, settings)
+    least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
+    span = span_of(given.data, recordings)
+    late = _delay(nominal.data, samples, span, least)
+    position = _position_dependent(extended_description(nominal.data, late), samples, least, least_gain)
+    start = [terms for terms in (late, *position) if terms]
+    model, memory = _with_memory(given, nominal, start, samples, settings)
+    return Base(samples, least, nominal, (*start, *memory), model, settings)
+
+
+# --- position-dependent torque ----------------------------------------------------------------------------------------
+
+
+def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_gain: float) -> list[tuple[Term, ...]]:
+    """Return the terms of effects that depend on angles alone, one effect after the other."""
+    view = look(data, samples, least, [by_name(name) for name in POSITION])
+    taken: list[Any] = []
+    while len(taken) < len(POSITION):
+        selection: Selection = view.beside({cause.key for cause in taken})
+        best = selection.best(least_gain)
+        if best is None:
+            break
+        taken.append(best)
+    return [cause.scaled() for cause in taken]
+
+
+# --- memory -----------------------------------------------------------------------------------------------------------
+
+
+def _with_memory(
+    given: Finger, nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
+) -> tuple[FittedModel, list[tuple[Term, ...]]]:
+    """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
+    described = replace(given, data=extended_description(nominal.data, [term for terms in start for term in terms]))
+    choice = choose_memory(described, samples.recordings, settings.choice, threads=settings.threads)
+    model = FittedModel(choice.finger.data, nominal.given, {})
+    return refitted(model, samples, settings), memory_terms(nominal.data, memory_of(choice.finger.data))
+
+
+# --- delay ------------------------------------------------------------------------------------------------------------
+
+
+def _delay(data: Data, samples: Samples, span: Span, least: LeastSizes) -> tuple[Term, ...]:
+    """Return a delay of forces that is too large for its derivative; () if there is none."""
+    source = samples.recordings[0].kinematics
+    if not DELAY.places(data, source):
+        return ()
+    known = delay_of_positions(data, samples.recordings) if source == 1 else None
+    if known is not None:
+        return _late(known) if abs(known) >= least.least("time_delay", None, None) else ()
+    delays = _delays(span.step)
+    moved = np.stack([_late_torque(samples, delay) for delay in delays], axis=2)
+    still, best, found = int(np.argmin(np.abs(delays))), np.inf, 0.0
+    for described in _elastic(data):
+        errors = _errors(described, samples, least, moved)
+        k = int(np.argmin(errors))
+        # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
+        is_large = 0 < k < len(delays) - 1 and abs(delays[k]) >= LARGE
+        clear = is_large and errors[k] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]
+        error, delay = (errors[k], delays[k]) if clear else (errors[still], 0.0)
+        if error < best:
+            best, found = float(error), float(delay)
+    return _late(found) if found else ()
+
+
+def _elastic(data: Data) -> Iterator[Data]:
+    """Yield a description as it is, and with presliding over several distances: it delays the torque of friction."""
+    yield data
+    tendon = number_of(data, "velocity_threshold.tendon")
+    if tendon > 0.0 and not memory_of(data):
+        for distance in DISTANCES:
+            row = {"effect": "presliding", "displacement": distance / tendon}
+            yield {**data, "extensions": [*(data.get("extensions") or []), row]}
+
+
+def _late(delay: float) -> tuple[Term, ...]:
+    return (Term(DELAY, Place(), {"delay": delay}, (1.0,)),)
+
+
+def _delays(step: float) -> Numbers:
+    """Return a grid of all delays that a description accepts, including 0."""
+    grid = max(2 * FINE, step / 2)
+    count = int(LONGEST_DELAY / grid)
+    return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
+
+
+def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
+    """Return by how many seconds forces are later than positions; None if the recordings do not show it.
+
+    With more tendons than joints, the joint-side positions x0 − f0/k agree with each other only if positions and forces
+    are of the same time.
+    """
+    arms = moment_arms(data)
+    apart = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
+    if np.linalg.matrix_rank(apart) == 0:
+        return None
+    delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + FINE / 2, FINE)
+    errors = np.zeros(len(delays))
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        for part in recording.parts:
+            time, force = recording.time[part], groups["tendon_force"][part] / stiffness
+            for k, delay in enumerate(delays):
+                late = [np.interp(time - delay, time, column) for column in groups["tendon_position"][part].T]
+                left = (np.stack(late, axis=1) - force) @ apart
+                errors[k] += float(np.sum((left - left.mean(axis=0)) ** 2))
+    best = int(np.argmin(errors))
+    if not 0 < best < len(delays) - 1 or errors[best] > CLEAR * float(np.median(errors)):
+        return None
+    before, at, after = errors[best - 1 : best + 2]
+    return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
+
+
+def _errors(data: Data, samples: Samples, least: LeastSizes, moved: Numbers) -> Numbers:
+    """Return Σ e² on held-out folds, (N·m)² [K], with the target changed by `moved` [B, n, K]."""
+    view = look(data, samples, least, ())
+    return view.grams.errors_of(view.series.target[:, :, None] + moved)
+
+
+def _late_torque(samples: Samples, delay: float) -> Numbers:
+    """Return the change of the block means of the target if it is taken `delay` s later, N·m [B, n]."""
+    shifted: list[Numbers] = []
+    for recording in samples.recordings:
+        own = recording.target.copy()
+        for part in recording.parts:
+            time = recording.time[part]
+            for j in range(own.shape[1]):
+                own[part, j] = np.interp(time + delay, time, recording.target[part, j])
+        shifted.append(own - recording.target)
+    return samples.grid.means(shifted)

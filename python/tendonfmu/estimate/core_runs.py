@@ -1,0 +1,232 @@
+"""Runs of the C core over recordings: the torque that a finger leaves, and its derivatives by numbers.
+
+What is left is τ − T without a learning bias. T has the jumps of fig. 5 where a place has no presliding; with nothing
+learned and nothing forgotten they hold the friction of a place while it sticks. The derivatives are differences
+between runs, so they know every term of the core. Both are block means over the grid of the recordings.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tendonfmu.arrays import Data, Flags, Indices, Numbers
+from tendonfmu.model import INPUTS_OF_SOURCE, native, number_of, without_learning
+from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
+
+RATE = 400.0  # Hz; the samples of faster recordings are averaged, but not below this rate
+SETTLED = 1.0, 0.05  # s, and share of a stretch: until then what friction remembers is still unknown
+STEP = 1e-4  # of a number's size: far above rounding, far below what moves many samples across a limit
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of numbers, or of the description, whose effect is wanted."""
+
+    moves: Mapping[str, float]  # path -> change of the number per unit of the direction, SI units
+    step: float = STEP  # difference that the derivative is taken over, in units of the direction
+    central: bool = False  # whether a step is taken both ways, where the torque is curved
+    # description that has the numbers, if the finger itself lacks them; with its own values it leaves the same torque
+    data: Data | None = None
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A stretch without a gap, thinned."""
+
+    segment: Segment
+    arrays: dict[str, Numbers]
+    kinematics: int
+    external: Numbers | float  # block means [count, n] (N·m)
+
+
+class CoreRuns:
+    """Runs of a finger over recordings, whose numbers are set by path.
+
+    Attributes
+    ----------
+    grid
+        The blocks, B in all.
+    used
+        [B] whether a block may be learned from.
+    stretch
+        [B] the stretch without a gap that a block belongs to, from 0.
+    time, still
+        [B] centre of each block (s), and whether all joints stand still in it.
+    torque, speed
+        [B, n] torque to explain (N·m), and joint speeds (rad/s).
+    """
+
+    def __init__(
+        self,
+        data: Data,
+        recordings: Sequence[FitRecording],
+        grid: Grid | None = None,
+        *,
+        rate: float = RATE,
+        threads: int = 0,
+    ) -> None:
+        """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
+        self.data, self._rate, self._threads = data, rate, threads
+        self.grid = make_grid(recordings) if grid is None else grid
+        segments = self.grid.segments
+        self._stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
+        self.used: Flags = np.concatenate(
+            [_used(recordings[each.recording], each, self.grid.step) for each in segments]
+        )
+        self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
+        self.time: Numbers = self.grid.means([recording.time for recording in recordings])
+        self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
+        fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
+        self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
+        self.still: Flags = np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
+        self.added: Numbers | float = 0.0  # torque that is measured beyond that of the runs' forces, N·m [B, n]
+        self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
+        self._instances = _Instances()
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return len(self.data["joints"])
+
+    def of(self, data: Data) -> CoreRuns:
+        """Return runs of another description of the same finger over the same samples."""
+        other = object.__new__(CoreRuns)
+        other.__dict__ = {**self.__dict__, "data": data}
+        return other
+
+    def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
+        """Return runs of the same description over other signals of the same samples."""
+        return CoreRuns(self.data, recordings, self.grid, rate=self._rate, threads=self._threads)
+
+    def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
+        """Return block means of τ − T.
+
+        Parameters
+        ----------
+        values
+            Numbers that differ from the description's, by path, SI units.
+
+        Returns
+        -------
+        ndarray
+            [B, n] (N·m).
+        """
+        image = _image(self.data)
+        parts = self._pool.map(lambda each: self._left(image, values or {}, each), self._stretches)
+        return np.concatenate(list(parts)) + self.added
+
+    def columns(self, directions: Sequence[Direction], values: Mapping[str, float] | None = None) -> Numbers:
+        """Return the derivatives of `residual` by directions at `values`.
+
+        Parameters
+        ----------
+        directions
+            What to move; p of them.
+        values
+            As of `residual`.
+
+        Returns
+        -------
+        ndarray
+            [B, n, p] (N·m per unit of the direction).
+        """
+        at = dict(values or {})
+        base = np.zeros(()) if all(direction.central for direction in directions) else self.residual(at)
+        images = [_image(self.data if each.data is None else each.data) for each in directions]
+        columns = np.empty((self.grid.blocks, self.joints, len(directions)))
+
+        def run(k: int, sign: float) -> Numbers:
+            moved = dict(at)
+            for path, change in directions[k].moves.items():
+                start = at[path] if path in at else self._instances.number(images[k], path)
+                moved[path] = start + sign * directions[k].step * change
+            return np.concatenate([self._left(images[k], moved, each) for each in self._stretches])
+
+        def fill(k: int) -> None:
+            direction = directions[k]
+            if direction.central:
+                columns[:, :, k] = (run(k, 1.0) - run(k, -1.0)) / (2.0 * direction.step)
+            else:
+                columns[:, :, k] = (run(k, 1.0) + self.added - base) / direction.step
+
+        list(self._pool.map(fill, range(len(directions))))
+        return columns
+
+    def _left(self, image: bytes, values: Mapping[str, float], stretch: _Stretch) -> Numbers:
+        """Return [count, n] block means of τ − T (N·m) of one stretch."""
+        finger = self._instances.take(image)
+        finger.reset()
+        finger.set_kinematics_source(stretch.kinematics)
+        finger.set(values)
+        left = finger.run(stretch.arrays)["compensated_torque"]
+        self._instances.give(image, finger)
+        return np.asarray(left.reshape(stretch.segment.count, -1, left.shape[1]).mean(axis=1) - stretch.external)
+
+
+class _Instances:
+    """Fingers by image, each used by one thread at a time."""
+
+    def __init__(self) -> None:
+        self._idle: dict[bytes, list[native.Instance]] = defaultdict(list)
+
+    def take(self, image: bytes) -> native.Instance:
+        try:
+            return self._idle[image].pop()  # one step for the interpreter: no other thread gets the same
+        except IndexError:
+            return native.Instance(image)
+
+    def give(self, image: bytes, finger: native.Instance) -> None:
+        self._idle[image].append(finger)
+
+    def number(self, image: bytes, path: str) -> float:
+        """Return a number of the description that an image is of."""
+        finger = self.take(image)
+        finger.reset()
+        value = finger.get(path)
+        self.give(image, finger)
+        return value
+
+
+def _image(data: Data) -> bytes:
+    """Return the image of a description whose bias neither learns nor forgets, without contact detection."""
+    bare = without_learning(data, "entry_load")
+    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
+
+
+def _stretch(recording: FitRecording, segment: Segment, rate: float) -> _Stretch:
+    rows = slice(segment.part.start, segment.part.start + segment.count * segment.samples)
+    signals = recording.arrays(rows)
+    step = float(np.median(np.diff(signals["time"])))
+    every = max(
+        d for d in range(1, segment.samples + 1) if segment.samples % d == 0 and (d == 1 or d * step * rate <= 1)
+    )
+    wanted = {"time", "tendon_force", *INPUTS_OF_SOURCE[recording.kinematics]}
+    thin = {
+        name: np.ascontiguousarray(values.reshape(len(values) // every, every, *values.shape[1:]).mean(axis=1))
+        for name, values in signals.items()
+        if name in wanted
+    }
+    external = recording.external
+    known = 0.0 if external is None else segment.mean(external[segment.part])
+    return _Stretch(segment, thin, recording.kinematics, known)
+
+
+def _used(recording: FitRecording, segment: Segment, step: float) -> Flags:
+    """Return [count] the blocks that may be learned from."""
+    used = segment.mean(recording.train[segment.part]) == 1.0
+    longest, share = SETTLED
+    used[: int(min(longest / step, share * segment.count))] = False
+    return np.asarray(used)
+
+
+def with_angles(recording: FitRecording, angle: Numbers) -> FitRecording:
+    """Return a recording whose runs take these joint angles [N, n] (rad)."""
+    groups = {**recording.recording.groups, "joint_position": angle}
+    return replace(recording, recording=replace(recording.recording, groups=groups), kinematics=2)

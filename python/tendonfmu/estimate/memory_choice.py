@@ -1,0 +1,227 @@
+"""Which form of memory a finger's friction has: none, relative or absolute, relaxing, with cords that stretch, doubled.
+
+Each form is fitted from several starts to the same windows of the recordings and judged by its error on contiguous
+parts that are held out: all numbers are refitted without a part by one Gauss-Newton step from the whole fit. A form
+with more numbers must be better by `MATERIAL` and by `CERTAIN` standard errors over the parts, else the simpler one
+stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.memory import CORDS, PRESLIDING, memory_rows, with_rows, without_memory
+from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
+from tendonfmu.estimate.memory_methods import coarse_problem, from_starts, full_problem, guess_prior, no_show
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
+from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
+from tendonfmu.recordings import FitRecording, make_grid
+
+Rows = tuple[dict[str, Any], ...]
+
+FOLDS = 8
+MATERIAL, CERTAIN = 0.02, 1.64  # of the rms, and standard errors over the folds
+DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it slips
+STEPS, TOLERANCE = 12, 0.3
+TIME, CORD = 0.1, 6e4  # s and N/m, between the starts of `memory`
+SPLIT, TYPICAL = 0.4, 0.03  # ratio of a doubled element's numbers to the single one's; friction of a place
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of the memory, fitted."""
+
+    name: str
+    rows: Rows  # of extensions
+    data: Data  # description with the fitted numbers
+    errors: Numbers  # [K] squared error of each part held out, in variances of the plain model
+    numbers: int  # how many were fitted
+
+    def is_better_than(self, other: Form) -> bool:
+        """Return whether it is clearly better: materially and certainly."""
+        gain = other.errors - self.errors
+        certain = gain.sum() > CERTAIN * np.sqrt(len(gain)) * gain.std(ddof=1)
+        return bool(certain and self.errors.sum() < (1.0 - MATERIAL) ** 2 * other.errors.sum())
+
+
+@dataclass(frozen=True)
+class MemoryChoice:
+    """The form that was chosen, and all that were tried."""
+
+    finger: Finger
+    form: Form
+    tried: tuple[Form, ...]
+
+
+def choose_memory(
+    finger: Finger, recordings: Sequence[FitRecording], choice: Choice | None = None, *, threads: int = 0
+) -> MemoryChoice:
+    """Fit the forms of the memory to recordings and choose one.
+
+    Parameters
+    ----------
+    finger
+        Description; what it says of presliding and cord stretch is replaced.
+    recordings
+        Free motion; the samples of `train` count.
+    choice
+        Which other numbers are fitted.
+    threads
+        0: all cores.
+
+    Returns
+    -------
+    MemoryChoice
+        The finger with all its numbers fitted in the chosen form.
+    """
+    search = _Search(finger, recordings, choice or Choice(), threads)
+    plain = search.fit("none", (), None)
+    force = float(np.mean([recording.mean_force for recording in recordings]))
+    forms = [search.fit(name, rows, plain) for name, rows in _whole_forms(finger.data, force)]
+    best = min(forms, key=lambda form: form.errors.sum())
+    cords = {"effect": CORDS, "stiffness": CORD}
+    best = search.simpler(best, search.fit(f"{best.name}, cords", (*best.rows, cords), best))
+    best = search.simpler(search.fit(f"{best.name}, no relaxation", _without_times(best.rows), best), best)
+    best = search.simpler(best, search.fit(f"{best.name}, levels", _by_level(finger.data, best.rows), best))
+    best = search.simpler(best, search.fit(f"{best.name}, two elements", _doubled(best.rows), best))
+    best = search.simpler(plain, best)
+    return MemoryChoice(search.refined(best), best, tuple(search.tried))
+
+
+class _Search:
+    """Fits of forms to the same windows."""
+
+    def __init__(self, finger: Finger, recordings: Sequence[FitRecording], choice: Choice, threads: int) -> None:
+        self._finger, self._recordings, self._choice = finger, recordings, choice
+        self._threads, self._grid = threads, make_grid(recordings)
+        self._variance: Numbers | None = None  # [n] of what the plain model leaves
+        self.tried: list[Form] = []
+
+    def fit(self, name: str, rows: Rows, near: Form | None) -> Form:
+        """Fit a form, from several starts and from the numbers of another one."""
+        structure, estimator = self._structure(rows)
+        problem = coarse_problem(structure, estimator, self._recordings, self._grid, self._threads)
+        begin = estimator.start if near is None else self._numbers_of(estimator, with_rows(near.data, *rows))
+        end = from_starts(problem, begin, TOLERANCE, no_show(problem, name))[0]
+        found = minimise(problem, end, STEPS, TOLERANCE)
+        if self._variance is None:
+            self._variance = problem.variance(found.state.residual)
+        fitted = with_values(structure, estimator.values(problem.scale.unknowns(found.state.u)))
+        memory = tuple(dict(row) for _, row in memory_rows(fitted.data))
+        form = Form(name, memory, fitted.data, held_out_errors(problem, found, self._variance), len(found.state.u))
+        self.tried.append(form)
+        return form
+
+    def refined(self, form: Form) -> Finger:
+        """Return the finger with a form that is fitted to all samples."""
+        structure, estimator = self._structure(form.rows)
+        begin = self._numbers_of(estimator, form.data)
+        problem = full_problem(structure, estimator, self._recordings, self._grid, self._threads)
+        problem.mean, problem.known = guess_prior(problem)
+        found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE)
+        return with_values(structure, estimator.values(problem.scale.unknowns(found.state.u)))
+
+    def simpler(self, first: Form, second: Form) -> Form:
+        """Return the second form if it is clearly better than the first, else the first."""
+        return second if second.is_better_than(first) else first
+
+    def _structure(self, rows: Rows) -> tuple[Structure, Estimator]:
+        data = with_rows(without_memory(self._finger.data), *rows)
+        structure = build_structure(finger_from_data(data, self._finger.path), self._choice)
+        return structure, Estimator(structure.start.image, structure.group, structure.scale)
+
+    def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
+        """Return the unknowns z [u] of a description of the same structure."""
+        bare = finger_from_data(model_alone(data), self._finger.path)
+        return estimator.unknown_values(native.Instance(bare.image).values())
+
+
+def held_out_errors(problem: MemoryProblem, found: Minimum, variance: Numbers) -> Numbers:
+    """Return [K] the squared error of each contiguous part, refitted without it, in units of variances [n]."""
+    residual, columns = found.state.residual / np.sqrt(variance), found.linearised.columns / np.sqrt(variance)[:, None]
+    rows = np.array_split(np.arange(len(residual)), FOLDS)
+    grams = [np.einsum("rju,rjv->uv", columns[own], columns[own]) for own in rows]
+    scores = [np.einsum("rju,rj->u", columns[own], residual[own]) for own in rows]
+    ridge = problem.known + 1e-9 * np.diag(np.diag(sum(grams))) + 1e-12 * np.eye(len(problem.known))
+    errors = []
+    for own, gram, score in zip(rows, grams, scores, strict=True):
+        away = -np.linalg.solve(sum(grams) - gram + ridge, sum(scores) - score)
+        errors.append(float(np.sum(residual[own] ** 2) + 2.0 * away @ score + away @ gram @ away))
+    return np.array(errors)
+
+
+# --- forms ------------------------------------------------------------------------------------------------------------
+
+
+def _whole_forms(data: Data, force: float) -> list[tuple[str, Rows]]:
+    """Return one distance and one stiffness for everything, both relaxing. force: mean of the tendons (N)."""
+    relaxing: dict[str, Any] = {"relaxation_time": TIME}
+    thresholds = [number_of(data, f"velocity_threshold.{which}") for which in ("tendon", "joint")]
+    if min(thresholds) > 0.0:
+        relative: Rows = ({"effect": PRESLIDING, "displacement": DISTANCE / thresholds[0], **relaxing},)
+    else:
+        lengths = [DISTANCE / (_mean_square_arm(data, j) ** 0.5 or 1.0) for j in range(len(data["joints"]))]
+        relative = _rows_of_places(data, "displacement", DISTANCE, lengths, relaxing)
+    stiffness = _friction(data) * force / DISTANCE
+    return [("relative", relative), ("absolute", ({"effect": PRESLIDING, "stiffness": stiffness, **relaxing},))]
+
+
+def _rows_of_places(data: Data, key: str, at_tendons: float, at_joints: Sequence[float], others: Data) -> Rows:
+    """Return a row for each level with friction of tendons, and for each joint with friction of its own."""
+    places = list(effects(data))
+    levels = sorted({each.drive for each in places if each.tendon})
+    joints = sorted({each.joint for each in places if not each.tendon})
+    return (
+        *({"effect": PRESLIDING, "level": j, key: at_tendons, **others} for j in levels),
+        *({"effect": PRESLIDING, "joint": j, key: at_joints[j - 1], **others} for j in joints),
+    )
+
+
+def _by_level(data: Data, rows: Rows) -> Rows:
+    """Return rows of a whole finger as rows of its levels and joints with the same values."""
+    split: list[dict[str, Any]] = []
+    for row in rows:
+        if row["effect"] != PRESLIDING or {"joint", "level"} & set(row):
+            split.append(row)
+            continue
+        others: dict[str, Any] = {name: row[name] for name in ("relaxation_time", "share") if name in row}
+        if "displacement" in row:
+            at = [row["displacement"] * number_of(data, f"velocity_threshold.{which}") for which in ("tendon", "joint")]
+            split += _rows_of_places(data, "displacement", at[0], [at[1]] * len(data["joints"]), others)
+        else:
+            joints = [row["stiffness"] * _mean_square_arm(data, j) for j in range(len(data["joints"]))]
+            split += _rows_of_places(data, "stiffness", row["stiffness"], joints, others)
+    return tuple(split)
+
+
+def _doubled(rows: Rows) -> Rows:
+    """Return two elements of half the share in place of each, one stiffer and one softer."""
+    doubled: list[dict[str, Any]] = []
+    for row in rows:
+        if row["effect"] != PRESLIDING:
+            doubled.append(row)
+            continue
+        key = "displacement" if "displacement" in row else "stiffness"
+        doubled += [{**row, key: factor * row[key], "share": 0.5} for factor in (SPLIT, 1.0 / SPLIT)]
+    return tuple(doubled)
+
+
+def _without_times(rows: Rows) -> Rows:
+    return tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in rows)
+
+
+def _friction(data: Data) -> float:
+    """Return the mean Coulomb friction of a place of a tendon."""
+    laws = [law.get("positive") or law for each in effects(data) if each.tendon for law in each.laws]
+    return float(np.mean([law["coulomb"] for law in laws])) if laws else TYPICAL
+
+
+def _mean_square_arm(data: Data, joint: int) -> float:
+    """Return Σ r²/m at a joint, from 0 (m²)."""
+    return float(np.mean(moment_arms(data)[:, joint] ** 2))

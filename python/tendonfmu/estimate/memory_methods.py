@@ -1,0 +1,266 @@
+"""The method `batch` for a finger whose friction remembers: starts, weights, prior and uncertainty about `memory_fit`.
+
+1. From each start of the memory's numbers (`memory.starts`) a few steps on evenly spread windows of the recordings.
+2. The best two are refined on all of them, with each block counting as one.
+3. The residuals say how many independent blocks they are worth, and the prior is the one under which the data are most
+   likely (`prior`). With both the better one is refined again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tendonfmu.arrays import Numbers
+from tendonfmu.estimate.core_runs import CoreRuns
+from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.learning import FitProgress, Interrupted, Learned, MemoryEvidence, Settings, Watch
+from tendonfmu.estimate.memory import starts
+from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, State, minimise
+from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
+from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
+from tendonfmu.estimate.structure import Structure
+from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
+from tendonfmu.statistics import sample_weights
+
+COARSE_RATE = 200.0  # Hz, and s in all: enough to tell starts apart
+COARSE_TIME, WINDOW = 30.0, 10.0
+COARSE_STEPS, REFINED = 6, 2  # steps from each start, and starts that are refined
+FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
+_MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
+
+Shown = Callable[[MemoryProblem, str], Callable[[int, State], None]]  # what watches the steps of a phase
+
+
+def no_show(_problem: MemoryProblem, _what: str) -> Callable[[int, State], None]:
+    """Watch nothing."""
+    return lambda _number, _state: None
+
+
+def windows(grid: Grid, seconds: float = COARSE_TIME) -> Grid:
+    """Return a grid of evenly spread windows of about `seconds` in all; all of it if it has no more."""
+    total = grid.blocks * grid.step
+    if total <= 1.5 * seconds:
+        return grid
+    segments: list[Segment] = []
+    first = 0
+    for segment in grid.segments:
+        count = max(1, round(seconds * segment.count / grid.blocks / WINDOW))
+        length = int(seconds * segment.count / grid.blocks / count / grid.step)
+        for k in range(count):
+            begin = (2 * k + 1) * segment.count // (2 * count) - length // 2
+            start = segment.part.start + max(begin, 0) * segment.samples
+            part = slice(start, start + length * segment.samples)
+            if length:
+                segments.append(replace(segment, part=part, first=first, count=length))
+                first += length
+    return Grid(tuple(segments), grid.step)
+
+
+def coarse_problem(
+    structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
+) -> MemoryProblem:
+    """Return the problem over few windows at a low rate, with the prior of guesses."""
+    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
+    problem = MemoryProblem(structure, estimator, runs, SlowDrift(runs.time, runs.stretch, runs.used))
+    problem.mean, problem.known = guess_prior(problem)
+    return problem
+
+
+def guess_prior(problem: MemoryProblem) -> tuple[Numbers, Numbers]:
+    """Return mean [u] and information [u, u] of coordinates that were guessed: off by their size, or by a factor."""
+    size = np.where(problem.scale.log, FACTOR, 1.0)
+    return problem.scale.coordinates(problem.estimator.start), np.diag(size**-2.0)
+
+
+def from_starts(
+    problem: MemoryProblem, begin: Numbers, tolerance: float, watch: Callable[[int, State], None]
+) -> list[State]:
+    """Go a few steps down from each start of the memory about z = `begin` [u]; return the ends, the best first."""
+    places = {unknown.path: k for k, unknown in enumerate(problem.estimator.unknowns)}
+    first = problem.scale.coordinates(begin)
+    ends: list[State] = []
+    for start in starts(problem.runs.data):
+        u = first.copy()
+        for path, value in start.items():
+            if path in places:
+                u[places[path]] = np.log(value / problem.scale.size[places[path]])
+        u = np.clip(u, problem.lower, problem.upper)
+        if not any(np.array_equal(u, end.u) for end in ends):
+            ends.append(minimise(problem, problem.state(u), COARSE_STEPS, tolerance, watch).state)
+    return sorted(ends, key=lambda state: state.cost)
+
+
+def full_problem(
+    structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
+) -> MemoryProblem:
+    """Return the problem over all samples, whose drift is the slowest that the rests demand."""
+    runs = CoreRuns(structure.start.data, recordings, grid, threads=threads)
+    drift = slowest_drift(runs.residual(), runs.time, runs.stretch, runs.used, runs.still)
+    return MemoryProblem(structure, estimator, runs, drift)
+
+
+def effective_blocks(problem: MemoryProblem, state: State) -> tuple[Numbers, list[Numbers]]:
+    """Return N_j [n], and by stretch [n] the share of an independent block that each block counts for."""
+    runs = problem.runs
+    whole = np.full((len(runs.used), runs.joints), np.nan)
+    whole[runs.used] = state.residual / np.sqrt(problem.variance(state.residual))
+    shares = []
+    for segment in runs.grid.segments:
+        rows = segment.blocks
+        shares.append(sample_weights(whole[rows], runs.grid.step, stroke_time(runs.speed[rows], runs.grid.step)))
+    counts = [np.count_nonzero(runs.used[segment.blocks]) for segment in runs.grid.segments]
+    worth = np.sum([count * share for count, share in zip(counts, shares, strict=True)], axis=0)
+    return np.maximum(worth, 1.0), shares
+
+
+def stroke_time(joint_speed: Numbers, step: float) -> float:
+    """Return the mean time (s) between reversals of any joint."""
+    reversals = 1
+    for speed in joint_speed.T:
+        moving = speed[np.abs(speed) > _MOVES * np.abs(speed).max(initial=0.0)]
+        reversals += np.count_nonzero(np.diff(np.sign(moving)))
+    return step * len(joint_speed) / reversals
+
+
+def minimum_from_starts(
+    structure: Structure,
+    estimator: Estimator,
+    recordings: Sequence[FitRecording],
+    begin: Numbers,
+    settings: Settings,
+    shown: Shown = no_show,
+) -> tuple[MemoryProblem, Minimum]:
+    """Fit from several starts with each block counting as one, under the prior of guesses."""
+    threads, tolerance = settings.options.threads, settings.options.tolerance
+    grid = make_grid(recordings)
+    coarse = coarse_problem(structure, estimator, recordings, grid, threads)
+    ends = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))
+    problem = full_problem(structure, estimator, recordings, grid, threads)
+    problem.mean, problem.known = coarse.mean, coarse.known
+    found = [
+        minimise(problem, problem.state(end.u), settings.passes, tolerance, shown(problem, f"start {k}"))
+        for k, end in enumerate(ends[:REFINED], start=1)
+    ]
+    return problem, min(found, key=lambda each: each.state.cost)
+
+
+# --- the method -------------------------------------------------------------------------------------------------------
+
+
+def learn_with_memory(
+    structure: Structure,
+    estimator: Estimator,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    settings: Settings,
+    begin: Numbers,
+) -> Learned:
+    """Estimate all numbers together, from z = `begin` [u] and the starts of the memory. Raises Interrupted."""
+    passes = 0
+
+    def shown(problem: MemoryProblem, what: str) -> Callable[[int, State], None]:
+        def show(number: int, state: State) -> None:
+            nonlocal passes
+            passes += 1
+            blocks = problem.runs.grid.blocks
+            if not watch(FitProgress(f"step {number}, {what}", passes, blocks, blocks, state.cost)):
+                z = problem.scale.unknowns(state.u)
+                raise Interrupted(estimator, z, state.cost, watch.by_user)
+
+        return show
+
+    try:
+        problem, first = minimum_from_starts(structure, estimator, recordings, begin, settings, shown)
+        return _weighted(problem, first, recordings, settings, shown, lambda: passes)
+    except KeyboardInterrupt:
+        raise Interrupted(estimator, begin, float("nan"), by_user=True) from None
+
+
+def _weighted(
+    problem: MemoryProblem,
+    first: Minimum,
+    recordings: Sequence[FitRecording],
+    settings: Settings,
+    shown: Shown,
+    passes: Callable[[], int],
+) -> Learned:
+    """Refine a minimum with the effective number of blocks and the most likely prior."""
+    prior = coordinate_prior(problem, settings)
+    given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(problem.runs.grid.segments)
+    if settings.effective:
+        problem.blocks, shares = effective_blocks(problem, first.state)
+    if given is None:
+        now = problem.linearised(first.state)
+        pull = now.information @ (first.state.u - problem.mean) - now.gradient
+        covariance = most_likely(now.information, pull, prior)
+    else:
+        covariance = prior.of_spread(given)
+    problem.known = inverse(covariance)
+    again = replace(first.state, cost=problem.cost(first.state.residual, first.state.u))
+    tolerance, show = settings.options.tolerance, shown(problem, "effective samples")
+    last = minimise(problem, again, settings.passes, tolerance, show)
+    return learned_of(problem, last, prior, given, _weights(problem, recordings, shares), first.steps, passes())
+
+
+def learned_of(
+    problem: MemoryProblem,
+    last: Minimum,
+    prior: Prior,
+    given: float | None,
+    weights: list[Numbers],
+    steps: int,
+    passes: int,
+) -> Learned:
+    """Return what a minimum tells, in unknowns z instead of coordinates u."""
+    z = problem.scale.unknowns(last.state.u)
+    turn = problem.scale.slopes(z)
+    information, both = last.linearised.information, np.outer(turn, turn)
+    known = prior.reported(given)
+    return Learned(
+        estimator=problem.estimator,
+        z=z,
+        covariance=both * np.linalg.inv(information + inverse(known)),
+        prior=both * known,
+        information=information / both,
+        cost=last.state.cost,
+        iterations=steps + last.steps,
+        passes=passes,
+        converged=last.converged,
+        weights=weights,
+        innovations=[],
+        warnings=[] if last.converged else [f"not converged after {passes} steps"],
+        memory=MemoryEvidence(problem, last),
+    )
+
+
+def coordinate_prior(problem: MemoryProblem, settings: Settings) -> Prior:
+    """Return the prior of the coordinates u about the numbers of the description."""
+    of_z = Prior.of(problem.estimator, settings)
+    turn = problem.scale.slopes(problem.estimator.start)
+    size = np.where(problem.scale.log, FACTOR / GUESS, of_z.size / problem.scale.size)
+    size = np.where(problem.scale.log & of_z.estimated, 1.0, size)
+    return Prior(of_z.covariance / np.outer(turn, turn), size, of_z.estimated)
+
+
+def _weights(problem: MemoryProblem, recordings: Sequence[FitRecording], shares: list[Numbers]) -> list[Numbers]:
+    """Return by recording [N, n] the share of an independent sample that each sample counts for."""
+    weights = [np.ones_like(recording.target) for recording in recordings]
+    for segment, share in zip(problem.runs.grid.segments, shares, strict=True):
+        weights[segment.recording][segment.part] = share / segment.samples
+    return weights
+
+
+def learned_with_memory_at(
+    structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], settings: Settings
+) -> Learned:
+    """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
+    problem = full_problem(structure, estimator, recordings, make_grid(recordings), settings.options.threads)
+    problem.mean = problem.scale.coordinates(estimator.start)
+    state = problem.state(problem.mean)
+    problem.blocks, shares = effective_blocks(problem, state)
+    here = Minimum(state, problem.linearised(state), 0, converged=True)
+    weights = _weights(problem, recordings, shares)
+    return learned_of(problem, here, coordinate_prior(problem, settings), None, weights, 0, 1)

@@ -1,0 +1,176 @@
+#include "floating_point.h"
+
+#include "friction_memory.h"
+
+#include "effect_facts.h"
+#include "friction_law.h"
+
+#define LEAST_DISTANCE 1e-150 /* m, rad: however short, no product in a step overflows */
+#define STEEPEST 1e290        /* 1/m, 1/rad, of z */
+
+/* numbers of a row of presliding, as in effects.json */
+enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE };
+
+static const extension_row* memory_row(const tendonfmu_finger* f, size_t n) {
+  return f->extensions.row + f->extensions.signals + f->extensions.friction + f->extensions.torques + n;
+}
+
+/* how specific a row of presliding is at a slot; 0: it does not act there */
+static int rank_at(const tendonfmu_finger* f, effect_place place, size_t slot) {
+  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
+  if (slot >= joint_row) {
+    const size_t joint = slot - joint_row;
+    const int here = place.joint == joint && place.tendon == EFFECT_NOWHERE;
+    return joint >= f->joints ? 0 : is_everywhere(place) ? 1 : here ? 2 : 0;
+  }
+  const size_t level = slot / lanes, tendon = slot % lanes;
+  if (tendon >= f->tendons) {
+    return 0;
+  }
+  if (place.tendon != EFFECT_NOWHERE) {
+    const int here = place.tendon == tendon;
+    return !here ? 0 : place.joint == EFFECT_NOWHERE ? 3 : place.joint == level ? 4 : 0;
+  }
+  return is_everywhere(place) ? 1 : place.level == level ? 2 : 0;
+}
+
+/* mean square of the moment arms at a joint, m² */
+static double mean_square_arm(const tendonfmu_finger* f, size_t joint) {
+  double sum = 0.0;
+  for (size_t i = 0; i < f->tendons; ++i) {
+    const double arm = f->derived.moment_arm[joint * f->tendon_lanes + i];
+    sum += arm * arm;
+  }
+  return sum / (double)f->tendons;
+}
+
+static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place place, const double* numbers) {
+  const friction_element* to = &f->memory.element[e];
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  const int own = slot >= joint_row, everywhere = is_everywhere(place);
+  const double threshold = own ? f->derived.settings.joint_threshold : f->derived.settings.tendon_threshold;
+  const double distance = numbers[DISPLACEMENT] * (everywhere ? threshold : 1.0);
+  const double scale = own && everywhere ? mean_square_arm(f, slot - joint_row) : 1.0;
+  const int absolute = numbers[STIFFNESS] > 0.0;
+  to->share[slot] = numbers[SHARE];
+  to->stiffness[slot] = absolute ? numbers[STIFFNESS] * scale : 0.0;
+  to->per_distance[slot] = absolute ? 0.0 : 1.0 / (distance > LEAST_DISTANCE ? distance : LEAST_DISTANCE);
+  to->relaxation_time[slot] = numbers[RELAXATION_TIME];
+  f->memory.relaxes |= numbers[RELAXATION_TIME] > 0.0;
+}
+
+/* the rows that hold at a slot, at most two */
+static void find_elements(tendonfmu_finger* f, size_t slot) {
+  size_t found = 0;
+  int rank = 0;
+  double sum = 0.0;
+  for (size_t r = 0; r < f->extensions.memory; ++r) {
+    const extension_row* row = memory_row(f, r);
+    const int here = row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
+    if (here > rank) {
+      rank = here;
+      found = 0;
+      sum = 0.0;
+    }
+    if (here && here == rank && found < f->memory.elements) {
+      set_element(f, found++, slot, row->place, row->parameters);
+      sum += row->parameters[SHARE];
+    }
+  }
+  f->memory.remembers[slot] = found ? 1.0 : 0.0;
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    const friction_element* to = &f->memory.element[e];
+    to->share[slot] = e < found ? to->share[slot] / sum : 0.0;
+    to->stiffness[slot] = e < found ? to->stiffness[slot] : 0.0;
+    to->per_distance[slot] = e < found ? to->per_distance[slot] : 1.0;
+    to->relaxation_time[slot] = e < found ? to->relaxation_time[slot] : 0.0;
+  }
+}
+
+/* 1/k_c, m/N; 0: rigid */
+static double cord_compliance(const tendonfmu_finger* f) {
+  for (size_t r = 0; r < f->extensions.memory; ++r) {
+    const extension_row* row = memory_row(f, r);
+    if (row->effect == &effect_cord_stretch) {
+      return 1.0 / row->parameters[0];
+    }
+  }
+  return 0.0;
+}
+
+/* g at a slot; 1 without relaxation, and at the first sample, whose step is 0 */
+static double decayed_gain(const friction_element* element, size_t slot, double step) {
+  const double time = element->relaxation_time[slot], age = time > 0.0 ? step / time : 0.0;
+  return age > 0.0 ? law_one_minus_exponential(age) / age : 1.0;
+}
+
+static void set_decay(const friction_element* element, size_t slot, double step) {
+  const double time = element->relaxation_time[slot], gain = decayed_gain(element, slot, step);
+  element->kept[slot] = time > 0.0 ? law_exponential(step / time) : 1.0;
+  element->stiff[slot] = gain * element->stiffness[slot];
+  element->soft[slot] = gain * element->per_distance[slot];
+}
+
+void find_decay(tendonfmu_finger* f, double step) {
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    for (size_t slot = 0; slot < f->slots; ++slot) {
+      set_decay(&f->memory.element[e], slot, step);
+    }
+  }
+  f->memory.step = step;
+}
+
+void find_memory(tendonfmu_finger* f) {
+  f->memory.elements = f->shape.elements;
+  f->memory.relaxes = 0;
+  if (!f->memory.elements) {
+    return;
+  }
+  f->memory.compliance = cord_compliance(f);
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    find_elements(f, slot);
+  }
+  find_decay(f, 0.0);
+}
+
+/* --- friction as a torque -------------------------------------------------------------------------------------------
+ */
+
+/* ∂z/∂travel of what does not slip, without relaxation */
+static double steepness(const tendonfmu_finger* f, size_t slot, double size) {
+  const friction_element* first = &f->memory.element[0];
+  if (first->stiffness[slot] == 0.0) {
+    return first->per_distance[slot];
+  }
+  const double slope = size > 0.0 ? first->stiffness[slot] / size : STEEPEST;
+  return slope < STEEPEST ? slope : STEEPEST;
+}
+
+void follow_elements(const tendonfmu_finger* f, const extension_row* row, double size) {
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  const friction_element* first = &f->memory.element[0];
+  for (size_t k = 0; k < row->memory_count; ++k) {
+    const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+    if (f->memory.remembers[slot] == 0.0) {
+      continue;
+    }
+    if (slot >= joint_row) {
+      f->scratch.own_limit[slot - joint_row] += size;
+      row->next[k] = 0.0;
+      continue;
+    }
+    const double travel = f->scratch.travelled[slot], z = first->kept[slot] * row->memory[k];
+    const double gain = decayed_gain(first, slot, f->scratch.sample.first ? 0.0 : f->scratch.sample.step);
+    const double moved = travel == 0.0 ? z : z + gain * steepness(f, slot, size) * travel;
+    row->next[k] = moved > 1.0 ? 1.0 : moved < -1.0 ? -1.0 : moved;
+  }
+}
+
+double follower_slope(const tendonfmu_finger* f, const extension_row* row, size_t k, double size) {
+  const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+  const double z = row->memory[k];
+  if (slot >= f->joints * f->tendon_lanes || f->memory.remembers[slot] == 0.0 || z >= 1.0 || z <= -1.0) {
+    return 0.0;
+  }
+  return decayed_gain(&f->memory.element[0], slot, f->remembered.scalar[STATE_STEP]) * steepness(f, slot, size);
+}

@@ -1,0 +1,207 @@
+/* Friction with a memory (docs/reference/semantics/presliding.md): elements that are elastic until they slip, four
+ * places at a time. Which rows hold where is in friction_memory.h. */
+#pragma once
+
+#include <string.h>
+
+#include "friction_memory.h"
+#include "quad.h"
+
+#define LARGEST_LIMIT 1e30 /* N, N·m: no product in a step overflows */
+
+enum { EDGES, PULLEYS }; /* rows of slots of what is remembered; a joint's own friction stands among the edges */
+
+/* lanes whose friction has a memory: they slide at all times */
+HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
+  const quad remembers = f->memory.elements ? quad_load(f->memory.remembers + slot) : quad_set(0.0);
+  return quad_greater(remembers, quad_set(0.5));
+}
+
+/* what the cord beyond has stretched adds to the travel of every place */
+HOT_INLINE void add_stretch(tendonfmu_finger* f) {
+  const size_t lanes = f->tendon_lanes;
+  const quad compliance = quad_set(f->memory.compliance);
+  for (size_t i = 0; i < lanes; i += 4) {
+    quad beyond = quad_set(0.0);
+    for (size_t j = f->joints; j-- > 0;) {
+      const size_t at = j * lanes + i;
+      quad_store(f->scratch.turning + at, quad_add(quad_load(f->scratch.turning + at), quad_mul(compliance, beyond)));
+      beyond = quad_add(beyond, quad_load(f->remembered.tension_change + at));
+    }
+  }
+}
+
+/* The travel of every place in this sample, and what relaxation makes of it; needs the kinematics. */
+HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
+  const finger_scratch* s = &f->scratch;
+  const double* moved = filters_position(f) ? s->travel : s->velocity;
+  const quad duration = quad_set(first ? 0.0 : filters_position(f) ? 1.0 : step);
+  for (size_t slot = 0; slot < f->slots; slot += 4) {
+    const quad travel = quad_mul(quad_load(moved + slot), duration);
+    quad_store(s->travelled + slot, travel);
+    quad_store(s->turning + slot, travel);
+    quad_store(s->kept + slot, quad_set(0.0));
+  }
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(s->own_limit + j, quad_set(0.0));
+  }
+  if (f->memory.compliance > 0.0 && !first) {
+    add_stretch(f);
+  }
+  if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
+    find_decay(f, first ? 0.0 : step);
+  }
+}
+
+/* Four places: what is the same of all their elements. */
+typedef struct places {
+  size_t slot, at; /* at: in rows of edges and pulleys */
+  quad limit;      /* lim */
+  quad turned;     /* c0 */
+  quad compliance; /* 1/k_c; 0 at joints */
+} places;
+
+HOT_INLINE quad limit_of(quad friction) {
+  return quad_max(quad_set(0.0), quad_min(quad_set(LARGEST_LIMIT), friction));
+}
+
+/* One of their elements before it is clipped. */
+typedef struct trial {
+  quad limit, rate; /* w·lim, β */
+  quad kept;        /* a·F′ */
+  quad held;        /* F, not clipped */
+  quad_mask free;   /* it does not slip */
+} trial;
+
+HOT_INLINE quad trial_force(const trial* t, const places* p, quad other) {
+  const quad turned = quad_sub(p->turned, quad_mul(other, p->compliance));
+  const quad stiff = quad_add(quad_set(1.0), quad_mul(t->rate, p->compliance));
+  return quad_div(quad_add(t->kept, quad_mul(t->rate, turned)), stiff);
+}
+
+HOT_INLINE quad clip_to(quad value, quad limit) {
+  return quad_max(quad_sub(quad_set(0.0), limit), quad_min(limit, value));
+}
+
+HOT_INLINE trial begin_trial(const tendonfmu_finger* f, const places* p, size_t e) {
+  const friction_element* element = &f->memory.element[e];
+  trial t;
+  t.limit = quad_mul(quad_load(element->share + p->slot), p->limit);
+  t.rate = quad_add(quad_load(element->stiff + p->slot), quad_mul(quad_load(element->soft + p->slot), t.limit));
+  t.kept = quad_mul(quad_load(element->kept + p->slot),
+                    quad_load(f->remembered.element + e * 2 * f->slots + p->at));
+  return t;
+}
+
+HOT_INLINE void end_trial(trial* t) {
+  t->free = quad_greater(t->limit, quad_abs(t->held));
+}
+
+/* both elements free: Σ F_e of the two equations together, then each with what the other holds */
+HOT_INLINE void solve_pair(trial t[2], const places* p) {
+  const quad rate = quad_add(t[0].rate, t[1].rate), kept = quad_add(t[0].kept, t[1].kept);
+  const trial both = {.rate = rate, .kept = kept};
+  const quad sum = trial_force(&both, p, quad_set(0.0));
+  const quad turned = quad_sub(p->turned, quad_mul(sum, p->compliance));
+  for (int e = 0; e < 2; ++e) {
+    t[e].held = quad_add(t[e].kept, quad_mul(t[e].rate, turned));
+    end_trial(&t[e]);
+  }
+  const quad clipped[2] = {clip_to(t[0].held, t[0].limit), clip_to(t[1].held, t[1].limit)};
+  const quad_mask was_free[2] = {t[0].free, t[1].free};
+  for (int e = 0; e < 2; ++e) {
+    const quad alone = trial_force(&t[e], p, clipped[1 - e]);
+    t[e].held = quad_select(quad_only_first(was_free[e], was_free[1 - e]), alone, t[e].held);
+    end_trial(&t[e]);
+  }
+}
+
+/* F of four places, and what is remembered of them */
+HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
+  const finger_scratch* s = &f->scratch;
+  const quad zero = quad_set(0.0);
+  quad sum = zero, stiffness = zero, by_turning = zero, by_limit = zero;
+  trial t[MODEL_MAX_ELEMENTS];
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    t[e] = begin_trial(f, p, e);
+  }
+  if (f->memory.elements == 2) {
+    solve_pair(t, p);
+  } else {
+    t[0].held = trial_force(&t[0], p, zero);
+    end_trial(&t[0]);
+  }
+  quad kept = quad_load(s->kept + p->slot);
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    const quad force = clip_to(t[e].held, t[e].limit);
+    quad_store(s->element + e * 2 * f->slots + p->at, force);
+    sum = quad_add(sum, force);
+    by_turning = quad_add(by_turning, quad_keep(t[e].free, t[e].rate));
+    kept = quad_max(kept, quad_keep(t[e].free, quad_load(f->memory.element[e].kept + p->slot)));
+  }
+  quad_store(s->kept + p->slot, kept);
+  const quad turned = quad_sub(p->turned, quad_mul(sum, p->compliance)); /* c */
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    const friction_element* element = &f->memory.element[e];
+    const quad slips = quad_with_sign(quad_set(1.0), t[e].held);
+    const quad own = quad_select(t[e].free, quad_mul(quad_load(element->soft + p->slot), turned), slips);
+    by_limit = quad_add(by_limit, quad_mul(quad_load(element->share + p->slot), own));
+  }
+  stiffness = quad_add(quad_set(1.0), quad_mul(by_turning, p->compliance));
+  quad_store(s->by_turning + p->at, quad_div(by_turning, stiffness));
+  quad_store(s->by_limit + p->at, quad_div(by_limit, stiffness));
+  return sum;
+}
+
+/* What four tendons lose at their edges or pulleys at a slot, with |F| of the law and the force before them. */
+HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, quad magnitude, quad acting, quad before) {
+  const double compliance = f->scratch.sample.first ? 0.0 : f->memory.compliance;
+  const size_t at = row * f->slots + slot;
+  places p = {.slot = slot,
+              .at = at,
+              .limit = limit_of(quad_mul(acting, magnitude)),
+              .turned = quad_load(f->scratch.turning + slot),
+              .compliance = quad_set(compliance)};
+  if (compliance > 0.0) {
+    const quad change = quad_sub(before, quad_load(f->remembered.tension + at));
+    p.turned = quad_add(p.turned, quad_mul(change, p.compliance));
+  }
+  return step_places(f, &p);
+}
+
+/* The same of the joints' own friction. */
+HOT_INLINE quad torque_of_memory(tendonfmu_finger* f, size_t joint, quad limit) {
+  const size_t slot = f->joints * f->tendon_lanes + joint;
+  const places p = {.slot = slot,
+                    .at = EDGES * f->slots + slot,
+                    .limit = limit,
+                    .turned = quad_load(f->scratch.turning + slot),
+                    .compliance = quad_set(0.0)};
+  return step_places(f, &p);
+}
+
+/* What is behind an edge or a pulley, for the stretch of the cord there at the next sample. */
+HOT_INLINE void keep_tension(const tendonfmu_finger* f, size_t slot, size_t row, quad force) {
+  const size_t at = row * f->slots + slot;
+  if (f->memory.compliance > 0.0) {
+    if (row == EDGES) {
+      const quad change = quad_sub(force, quad_load(f->remembered.tension + at));
+      quad_store(f->scratch.tension_change + slot, f->scratch.sample.first ? quad_set(0.0) : change);
+    }
+    quad_store(f->scratch.tension + at, force);
+  }
+}
+
+/* The sample is accepted. */
+HOT_INLINE void remember_elements(tendonfmu_finger* f) {
+  const finger_state* to = &f->remembered;
+  const finger_scratch* from = &f->scratch;
+  const size_t slots = f->slots;
+  memcpy(to->element, from->element, f->memory.elements * 2 * slots * sizeof(double));
+  memcpy(to->by_turning, from->by_turning, 2 * slots * sizeof(double));
+  memcpy(to->by_limit, from->by_limit, 2 * slots * sizeof(double));
+  if (f->memory.compliance > 0.0) {
+    memcpy(to->tension, from->tension, 2 * slots * sizeof(double));
+    memcpy(to->tension_change, from->tension_change, slots * sizeof(double));
+  }
+}
