@@ -29,6 +29,7 @@ ORDER = (
     "zero", "unknown_catch",
 )  # fmt: skip
 ENCODERS = ("encoder_offset", "zero", "tendon_nonlinearity")  # what the torque does not show, but the angles do
+LEFT = {"elastic": 1.0e-3, "dahl": 1.0e-3, "maxwell": 1.0e-3}  # N·m rms that a fitted memory leaves, nothing hidden
 MATERIAL = 0.03  # of what a perfect friction model would leave
 
 
