@@ -23,6 +23,7 @@ from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
 
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
+FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_FALL = 1e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
@@ -79,7 +80,9 @@ class MemoryProblem:
         self.scale = Scale(log, estimator.scale)
         ends = (np.array([getattr(unknown, end) for unknown in unknowns]) for end in ("lower", "upper"))
         with np.errstate(divide="ignore", invalid="ignore"):
-            self.lower, self.upper = (self.scale.coordinates(end) for end in ends)
+            low, high = (self.scale.coordinates(end) for end in ends)
+        self.lower = np.where(log, np.maximum(low, -FARTHEST), low)
+        self.upper = np.where(log, np.minimum(high, FARTHEST), high)
         self.blocks = np.full(runs.joints, float(drift.used.sum()))  # N_j: those that count
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30

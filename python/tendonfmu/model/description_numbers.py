@@ -72,7 +72,7 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
         for name, magnitude in MAGNITUDES[row["effect"]].items():
             missing = LEFT_OUT.get(name, 0.0)
             value = missing if row.get(name) is None else float(row[name])
-            left_out = missing != 0.0 and value == missing
+            left_out = value == missing and (missing != 0.0 or row["effect"] == "presliding")
             yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", value, magnitude, left_out)
 
 
