@@ -111,6 +111,7 @@ def write_cases(folder: Path) -> list[Path]:
         "shaking": (middle, True),
         "calibrated": (calibrated(middle), False),
         "presliding": (calibrated(middle) | presliding, False),
+        "memory": (middle | presliding, False),
         "1x2x1": (finger(1, 2, 1), False),
         "16x64x5": (finger(16, 64, 5), False),
     }
@@ -156,6 +157,7 @@ STEPS = {
     "sse2/4x8x5": "SSE2, baseline x86-64",
     "plain/4x8x5": "plain C, any machine",
     "avx2/shaking": "AVX2, joints shaking so that sides, rests and working points change all the time",
+    "avx2/memory": "AVX2, presliding at all places",
     "avx2/calibrated": "AVX2, all that `calibrate` writes, presliding apart",
     "avx2/presliding": "AVX2, all that `calibrate` writes",
     "avx2/1x2x1": "AVX2, 1 joint × 2 tendons × 1 point",

@@ -20,7 +20,7 @@ from oracle_finger import Step, given
 Array = NDArray[Any]
 Place = tuple[Any, ...]
 
-LARGEST_LIMIT = 1e30
+LARGEST_LIMIT = 1e15  # of a joint; of |F| at a tendon
 LARGEST_SLOPE = 1e150  # 1/D
 
 
@@ -108,6 +108,7 @@ class Elements:
 
     def loss(self, kind: str, i: int, j: int, limit: float, before: float, out: Step) -> float:
         """F of an edge or pulley, N. limit: |F(v)|·f; before: the force before it."""
+        limit = min(max(limit, 0.0), LARGEST_LIMIT * abs(before))
         place, level = (kind, i, j), j + (1 if kind == "pulley" else 0)
         turned = float(self.tendons[i, level])
         if self.compliance and not self.first:
@@ -117,6 +118,7 @@ class Elements:
 
     def own(self, j: int, limit: float, out: Step) -> float:
         """F of a joint, N·m."""
+        limit = min(max(limit, 0.0), LARGEST_LIMIT)
         return self._take(("joint", j), ("joint", j), limit, float(self.joints[j]), 0.0, out)
 
     def behind(self, kind: str, i: int, j: int, force: float) -> None:
@@ -129,7 +131,6 @@ class Elements:
         self.change = self.next_change
 
     def _take(self, place: Place, key: Place, limit: float, turned: float, compliance: float, out: Step) -> float:
-        limit = min(max(limit, 0.0), LARGEST_LIMIT)
         elements = self.at(place)
         before = self.forces.get(place, [0.0] * len(elements))
         limits = [element.share * limit for element in elements]

@@ -89,6 +89,7 @@ typedef struct friction_element {
 typedef struct friction_memory {
   size_t elements;   /* side by side, 0: there is no memory */
   double compliance; /* of the cords, 1/k_c, m/N; 0: rigid */
+  double stretch;    /* the same in the present step: 0 in the first */
   int relaxes;       /* some place has a relaxation time */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */

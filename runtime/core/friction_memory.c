@@ -6,7 +6,7 @@
 #include "friction_law.h"
 
 #define LEAST_DISTANCE 1e-150 /* m, rad: however short, no product in a step overflows */
-#define STEEPEST 1e290        /* 1/m, 1/rad, of z */
+#define STEEPEST       1e290  /* 1/m, 1/rad, of z */
 
 /* numbers of a row of presliding, as in effects.json */
 enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE };

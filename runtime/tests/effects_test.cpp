@@ -50,7 +50,7 @@ struct Effect {
   // from 1, as in a description; 0: nowhere
   Effect(const char* name, std::uint32_t joint, std::uint32_t tendon, std::vector<double> values)
       : type(effect_by_name(name)),
-        place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE},
+        place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE, EFFECT_NOWHERE},
         numbers(std::move(values)) {
     memory.resize(type->state_count ? type->state_count(joints, tendons, place) : type->memory_count, 0.0);
   }

@@ -112,9 +112,13 @@ class MemoryProblem:
         """Return Q, [n] ((N·m)²)."""
         return np.asarray(np.mean(residual**2, axis=0) + self._floor)
 
-    def linearised(self, state: State) -> Linearised:
-        """Return the derivatives at a state."""
-        return self.of_columns(state, self.drift.without(self.columns(state.u)))
+    def linearised(self, state: State, like: Linearised | None = None) -> Linearised:
+        """Return the derivatives at a state; only those by numbers of the memory are new if there are others like it."""
+        if like is None:
+            return self.of_columns(state, self.drift.without(self.columns(state.u)))
+        remembered, columns = np.flatnonzero(self.scale.log), like.columns.copy()
+        columns[:, :, remembered] = self.drift.without(self.columns(state.u, remembered.tolist()))
+        return self.of_columns(state, columns)
 
     def of_columns(self, state: State, columns: Numbers) -> Linearised:
         """Return what follows from derivatives [R, n, u] at a state."""
@@ -131,6 +135,14 @@ class MemoryProblem:
         here = self.values(u)
         directions = [self._direction(k, u, here) for k in (range(len(u)) if chosen is None else chosen)]
         return (self.runs if runs is None else runs).columns(directions, self._of_description(here))
+
+    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
+        """Return derivatives at `tried` that agree with the step there: Broyden's update."""
+        step = tried.u - state.u
+        missed = tried.residual - state.residual - linearised.columns @ step
+        return self.of_columns(
+            tried, linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+        )
 
     def slopes(self, state: State, runs: CoreRuns) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
@@ -174,31 +186,45 @@ class Minimum:
     converged: bool
 
 
-def minimise(problem: MemoryProblem, begin: State, most: int, tolerance: float, watch: Watch | None = None) -> Minimum:
-    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors."""
-    state, damping, converged = begin, DAMPING[0], False
-    linearised = problem.linearised(state)
-    for number in range(1, most + 1):
+def minimise(
+    problem: MemoryProblem,
+    begin: State,
+    most: int,
+    tolerance: float,
+    watch: Watch | None = None,
+    *,
+    known: Linearised | None = None,
+    rough: bool = False,
+) -> Minimum:
+    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
+
+    Between two computations of the derivatives Broyden's update keeps them good enough (Math. Comp. 19, 1965). `known`
+    are some to begin with; a rough end has updated ones.
+    """
+    state, damping, converged, number = begin, DAMPING[0], False, 0
+    linearised, is_fresh = (problem.linearised(state), True) if known is None else (known, False)
+    while not converged and number < most:
+        number += 1
         gradient = linearised.gradient + problem.known @ (state.u - problem.mean)
         matrix = linearised.information + problem.known
-        while damping < DAMPING[2]:
-            step = bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
-            tried = problem.state(state.u + step)
-            if tried.cost < state.cost:
-                break
-            damping *= 8.0
-        else:
-            converged = True
-            break
+        step = bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
+        tried = problem.state(state.u + step)
         fall = state.cost - tried.cost
-        state, damping = tried, max(damping / 5.0, DAMPING[1])
-        if watch is not None:
-            watch(number, state)
-        linearised = problem.linearised(state)
-        if step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum()):
-            converged = True
-            break
-    return Minimum(state, linearised, number, converged)
+        small = step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum())
+        if fall > 0.0:
+            linearised = problem.moved_on(state, linearised, tried)
+            state, damping = tried, max(damping / 5.0, DAMPING[1])
+            if watch is not None:
+                watch(number, state)
+        else:
+            damping *= 8.0
+        if small and (is_fresh or rough):
+            converged = fall >= 0.0 or damping > 1.0
+        elif small:
+            linearised, is_fresh = problem.linearised(state), True
+            continue
+        is_fresh = is_fresh and fall <= 0.0
+    return Minimum(state, linearised if is_fresh or rough else problem.linearised(state), number, converged)
 
 
 def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
@@ -218,5 +244,5 @@ def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Number
 
 def best_of(problem: MemoryProblem, begins: Sequence[State], most: int, tolerance: float) -> list[State]:
     """Go a few steps down from each start; return where they end, the best first."""
-    ends = [minimise(problem, begin, most, tolerance).state for begin in begins]
+    ends = [minimise(problem, begin, most, tolerance, rough=True).state for begin in begins]
     return sorted(ends, key=lambda state: state.cost)

@@ -27,7 +27,7 @@ from tendonfmu.statistics import sample_weights
 
 COARSE_RATE = 200.0  # Hz, and s in all: enough to tell starts apart
 COARSE_TIME, WINDOW = 30.0, 10.0
-COARSE_STEPS, REFINED = 6, 2  # steps from each start, and starts that are refined
+COARSE_STEPS, REFINED = 12, 2  # steps from each start, and starts that are refined
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 
@@ -81,16 +81,16 @@ def from_starts(
     """Go a few steps down from each start of the memory about z = `begin` [u]; return the ends, the best first."""
     places = {unknown.path: k for k, unknown in enumerate(problem.estimator.unknowns)}
     first = problem.scale.coordinates(begin)
-    ends: list[State] = []
+    ends: list[Minimum] = []
     for start in starts(problem.runs.data):
         u = first.copy()
         for path, value in start.items():
             if path in places:
                 u[places[path]] = np.log(value / problem.scale.size[places[path]])
-        u = np.clip(u, problem.lower, problem.upper)
-        if not any(np.array_equal(u, end.u) for end in ends):
-            ends.append(minimise(problem, problem.state(u), COARSE_STEPS, tolerance, watch).state)
-    return sorted(ends, key=lambda state: state.cost)
+        begin_here = problem.state(np.clip(u, problem.lower, problem.upper))
+        known = problem.linearised(begin_here, ends[-1].linearised) if ends else None
+        ends.append(minimise(problem, begin_here, COARSE_STEPS, tolerance, watch, known=known, rough=True))
+    return sorted((end.state for end in ends), key=lambda state: state.cost)
 
 
 def full_problem(

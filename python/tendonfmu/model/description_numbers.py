@@ -78,7 +78,7 @@ def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
 
 def place_of(row: Mapping[str, Any]) -> str:
     """Describe an extension as an appendix to a text."""
-    where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon") if row.get(key) is not None)
+    where = ", ".join(f"{key} {row[key]}" for key in ("joint", "tendon", "level") if row.get(key) is not None)
     return f", of {row['effect']}" + (f" at {where}" if where else "")
 
 

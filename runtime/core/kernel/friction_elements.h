@@ -7,7 +7,7 @@
 #include "friction_memory.h"
 #include "quad.h"
 
-#define LARGEST_LIMIT 1e30 /* N, N·m: no product in a step overflows */
+#define LARGEST_LIMIT 1e15 /* of |F|, and of the friction of a joint, N·m: no product in a step overflows */
 
 enum { EDGES, PULLEYS }; /* rows of slots of what is remembered; a joint's own friction stands among the edges */
 
@@ -25,7 +25,7 @@ HOT_INLINE void add_stretch(tendonfmu_finger* f) {
     quad beyond = quad_set(0.0);
     for (size_t j = f->joints; j-- > 0;) {
       const size_t at = j * lanes + i;
-      quad_store(f->scratch.turning + at, quad_add(quad_load(f->scratch.turning + at), quad_mul(compliance, beyond)));
+      quad_store(f->scratch.turning + at, quad_add(quad_load(f->scratch.travelled + at), quad_mul(compliance, beyond)));
       beyond = quad_add(beyond, quad_load(f->remembered.tension_change + at));
     }
   }
@@ -37,15 +37,14 @@ HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
   const double* moved = filters_position(f) ? s->travel : s->velocity;
   const quad duration = quad_set(first ? 0.0 : filters_position(f) ? 1.0 : step);
   for (size_t slot = 0; slot < f->slots; slot += 4) {
-    const quad travel = quad_mul(quad_load(moved + slot), duration);
-    quad_store(s->travelled + slot, travel);
-    quad_store(s->turning + slot, travel);
+    quad_store(s->travelled + slot, quad_mul(quad_load(moved + slot), duration));
     quad_store(s->kept + slot, quad_set(0.0));
   }
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->own_limit + j, quad_set(0.0));
   }
-  if (f->memory.compliance > 0.0 && !first) {
+  f->memory.stretch = first ? 0.0 : f->memory.compliance;
+  if (f->memory.stretch > 0.0) {
     add_stretch(f);
   }
   if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
@@ -63,6 +62,14 @@ typedef struct places {
 
 HOT_INLINE quad limit_of(quad friction) {
   return quad_max(quad_set(0.0), quad_min(quad_set(LARGEST_LIMIT), friction));
+}
+
+/* the share left of what was held before this sample, where it decides what is known of the start */
+HOT_INLINE void keep_share(const tendonfmu_finger* f, size_t slot, quad_mask free, size_t e) {
+  if (f->derived.settings.has_start_share) {
+    double* kept = f->scratch.kept + slot;
+    quad_store(kept, quad_max(quad_load(kept), quad_keep(free, quad_load(f->memory.element[e].kept + slot))));
+  }
 }
 
 /* One of their elements before it is clipped. */
@@ -88,8 +95,7 @@ HOT_INLINE trial begin_trial(const tendonfmu_finger* f, const places* p, size_t 
   trial t;
   t.limit = quad_mul(quad_load(element->share + p->slot), p->limit);
   t.rate = quad_add(quad_load(element->stiff + p->slot), quad_mul(quad_load(element->soft + p->slot), t.limit));
-  t.kept = quad_mul(quad_load(element->kept + p->slot),
-                    quad_load(f->remembered.element + e * 2 * f->slots + p->at));
+  t.kept = quad_mul(quad_load(element->kept + p->slot), quad_load(f->remembered.element + e * 2 * f->slots + p->at));
   return t;
 }
 
@@ -116,6 +122,23 @@ HOT_INLINE void solve_pair(trial t[2], const places* p) {
   }
 }
 
+/* The same with one element and rigid cords: nothing is divided, and what does not wait for the force comes first. */
+HOT_INLINE quad step_alone(tendonfmu_finger* f, const places* p) {
+  const finger_scratch* s = &f->scratch;
+  const friction_element* element = &f->memory.element[0];
+  const quad held = quad_mul(quad_load(element->kept + p->slot), quad_load(f->remembered.element + p->at));
+  const quad stiff = quad_load(element->stiff + p->slot), soft = quad_load(element->soft + p->slot);
+  const quad fixed = quad_add(held, quad_mul(stiff, p->turned)), by_limit = quad_mul(soft, p->turned);
+  const quad limit = quad_mul(quad_load(element->share + p->slot), p->limit);
+  const quad trial = quad_add(fixed, quad_mul(by_limit, limit)), force = clip_to(trial, limit);
+  const quad_mask free = quad_greater(limit, quad_abs(trial));
+  quad_store(s->element + p->at, force);
+  quad_store(s->by_turning + p->at, quad_keep(free, quad_add(stiff, quad_mul(soft, limit))));
+  quad_store(s->by_limit + p->at, quad_select(free, by_limit, quad_with_sign(quad_set(1.0), trial)));
+  keep_share(f, p->slot, free, 0);
+  return force;
+}
+
 /* F of four places, and what is remembered of them */
 HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
   const finger_scratch* s = &f->scratch;
@@ -131,15 +154,13 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
     t[0].held = trial_force(&t[0], p, zero);
     end_trial(&t[0]);
   }
-  quad kept = quad_load(s->kept + p->slot);
   for (size_t e = 0; e < f->memory.elements; ++e) {
     const quad force = clip_to(t[e].held, t[e].limit);
     quad_store(s->element + e * 2 * f->slots + p->at, force);
     sum = quad_add(sum, force);
     by_turning = quad_add(by_turning, quad_keep(t[e].free, t[e].rate));
-    kept = quad_max(kept, quad_keep(t[e].free, quad_load(f->memory.element[e].kept + p->slot)));
+    keep_share(f, p->slot, t[e].free, e);
   }
-  quad_store(s->kept + p->slot, kept);
   const quad turned = quad_sub(p->turned, quad_mul(sum, p->compliance)); /* c */
   for (size_t e = 0; e < f->memory.elements; ++e) {
     const friction_element* element = &f->memory.element[e];
@@ -155,18 +176,18 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
 
 /* What four tendons lose at their edges or pulleys at a slot, with |F| of the law and the force before them. */
 HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, quad magnitude, quad acting, quad before) {
-  const double compliance = f->scratch.sample.first ? 0.0 : f->memory.compliance;
+  const int stretches = f->memory.stretch > 0.0;
   const size_t at = row * f->slots + slot;
   places p = {.slot = slot,
               .at = at,
-              .limit = limit_of(quad_mul(acting, magnitude)),
-              .turned = quad_load(f->scratch.turning + slot),
-              .compliance = quad_set(compliance)};
-  if (compliance > 0.0) {
+              .limit = quad_mul(acting, limit_of(magnitude)),
+              .turned = quad_load((stretches ? f->scratch.turning : f->scratch.travelled) + slot),
+              .compliance = quad_set(f->memory.stretch)};
+  if (stretches) {
     const quad change = quad_sub(before, quad_load(f->remembered.tension + at));
     p.turned = quad_add(p.turned, quad_mul(change, p.compliance));
   }
-  return step_places(f, &p);
+  return stretches || f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
 }
 
 /* The same of the joints' own friction. */
@@ -175,9 +196,9 @@ HOT_INLINE quad torque_of_memory(tendonfmu_finger* f, size_t joint, quad limit) 
   const places p = {.slot = slot,
                     .at = EDGES * f->slots + slot,
                     .limit = limit,
-                    .turned = quad_load(f->scratch.turning + slot),
+                    .turned = quad_load(f->scratch.travelled + slot),
                     .compliance = quad_set(0.0)};
-  return step_places(f, &p);
+  return f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
 }
 
 /* What is behind an edge or a pulley, for the stretch of the cord there at the next sample. */
