@@ -268,7 +268,6 @@ class FingerOracle:
                 own = products.joint[j] + products.load[j]
                 products.load[j] *= share
                 products.joint[j] = held - products.load[j] if own else held
-        self.elements.end()
         return products
 
     def _start_of_elements(self, F: Places, first: bool) -> None:

@@ -64,7 +64,7 @@ def rank_of(row: Mapping[str, Any], place: Place) -> int:
 
 
 class Elements:
-    """All places of one finger. Once a sample: `turn`, then `loss` in the order of the path, `own`, and `end`."""
+    """All places of one finger. Once a sample: `turn`, then `loss` in the order of the path, and `own`."""
 
     def __init__(
         self, description: Mapping[str, Any], R: Array, thresholds: tuple[float, float], branches: Counter[str]
@@ -76,7 +76,6 @@ class Elements:
         self.R, self.thresholds, self.branches = R, thresholds, branches
         self.forces: dict[Place, list[float]] = {}  # F of each element
         self.tension: dict[Place, float] = {}  # f behind a place
-        self.change: dict[tuple[int, int], float] = {}  # of f_B
         self.kept: dict[tuple[Any, ...], float] = {}  # of the present sample, by velocity
         self.first, self.dt = True, 0.0
 
@@ -104,17 +103,22 @@ class Elements:
         """travelled: Δ of the joints [n] and of the tendons [m, n + 1]."""
         self.joints, self.tendons = (np.zeros_like(each) if first else each for each in travelled)
         self.dt, self.first, self.kept = dt, first, {}
-        self.next_change: dict[tuple[int, int], float] = {}
 
     def loss(self, kind: str, i: int, j: int, limit: float, before: float, out: Step) -> float:
         """F of an edge or pulley, N. limit: |F(v)|·f; before: the force before it."""
         limit = min(max(limit, 0.0), LARGEST_LIMIT * abs(before))
         place, level = (kind, i, j), j + (1 if kind == "pulley" else 0)
         turned = float(self.tendons[i, level])
+        compliance = 0.0
         if self.compliance and not self.first:
-            beyond = sum(change for (tendon, at), change in self.change.items() if tendon == i and at > level)
-            turned += (before - self.tension[place] + beyond) * self.compliance
-        return self._take(place, ("tendon", i, level), limit, turned, 0.0 if self.first else self.compliance, out)
+            compliance = self.compliance * self.sections(i, level)
+            turned += (before - self.tension[place]) * compliance
+        return self._take(place, ("tendon", i, level), limit, turned, compliance, out)
+
+    def sections(self, i: int, level: int) -> int:
+        """S, of the cord of tendon i from a level to the last joint that it moves."""
+        moved = np.flatnonzero(self.R[i])
+        return max(0, int(moved[-1]) + 1 - level) if len(moved) else 0
 
     def own(self, j: int, limit: float, out: Step) -> float:
         """F of a joint, N·m."""
@@ -123,12 +127,7 @@ class Elements:
 
     def behind(self, kind: str, i: int, j: int, force: float) -> None:
         """The force behind a place; also where it has no memory."""
-        if kind == "edge":
-            self.next_change[i, j] = 0.0 if self.first else force - self.tension[kind, i, j]
         self.tension[kind, i, j] = force
-
-    def end(self) -> None:
-        self.change = self.next_change
 
     def _take(self, place: Place, key: Place, limit: float, turned: float, compliance: float, out: Step) -> float:
         elements = self.at(place)

@@ -39,8 +39,6 @@ typedef struct linearisation {
   double torque_slope[MODEL_MAX_JOINTS];
   double own_limit[MODEL_MAX_JOINTS]; /* of what torque rows add to the limit of a joint */
   double mean_force, mean_force_slope;
-  const double* memory_slope; /* of what the extensions remember; NULL: held fixed */
-  double* entry;              /* [places] ∂(b·what acts); NULL: not wanted */
 } linearisation;
 
 static double seed(const double* direction, size_t i) {
@@ -121,7 +119,7 @@ static dual slot_grip(const linearisation* l, size_t slot, dual velocity) {
   if (!l->finger->extensions.friction) {
     return (dual){1.0, 0.0};
   }
-  return (dual){slot_grip_of(l->finger, slot), slot_grip_slope(l->finger, slot, velocity.slope, l->memory_slope)};
+  return (dual){slot_grip_of(l->finger, slot), slot_grip_slope(l->finger, slot, velocity.slope)};
 }
 
 /* |F| at the present velocity where friction has a memory, else F: 0 where the effect sticks */
@@ -149,7 +147,8 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
   if (!remembers_at(f, slot)) {
     return product(acts, friction);
   }
-  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE], stretch = f->memory.compliance * before;
+  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE];
+  const double stretch = f->memory.compliance > 0.0 ? f->memory.sections[slot] * f->memory.compliance * before : 0.0;
   const double turned = first != 0.0 ? 0.0 : motion + stretch, limit = product(acts, friction).slope;
   double force = 0.0;
   for (size_t e = 0; e < f->memory.elements; ++e) {
@@ -196,15 +195,6 @@ static dual acting(const tendonfmu_finger* f, size_t i, dual* force) {
   return *force;
 }
 
-/* b of a place times what acts there */
-static dual jump_at(linearisation* l, size_t place, dual acts, dual bias) {
-  const dual jump = product(acts, bias);
-  if (l->entry) {
-    l->entry[place] = jump.slope;
-  }
-  return jump;
-}
-
 static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   const tendonfmu_finger* f = l->finger;
   const size_t lanes = f->tendon_lanes;
@@ -224,8 +214,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
     const effect_laws edge = edge_laws(l, j, i);
     const dual edge_friction = friction_at(l, &edge, slot, threshold, velocity[j]);
     const dual edge_loss = loss_at(l, slot, 0, edge_friction, acts, motion[j], force.slope);
-    const size_t place = 2 * (i * f->joints + j);
-    jumped = sum(jumped, jump_at(l, place, acts, bias_at(l, &edge, slot, threshold, velocity[j])));
+    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold, velocity[j])));
     lost = sum(lost, edge_loss);
     force = difference(force, edge_loss);
     acts = acting(f, i, &force);
@@ -235,7 +224,7 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
       const dual pulley_friction = friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
       const dual pulley_loss = loss_at(l, slot + lanes, 1, pulley_friction, acts, motion[j + 1], force.slope);
       const dual bias = bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
-      jumped = sum(jumped, jump_at(l, place + 1, acts, bias));
+      jumped = sum(jumped, product(acts, bias));
       lost = sum(lost, pulley_loss);
       force = difference(force, pulley_loss);
       acts = acting(f, i, &force);
@@ -280,9 +269,7 @@ static void linearise_joints(linearisation* l) {
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
     const dual friction = own_friction(l, j, joint_friction, product(load_friction, l->load[j]));
     l->friction[j] = sum(l->friction[j], sum(friction, cover));
-    const size_t place = 2 * f->joints * f->tendons + 2 * j;
-    const dual own_jump = jump_at(l, place, (dual){1.0, 0.0}, own_bias);
-    l->bias_step[j] = sum(l->bias_step[j], sum(own_jump, jump_at(l, place + 1, l->load[j], load_bias)));
+    l->bias_step[j] = sum(l->bias_step[j], sum(own_bias, product(l->load[j], load_bias)));
   }
 }
 
@@ -342,11 +329,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    if (l->memory_slope && row->effect->advance_slope) {
-      row->effect->torque(row->place, row->parameters, &sample, l->memory_slope + row->offset, slope);
-    } else {
-      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
-    }
+    row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
     if (row->effect->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }
@@ -442,20 +425,5 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
   linearise_torques(&l, signals.force);
   for (size_t j = 0; j < finger->joints; ++j) {
     write_joint(&l, j, derivative);
-  }
-}
-
-void torque_along(const tendonfmu_finger* finger, const state_direction* direction, double* torque, double* jump,
-                  double* entry) {
-  linearisation l = {.finger = finger, .memory_slope = direction->memory, .entry = entry};
-  for (size_t j = 0; j < finger->joints; ++j) {
-    l.angle[j] = (dual){finger->remembered.angle[j], direction->angle[j]};
-    l.speed[j] = (dual){finger->remembered.speed[j], direction->speed[j]};
-    l.motion[j] = 0.0;
-  }
-  linearise_torques(&l, direction->force);
-  for (size_t j = 0; j < finger->joints; ++j) {
-    torque[j] = l.friction[j].slope - l.torque_slope[j];
-    jump[j] = l.bias_step[j].slope;
   }
 }

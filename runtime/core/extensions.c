@@ -16,7 +16,7 @@ typedef struct row_search {
   tendonfmu_finger* finger;
   effect_kind kind;
   int order;
-  size_t found, offset;
+  size_t found;
   const double* parameters;
   size_t memory; /* before the row, numbers */
 } row_search;
@@ -26,8 +26,7 @@ static void note_row(row_search* search, uint32_t index, uint32_t first_paramete
   const uint32_t* words = f->shape.extensions + (size_t)index * MODEL_EXTENSION_WORDS;
   const effect_type* effect = effect_by_id(words[0]);
   const effect_place place = model_extension_place(&f->shape, index);
-  const size_t all = model_extension_memory(effect, &f->shape, place);
-  const size_t own = model_effect_memory(effect, &f->shape, place);
+  const size_t own = model_extension_memory(effect, &f->shape, place);
   if (effect->kind == search->kind && effect->order == search->order) {
     double *memory = f->remembered.extension + search->memory, *next = f->scratch.extension + search->memory;
     f->extensions.row[search->found++] = (extension_row){.effect = effect,
@@ -37,17 +36,13 @@ static void note_row(row_search* search, uint32_t index, uint32_t first_paramete
                                                          .parameters = f->parameters + first_parameter,
                                                          .memory = memory,
                                                          .next = next,
-                                                         .memory_count = own,
-                                                         .offset = search->offset,
-                                                         .slopes = memory + own,
-                                                         .next_slopes = next + own};
-    search->offset += own;
+                                                         .memory_count = own};
   }
-  search->memory += all;
+  search->memory += own;
 }
 
-static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin, size_t* offset) {
-  row_search search = {.finger = f, .kind = kind, .order = order, .found = begin, .offset = *offset};
+static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin) {
+  row_search search = {.finger = f, .kind = kind, .order = order, .found = begin};
   uint32_t parameter = f->shape.parameter_count;
   for (uint32_t i = f->shape.extension_count; i-- > 0;) {
     parameter -= effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
@@ -56,7 +51,6 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t
     note_row(&search, i, parameter);
     parameter += effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
   }
-  *offset = search.offset;
   return search.found - begin;
 }
 
@@ -83,15 +77,15 @@ void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
   }
-  size_t signals = 0, none = 0, offset = 0;
+  size_t signals = 0;
   for (int order = 0; order < SIGNAL_ORDERS; ++order) {
-    signals += note_kind(f, EFFECT_SIGNAL, order, signals, &none);
+    signals += note_kind(f, EFFECT_SIGNAL, order, signals);
   }
   f->extensions.signals = signals;
-  f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals, &offset);
-  f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction, &offset);
+  f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals);
+  f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction);
   const size_t others = signals + f->extensions.friction + f->extensions.torques;
-  f->extensions.memory = note_kind(f, EFFECT_MEMORY, 0, others, &none);
+  f->extensions.memory = note_kind(f, EFFECT_MEMORY, 0, others);
   find_axis_cosines(f);
   find_memory(f);
   clear_grips(f);
@@ -206,21 +200,16 @@ double slot_grip_of(const tendonfmu_finger* f, size_t slot) {
   return value;
 }
 
-double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity, const double* memory_slope) {
+double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity) {
   double value = 1.0, slope = 0.0;
   for (size_t r = 0; r < f->extensions.friction; ++r) {
     const extension_row* row = friction_row(f, r);
     size_t member;
-    if (!friction_acts_on(f, row, slot, &member)) {
-      continue;
+    if (friction_acts_on(f, row, slot, &member)) {
+      const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
+      slope = slope * own.value + value * own.by_velocity * velocity;
+      value *= own.value;
     }
-    const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
-    double own_slope = own.by_velocity * velocity;
-    if (memory_slope && row->effect->advance_slope) {
-      own_slope = row->effect->grip(row->place, row->parameters, memory_slope + row->offset, member).value;
-    }
-    slope = slope * own.value + value * own_slope;
-    value *= own.value;
   }
   return slope;
 }

@@ -32,9 +32,8 @@ int friction_acts_on(const tendonfmu_finger* finger, const extension_row* row, s
 /* The factor of all friction rows together at a slot, from the memory. */
 double slot_grip_of(const tendonfmu_finger* finger, size_t slot);
 
-/* Its derivative along a direction of the slot's velocity and of what the effects remember [effect_memory]; NULL: what
- * they remembered at the sample before is held fixed. */
-double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity, const double* memory_slope);
+/* Its derivative along a direction of the slot's velocity; what the effects remembered at the sample before is held. */
+double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity);
 
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {

@@ -100,7 +100,8 @@ static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
       *rows[i] = take_numbers(c, slots);
     }
   }
-  double** const rows[] = {&s->travelled, &s->turning, &s->kept};
+  f->memory.sections = take_numbers(c, stretching);
+  double** const rows[] = {&s->travelled, &s->kept};
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
     *rows[i] = take_numbers(c, slots);
   }
@@ -109,7 +110,6 @@ static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
   s->by_turning = take_numbers(c, 2 * slots);
   s->by_limit = take_numbers(c, 2 * slots);
   s->tension = take_numbers(c, 2 * stretching);
-  s->tension_change = take_numbers(c, stretching);
 }
 
 static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
@@ -184,7 +184,6 @@ const state_row state_rows[] = {
     {AT(by_turning), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
     {AT(by_limit), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
     {AT(tension), ROW_OF_CORDS, 2, 0, ANYTHING, 1},
-    {AT(tension_change), ROW_OF_CORDS, 1, 0, ANYTHING, 1},
     {AT(extension), ROW_OF_EXTENSIONS, 1, 0, ANYTHING, 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];

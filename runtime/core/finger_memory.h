@@ -65,9 +65,6 @@ typedef struct extension_row {
   const double* parameters;
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
-  size_t offset;         /* of its memory among the effect_memory; not of signals and memory rows */
-  double* slopes; /* of signals, in memory, by each number: [n] ∂q, [n] ∂q̇, [m] ∂z, [effect_memory]; next too */
-  double* next_slopes;
 } extension_row;
 
 /* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
@@ -93,6 +90,7 @@ typedef struct friction_memory {
   int relaxes;       /* some place has a relaxation time */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
+  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end; with cord_stretch only */
   friction_element element[MODEL_MAX_ELEMENTS];
 } friction_memory;
 
@@ -238,9 +236,8 @@ typedef struct finger_state {
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
   double *by_turning, *by_limit; /* [2 × (n × M + N)] ∂F/∂c0, ∂F/∂lim of the last sample */
-  double *tension,
-      *tension_change; /* [2 × (n × M + N)] f behind a place, N; [n × M + N] of f_B; with cord_stretch only */
-  double* extension;   /* as the extensions ask for */
+  double* tension;               /* [2 × (n × M + N)] f behind a place, N; with cord_stretch only */
+  double* extension;             /* as the extensions ask for */
 } finger_state;
 
 /* Which lanes of a row stand for something; the others hold 0, unless they are tracked along. */
@@ -324,10 +321,10 @@ typedef struct finger_scratch {
   double *grip, *bias_grip;          /* [n × M + N] what friction rows make of F and b; with extensions only */
   double *whole_edge, *whole_pulley; /* [n × M + N] grip·|F| of the law; with extensions only */
   double* own_limit;                 /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
-  double *travelled, *turning, *kept; /* [n × M + N] Δ; with what cords beyond have stretched; the share left of what
-                                        was held before this sample; this and the next with a memory only */
-  double *element, *by_turning, *by_limit, *tension, *tension_change; /* as in the state, after this sample */
-  effect_sample sample;                                               /* as the extensions see it */
+  double *travelled, *kept;          /* [n × M + N] Δ; the share left of what was held before this sample; this and
+                                      * the next with a memory only */
+  double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
+  effect_sample sample;                              /* as the extensions see it */
   double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 

@@ -98,6 +98,18 @@ static double cord_compliance(const tendonfmu_finger* f) {
   return 0.0;
 }
 
+/* S at every level: the sections of cord from there to the last joint that the tendon moves */
+static void find_sections(tendonfmu_finger* f) {
+  for (size_t i = 0; i < f->tendon_lanes; ++i) {
+    double beyond = 0.0;
+    for (size_t j = f->joints; j-- > 0;) {
+      const size_t slot = j * f->tendon_lanes + i;
+      beyond += beyond > 0.0 || f->derived.moment_arm[slot] != 0.0 ? 1.0 : 0.0;
+      f->memory.sections[slot] = beyond;
+    }
+  }
+}
+
 /* g at a slot; 1 without relaxation, and at the first sample, whose step is 0 */
 static double decayed_gain(const friction_element* element, size_t slot, double step) {
   const double time = element->relaxation_time[slot], age = time > 0.0 ? step / time : 0.0;
@@ -127,6 +139,9 @@ void find_memory(tendonfmu_finger* f) {
     return;
   }
   f->memory.compliance = cord_compliance(f);
+  if (f->shape.stretches) {
+    find_sections(f);
+  }
   for (size_t slot = 0; slot < f->slots; ++slot) {
     find_elements(f, slot);
   }

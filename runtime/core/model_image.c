@@ -122,15 +122,8 @@ effect_place model_extension_place(const model_shape* shape, uint32_t index) {
   return (effect_place){place_at(row[1]), place_at(row[2]), place_at(row[3])};
 }
 
-size_t model_effect_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : effect->memory_count;
-}
-
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  const size_t joint_rows = shape->options & MODEL_HAS_POSITION_FILTER ? 5 : 2;
-  const size_t slopes =
-      effect->kind == EFFECT_SIGNAL ? joint_rows * shape->joints + shape->tendons + shape->effect_memory : 0;
-  return model_effect_memory(effect, shape, place) + slopes * effect->parameter_count;
+  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : effect->memory_count;
 }
 
 static void walk_extensions(walk* w) {
@@ -373,7 +366,7 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
     shape->elements = same;
   }
   shape->stretches |= effect == &effect_cord_stretch;
-  shape->effect_memory += effect->kind == EFFECT_SIGNAL ? 0 : model_effect_memory(effect, shape, stored_place(row));
+  shape->extension_memory += model_extension_memory(effect, shape, stored_place(row));
   return 0;
 }
 
@@ -383,10 +376,6 @@ static int check_extensions(const unsigned char* image, model_shape* shape, mess
     if (check_extension(table, i, shape, message)) {
       return -1;
     }
-  }
-  for (uint32_t i = 0; i < shape->extension_count; ++i) {
-    const unsigned char* row = table + 4 * MODEL_EXTENSION_WORDS * (size_t)i;
-    shape->extension_memory += model_extension_memory(effect_by_id(load_u32(row)), shape, stored_place(row));
   }
   return 0;
 }

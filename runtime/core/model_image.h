@@ -52,7 +52,6 @@ typedef struct model_shape {
   uint32_t most_points[MODEL_MAX_JOINTS]; /* largest number of working points before each joint; 0 without angles */
   uint32_t elements;                      /* most rows of presliding at one place: 0..MODEL_MAX_ELEMENTS */
   int stretches;                          /* 1: with cord_stretch */
-  size_t effect_memory;                   /* numbers that extensions on friction and torques remember */
   size_t extension_memory;                /* all that the extensions remember */
 } model_shape;
 
@@ -73,11 +72,8 @@ typedef struct model_item {
 /* Calls visit for each item in order; stops at the first result other than 0 and returns it. */
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context);
 
-/* Where row `index` of the extensions acts, and how many numbers it remembers: those of its effect, and, where it
- * changes signals, by each of its numbers ∂q and ∂q̇ of every joint, ∂z of every tendon, the derivative of all
- * effect_memory, and with a position filter that of three rows of joints. */
+/* Where row `index` of the extensions acts, and how many numbers an effect remembers there. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
-size_t model_effect_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
 
 /* Directions of uncertainty that every joint has room for; joints with fewer have zeros there. */

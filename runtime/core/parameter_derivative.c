@@ -25,7 +25,7 @@ static sizes sizes_of(const tendonfmu_finger* f) {
                  .entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? places : 0,
                  .friction = places * LAWS_OF_PLACE,
                  .bias = places * LAWS_OF_PLACE * SIDES_OF_JUMP,
-                 .plain = 2 * f->joints + EFFECT_MAX_PARAMETERS * f->joints * (size_t)f->shape.extension_count};
+                 .plain = 2 * f->joints};
 }
 
 /* numbers a place of entry_load */
@@ -38,8 +38,7 @@ size_t parameter_derivative_size(const tendonfmu_finger* finger) {
   const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
   return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
          s.plain * sizeof(plain_term) +
-         (3 * s.places * finger->joints + 4 * finger->joints + 2 * s.places + s.entries * entry_row(finger)) *
-             sizeof(double);
+         (3 * s.places * finger->joints + 4 * finger->joints + s.entries * entry_row(finger)) * sizeof(double);
 }
 
 typedef struct law_search {
@@ -70,7 +69,7 @@ static void note_edge(law_search* search, const model_item* item) {
 }
 
 static void note_cover(parameter_derivative* d, uint32_t parameter, uint32_t joint) {
-  d->plain[d->covers++] = (plain_term){.parameter = parameter, .joint = joint};
+  d->plain[d->plain_count++] = (plain_term){.parameter = parameter, .joint = joint};
 }
 
 static int note_item(void* context, const model_item* item) {
@@ -110,8 +109,6 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
   derivative->bias_factor = take(&from, matrix);
   derivative->moved = take(&from, 2 * n * sizeof(double));
   derivative->jumped = take(&from, 2 * n * sizeof(double));
-  derivative->base = take(&from, s.places * sizeof(double));
-  derivative->jump_base = take(&from, s.places * sizeof(double));
   derivative->stop_jump = take(&from, s.entries * sizeof(double));
   derivative->left_share = take(&from, s.entries * sizeof(double));
   derivative->acting = take(&from, s.entries * sizeof(double));
@@ -179,12 +176,10 @@ static double read_friction(const tendonfmu_finger* f, const place_laws* p, para
   const double v = f->scratch.velocity[p->slot], speed = v < 0.0 ? -v : v;
   const double grip = f->extensions.friction ? f->scratch.grip[p->slot] : 1.0;
   if (f->remembered.moving[p->slot] == 0.0) {
-    d->base[p->place] = 0.0;
-  } else {
-    const double sign = v < 0.0 ? -1.0 : 1.0;
-    d->base[p->place] = sign * add_magnitude(p, v < 0.0, speed, grip * sign, d->friction, &d->friction_count);
+    return 0.0;
   }
-  return grip * d->base[p->place];
+  const double sign = v < 0.0 ? -1.0 : 1.0;
+  return grip * sign * add_magnitude(p, v < 0.0, speed, grip * sign, d->friction, &d->friction_count);
 }
 
 /* b of fig. 5 where a place comes to rest */
@@ -212,7 +207,6 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
   const double before = s->side_before[p->slot], now = s->side[p->slot], event = s->event[p->slot];
   const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
   const int keeps_entry = f->derived.settings.remembers_entry_load;
-  d->jump_base[p->place] = 0.0;
   if (keeps_entry) {
     d->stop_jump[p->place] = d->left_share[p->place] = 0.0;
     d->acting[p->place] = p->acting;
@@ -221,7 +215,6 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
     return 0.0;
   }
   const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, d);
-  d->jump_base[p->place] = jump;
   if (keeps_entry && event > 0.0) {
     d->stop_jump[p->place] = grip * jump;
   }
@@ -375,7 +368,7 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
 }
 
 static void read_covers(const tendonfmu_finger* f, parameter_derivative* d) {
-  for (size_t k = 0; k < d->covers; k += 2) {
+  for (size_t k = 0; k < d->plain_count; k += 2) {
     const uint32_t j = d->plain[k].joint;
     d->plain[k].slope = f->remembered.angle[j] - f->derived.cover_rest[j];
     d->plain[k + 1].slope = -f->derived.cover_stiffness[j];
@@ -400,5 +393,4 @@ void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivat
     read_joint(finger, derivative, j);
   }
   read_covers(finger, derivative);
-  derivative->plain_count = derivative->covers;
 }

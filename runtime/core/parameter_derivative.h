@@ -8,7 +8,8 @@
  *   ∂Δb_j/∂θ = Σ over places  jump_factor[place][j] · ∂F/∂θ + bias_factor[place][j] · ∂b/∂θ
  *
  * The factors carry the forces along: friction at one place changes the forces behind it, hence all losses there
- * (differs from sect. V: the paper's regressors freeze f_A and f_B, which leaves out that part). */
+ * (differs from sect. V: the paper's regressors freeze f_A and f_B, which leaves out that part). Numbers of extensions
+ * are not among the parameters here. */
 #pragma once
 
 #include "finger_memory.h"
@@ -24,19 +25,17 @@ typedef struct law_term {
   double slope[LAW_SIDE_NUMBERS];
 } law_term;
 
-/* Slope of T_j (with an extension that changes forces: of T_j − τ_j) and of Δb_j by a number that enters it directly:
- * covers and extensions. */
+/* Slope of T_j by a number of a cover. */
 typedef struct plain_term {
   uint32_t parameter, joint;
-  double slope, jump;
+  double slope;
 } plain_term;
 
 /* Room for the derivative of one sample. Place i·2n + 2j is the edge of tendon i before joint j, i·2n + 2j + 1 its
  * pulley at joint j, m·2n + 2j the friction T_jv0 and m·2n + 2j + 1 the load friction T_jvf of joint j (0-based). */
 typedef struct parameter_derivative {
   size_t joints, tendons, places;
-  size_t plain_count; /* of the last sample */
-  size_t covers;      /* the first of them */
+  size_t plain_count;
   /* where the laws stand among the parameters */
   uint32_t *edge_side[2], *pulley_side[2], *joint_side[2], *load_side[2]; /* [record], [n × M], [N], [N]: by sign */
   /* of the last sample */
@@ -47,13 +46,11 @@ typedef struct parameter_derivative {
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
   /* with entry_load, of a sample with jumps; [places] */
-  double* stop_jump;        /* b of what comes to rest */
-  double* left_share;       /* κ of what leaves rest and had moved before: −κ·e is part of Δb */
-  double* acting;           /* what multiplies F and b */
-  double* acting_factor;    /* [places × 2n] its derivative by F of the places of the same tendon before it */
-  double* load_factor;      /* [places × n] ∂f_B at each joint by F of a place */
-  double *base, *jump_base; /* [places] F and b before extensions act on friction; |F| where
-                                                        they make it slide at all times */
+  double* stop_jump;     /* b of what comes to rest */
+  double* left_share;    /* κ of what leaves rest and had moved before: −κ·e is part of Δb */
+  double* acting;        /* what multiplies F and b */
+  double* acting_factor; /* [places × 2n] its derivative by F of the places of the same tendon before it */
+  double* load_factor;   /* [places × n] ∂f_B at each joint by F of a place */
 } parameter_derivative;
 
 /* Bytes of memory that the derivative of this finger needs. */
@@ -62,6 +59,5 @@ size_t parameter_derivative_size(const tendonfmu_finger* finger);
 /* Lays it into memory [parameter_derivative_size], aligned for doubles. */
 void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, parameter_derivative* derivative);
 
-/* Fills it, but for the extensions (extension_derivative.h), for the sample that the finger last took, by a step: a
- * restored state has no scratch. */
+/* Fills it for the sample that the finger last took, by a step: a restored state has no scratch. */
 void parameter_derivative_read(const tendonfmu_finger* finger, parameter_derivative* derivative);

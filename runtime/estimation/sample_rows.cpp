@@ -13,11 +13,15 @@ sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* f
   if (finger->memory.elements > 0) {
     throw refused("friction with a memory (presliding): its derivative by the numbers is not known here");
   }
+  for (std::uint32_t p = 0; p < finger->shape.parameter_count; ++p) {
+    if (unknowns.plain(p) >= 0 && parameter_item(&finger->shape, p).kind == ITEM_EXTENSION) {
+      throw refused("extensions: the derivative by their numbers is not known here");
+    }
+  }
   parameter_derivative_place(finger, memory_.data(), &derivative_);
   terms_.reserve(6 * derivative_.places);
   if (finger->derived.settings.remembers_entry_load) {
     entries_.assign(derivative_.places * unknowns.count(), 0.0);
-    by_signal_.assign(derivative_.places, 0.0);
   }
 }
 
@@ -56,7 +60,6 @@ void sample_rows::add(const law_term& from, bool is_jump) {
 
 void sample_rows::read() {
   parameter_derivative_read(finger_, &derivative_);
-  extension_derivative_read(finger_, &derivative_);
   terms_.clear();
   plain_.clear();
   for (std::size_t k = 0; k < derivative_.friction_count; ++k) {
@@ -68,7 +71,7 @@ void sample_rows::read() {
   for (std::size_t k = 0; k < derivative_.plain_count; ++k) {
     const plain_term& term = derivative_.plain[k];
     if (unknowns_.plain(term.parameter) >= 0) {
-      plain_.push_back({unknowns_.plain(term.parameter), term.joint, term.slope, term.jump});
+      plain_.push_back({unknowns_.plain(term.parameter), term.joint, term.slope, 0.0});
     }
   }
   if (!entries_.empty() && derivative_.has_jump) {
@@ -118,25 +121,6 @@ void sample_rows::come_to_rest() {
       }
     }
   }
-  come_to_rest_by_signals();
-}
-
-void sample_rows::come_to_rest_by_signals() {
-  for (std::size_t r = 0; r < finger_->extensions.signals; ++r) {
-    const extension_row* row = signal_row(finger_, r);
-    for (std::uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      const std::int32_t column = unknowns_.plain(row->first_parameter + k);
-      if (column < 0) {
-        continue;
-      }
-      extension_entry_slopes(finger_, r, k, by_signal_.data());
-      for (std::size_t place = 0; place < derivative_.places; ++place) {
-        if (derivative_.stop_jump[place] != 0.0) {
-          entry(place)[column] += by_signal_[place];
-        }
-      }
-    }
-  }
 }
 
 /* factor·∂F, or ∂b, of a place */
@@ -150,17 +134,6 @@ void sample_rows::add_slopes(std::size_t place, bool is_jump, double factor, dou
         if (term.column[k] >= 0) {
           entry[term.column[k]] += factor * term.slope[k];
         }
-      }
-    }
-  }
-  for (std::size_t r = 0; r < finger_->extensions.friction; ++r) {
-    const extension_row* row = friction_row(finger_, r);
-    place_slopes slopes;
-    extension_place_slopes(finger_, &derivative_, r, place, &slopes);
-    for (std::uint32_t k = 0; k < row->effect->parameter_count; ++k) {
-      const std::int32_t column = unknowns_.plain(row->first_parameter + k);
-      if (column >= 0) {
-        entry[column] += factor * (is_jump ? slopes.jump[k] : slopes.friction[k]);
       }
     }
   }

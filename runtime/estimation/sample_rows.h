@@ -65,7 +65,6 @@ class sample_rows {
   void add(const law_term& from, bool is_jump);
   void leave_rest();
   void come_to_rest();
-  void come_to_rest_by_signals();
   void add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const;
   double* entry(std::size_t place) { return entries_.data() + place * unknowns_.count(); }
 
@@ -75,8 +74,7 @@ class sample_rows {
   parameter_derivative derivative_;
   std::vector<sensitivity_term> terms_;
   std::vector<plain_slope> plain_;
-  std::vector<double> entries_;   /* [places × unknowns] of e of every place, as it came to rest */
-  std::vector<double> by_signal_; /* [places] room */
+  std::vector<double> entries_; /* [places × unknowns] of e of every place, as it came to rest */
 };
 
 /* The beginnings of a recording's segments with other numbers of the description than those it was added with; rows: of

@@ -188,30 +188,6 @@ TEST(Slope, IsTheCentralDifferenceWithTheMemoryHeld) {
   }
 }
 
-TEST(Torque, ThatIsNotLinearSaysItsDerivatives) {
-  const double h = 1e-6;
-  std::set<std::string> checked;
-  for (Effect& effect : all_torques()) {
-    const std::vector<double> after = effect.advanced(Sample{});
-    for (std::uint32_t k = 0; effect.type->by_parameter && k < effect.numbers.size(); ++k) {
-      const auto at = [&](double step) {
-        std::vector<double> moved = effect.numbers;
-        moved[k] += step;
-        return effect.torque(Sample{}, moved, after);
-      };
-      PerJoint found{};
-      Effect::see(Sample{}, [&](auto* seen) {
-        effect.type->by_parameter(effect.place, effect.numbers.data(), k, seen, after.data(), found.data());
-      });
-      for (std::size_t j = 0; j < joints; ++j) {
-        EXPECT_NEAR(found[j], (at(h)[j] - at(-h)[j]) / (2.0 * h), 1e-8);
-      }
-      checked.insert(effect.type->name);
-    }
-  }
-  EXPECT_EQ(checked, (std::set<std::string>{"joint_coupling", "preload_friction", "pulley_eccentricity"}));
-}
-
 // --- the table ------------------------------------------------------------------------------------------------------
 
 TEST(Table, HasDifferentNamesAndNumbers) {

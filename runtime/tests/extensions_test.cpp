@@ -202,32 +202,6 @@ TEST(Derivative, OfWhatNeverSticksIsThatOfItsLaw) {
   }
 }
 
-// Forces that come early bend a hardening spring behind a play: within the play the position stays, its spring does
-// not.
-TEST(Derivative, OfADelayPassesAPlayAndASpring) {
-  const auto image = image_with(
-      R"({"effect": "time_delay", "delay": -0.0033}, {"effect": "backlash", "tendon": 1, "width": 3e-3},
-         {"effect": "tendon_nonlinearity", "tendon": 1, "hardening": 1e6})");
-  const Motion motion(1000);
-  const double change = 1e-6;
-  Finger middle(image), more(image), less(image);
-  set(more, "extensions[1].delay", -0.0033 + change);
-  set(less, "extensions[1].delay", -0.0033 - change);
-  double largest = 0.0;
-  for (std::size_t k = 0; k < 1000; ++k) {
-    for (const Finger* finger : {&middle, &more, &less}) {
-      finger->run(motion, k, k + 1);
-    }
-    const double* slopes = signal_slopes(middle, signal_row(middle, 0), 0);
-    for (std::size_t j = 0; k >= 64 && j < test_finger::joints; ++j) {
-      const double difference = (more.handle->remembered.angle[j] - less.handle->remembered.angle[j]) / (2.0 * change);
-      ASSERT_NEAR(slopes[j], difference, 1e-5) << "sample " << k << ", joint " << j + 1;
-      largest = std::max(largest, std::fabs(difference));
-    }
-  }
-  EXPECT_GT(largest, 1e-2);
-}
-
 // --- position filter ------------------------------------------------------------------------------------------------
 
 // no time step and no angle makes it refuse what the core takes, or leaves its variances below 0

@@ -4,7 +4,7 @@
 
 /* Play: what is behind it follows a position at half the width (Krasnosel'skii and Pokrovskii 1989). */
 
-enum { BEHIND, BY_WIDTH, FOLLOWS, MEMORY_COUNT };
+enum { BEHIND, FOLLOWS, MEMORY_COUNT };
 
 /* the position that has the play; NULL: not this time, or the kinematics source does not use it */
 static double* position_of(effect_place place, const effect_signals* signals) {
@@ -19,57 +19,27 @@ static void signal(effect_place place, const double* values, effect_signals* sig
   double* position = position_of(place, signals);
   if (!position) {
     if (place.tendon != EFFECT_NOWHERE && signals->source != 1) {
-      after[BEHIND] = after[BY_WIDTH] = after[FOLLOWS] = 0.0; /* not what another source left there */
+      after[BEHIND] = after[FOLLOWS] = 0.0; /* not what another source left there */
     }
     return;
   }
   const double half = 0.5 * values[0], x = *position;
   const int above = !signals->first && x - half > before[BEHIND], below = !signals->first && x + half < before[BEHIND];
   after[BEHIND] = signals->first ? x : above ? x - half : below ? x + half : before[BEHIND];
-  after[BY_WIDTH] = signals->first ? 0.0 : above ? -0.5 : below ? 0.5 : before[BY_WIDTH];
   after[FOLLOWS] = signals->first || above || below || half == 0.0 ? 1.0 : 0.0;
   *position = after[BEHIND];
-}
-
-/* later samples inside the play come back to it; behind a joint's nothing else moves the angle */
-static void remember_direction(effect_place place, effect_signals* direction) {
-  if (place.joint == EFFECT_NOWHERE && direction->position_behind) {
-    direction->position_behind[place.tendon] = direction->position[place.tendon];
-  }
-}
-
-static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
-                         effect_signals* derivative) {
-  (void)values;
-  (void)k;
-  double* position = position_of(place, derivative);
-  if (position) {
-    *position += memory[BY_WIDTH];
-    remember_direction(place, derivative);
-  }
 }
 
 /* inside the play it stays what it was */
 static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
   (void)values;
   double* position = position_of(place, direction);
-  if (!position) {
-    return;
+  if (position && memory[FOLLOWS] == 0.0) {
+    *position = 0.0;
   }
-  if (memory[FOLLOWS] == 0.0) {
-    const int at_joint = place.joint != EFFECT_NOWHERE;
-    const double* before = at_joint ? direction->angle_before : direction->position_before;
-    *position = before ? before[at_joint ? place.joint : place.tendon] : 0.0;
-  }
-  remember_direction(place, direction);
 }
 
 const effect_type effect_backlash = {
-    BACKLASH_FACTS,
-    .kind = EFFECT_SIGNAL,
-    .order = 1,
-    .memory_count = MEMORY_COUNT,
-    .signal = signal,
-    .signal_slope = signal_slope,
-    .signal_pass = signal_pass,
+    BACKLASH_FACTS,   .kind = EFFECT_SIGNAL,      .order = 1, .memory_count = MEMORY_COUNT,
+    .signal = signal, .signal_pass = signal_pass,
 };

@@ -75,18 +75,15 @@ typedef struct effect_signals {
   int first, source;
   int late; /* 0: before the joint angles are known (source 1) or taken as given; 1: after */
   double time;
-  double *force, *position;                     /* [m] f0, x0 */
-  double *angle, *velocity;                     /* [n]; velocity with source 3 only */
-  const double* inverse_stiffness;              /* [m] 1/k, m/N */
-  const double *position_before, *angle_before; /* of directions: behind a play at the sample before; NULL: 0 */
-  double* position_behind;                      /* [m] of directions: receives the same of this sample; NULL: not */
+  double *force, *position;        /* [m] f0, x0 */
+  double *angle, *velocity;        /* [n]; velocity with source 3 only */
+  const double* inverse_stiffness; /* [m] 1/k, m/N */
 } effect_signals;
 
 /* A factor of the friction at one place, of F and of b. */
 typedef struct effect_grip {
   double value;
   double by_velocity; /* s/m or s/rad */
-  double by_parameter[EFFECT_MAX_PARAMETERS];
 } effect_grip;
 
 /* EFFECT_MEMORY: numbers alone, which friction_memory.h reads. */
@@ -114,19 +111,10 @@ typedef struct effect_type {
   void (*advance)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                   double* after);
 
-  /* What a change of the signals, and slope_before of what it remembered, makes of what it remembers; NULL: nothing.
-   * Its torque, or grip, must then be linear in its memory and depend on the signals through it alone. */
-  void (*advance_slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
-                        const effect_direction* direction, const double* slope_before, double* slope_after);
-
   /* --- EFFECT_TORQUE ------------------------------------------------------------------------------------------------
-   * torque() adds to torque [n], N·m; with the parameters replaced by a unit vector it is the derivative by one, where
-   * it is linear in them: */
+   * torque() adds to torque [n], N·m; */
   void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                  double* torque);
-  /* else this adds the derivative by parameter k; NULL: linear. */
-  void (*by_parameter)(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                       const double* memory, double* torque);
   /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);
@@ -145,9 +133,6 @@ typedef struct effect_type {
    * Changes signals, twice a sample (late 0, then 1), and fills after from before; */
   void (*signal)(effect_place place, const double* parameters, effect_signals* signals, const double* before,
                  double* after);
-  /* adds the derivative of what it made of them by parameter k; */
-  void (*signal_slope)(effect_place place, const double* parameters, uint32_t k, const double* memory,
-                       effect_signals* derivative);
   /* turns a direction of what it was given into that of what it made of it. */
   void (*signal_pass)(effect_place place, const double* parameters, const double* memory, effect_signals* direction);
 } effect_type;

@@ -7,13 +7,11 @@
 /* F × (1 + amplitude·(1 − exp(−(t − t_0)/time_constant))): run-in, warming up. */
 
 enum { AMPLITUDE, TIME_CONSTANT };
-/* the share reached, 1 − e^−age, and its slope by the logarithm of the time constant, −age·e^−age */
-enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, BY_AGE, MEMORY_COUNT };
+enum { FIRST_TIME, ELAPSED, TOLD_CONSTANT, COME, MEMORY_COUNT };
 
-static void come_so_far(double elapsed, double time_constant, double* come, double* by_age) {
-  const double age = elapsed > 0.0 ? elapsed / time_constant : 0.0;
-  *come = law_one_minus_exponential(age);
-  *by_age = age < 700.0 ? -age * law_exponential(age) : 0.0; /* beyond it may be infinite times 0 */
+/* the share reached, 1 − e^−age */
+static double come_so_far(double elapsed, double time_constant) {
+  return elapsed > 0.0 ? law_one_minus_exponential(elapsed / time_constant) : 0.0;
 }
 
 static void advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
@@ -22,19 +20,16 @@ static void advance(effect_place place, const double* values, const effect_sampl
   after[FIRST_TIME] = sample->first ? sample->time : before[FIRST_TIME];
   after[ELAPSED] = sample->time - after[FIRST_TIME];
   after[TOLD_CONSTANT] = values[TIME_CONSTANT];
-  come_so_far(after[ELAPSED], values[TIME_CONSTANT], after + COME, after + BY_AGE);
+  after[COME] = come_so_far(after[ELAPSED], values[TIME_CONSTANT]);
 }
 
-/* of every velocity of its place the same, so the exponentials are remembered; the number may have changed since */
+/* of every velocity of its place the same, so the exponential is remembered; the number may have changed since */
 static effect_grip grip(effect_place place, const double* values, const double* memory, size_t member) {
   (void)place;
   (void)member;
-  double come = memory[COME], by_age = memory[BY_AGE];
-  if (memory[TOLD_CONSTANT] != values[TIME_CONSTANT]) {
-    come_so_far(memory[ELAPSED], values[TIME_CONSTANT], &come, &by_age);
-  }
-  return (effect_grip){.value = 1.0 + values[AMPLITUDE] * come,
-                       .by_parameter = {come, values[AMPLITUDE] * by_age / values[TIME_CONSTANT]}};
+  const int same = memory[TOLD_CONSTANT] == values[TIME_CONSTANT];
+  const double come = same ? memory[COME] : come_so_far(memory[ELAPSED], values[TIME_CONSTANT]);
+  return (effect_grip){.value = 1.0 + values[AMPLITUDE] * come};
 }
 
 const effect_type effect_friction_drift = {

@@ -17,17 +17,6 @@ static void advance(effect_place place, const double* parameters, const effect_s
   after[VELOCITY] = velocity;
 }
 
-static void advance_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                          const double* before, const effect_direction* direction, const double* slope_before,
-                          double* slope_after) {
-  (void)parameters;
-  (void)before;
-  const double velocity = along(direction->velocity, place.joint);
-  slope_after[ACCELERATION] = sample->first ? 0.0 : (velocity - slope_before[VELOCITY]) / sample->step;
-  slope_after[STEP] = 0.0;
-  slope_after[VELOCITY] = velocity;
-}
-
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   (void)sample;
@@ -43,7 +32,6 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_inertia = {
-    INERTIA_FACTS,      .kind = EFFECT_TORQUE,          .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance, .advance_slope = advance_slope, .torque = torque,
-    .slope = slope,
+    INERTIA_FACTS,      .kind = EFFECT_TORQUE, .memory_count = NUMBERS_REMEMBERED,
+    .advance = advance, .torque = torque,      .slope = slope,
 };

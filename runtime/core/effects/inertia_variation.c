@@ -54,14 +54,6 @@ static void advance(effect_place place, const double* parameters, const effect_s
   by_numbers(place, sample, after);
 }
 
-static void advance_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                          const double* before, const effect_direction* direction, const double* slope_before,
-                          double* slope_after) {
-  effect_inertia.advance_slope(place, parameters, sample, before, direction, slope_before, slope_after);
-  const double a = sample->first ? 0.0 : (sample->velocity[place.joint] - before[VELOCITY]) / sample->step;
-  slope_by_numbers(place, sample, a, slope_after[ACCELERATION], direction, slope_after);
-}
-
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
   (void)sample;
@@ -77,7 +69,6 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_inertia_variation = {
-    INERTIA_VARIATION_FACTS, .kind = EFFECT_TORQUE,          .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance,      .advance_slope = advance_slope, .torque = torque,
-    .slope = slope,
+    INERTIA_VARIATION_FACTS, .kind = EFFECT_TORQUE, .memory_count = NUMBERS_REMEMBERED,
+    .advance = advance,      .torque = torque,      .slope = slope,
 };

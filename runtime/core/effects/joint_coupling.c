@@ -23,18 +23,6 @@ static void torque(effect_place place, const double* parameters, const effect_sa
   torque[place.joint + 1] -= parameters[REACTION] * pull;
 }
 
-static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                         const double* memory, double* torque) {
-  (void)memory;
-  const double bend = bend_of(place, sample);
-  if (k == STIFFNESS) {
-    torque[place.joint] += bend;
-    torque[place.joint + 1] -= parameters[REACTION] * bend;
-  } else {
-    torque[place.joint + 1] -= parameters[STIFFNESS] * bend;
-  }
-}
-
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)sample;
@@ -46,5 +34,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_joint_coupling = {
-    JOINT_COUPLING_FACTS, .kind = EFFECT_TORQUE, .torque = torque, .by_parameter = by_parameter, .slope = slope,
+    JOINT_COUPLING_FACTS,
+    .kind = EFFECT_TORQUE,
+    .torque = torque,
+    .slope = slope,
 };

@@ -61,15 +61,6 @@ static void torque(effect_place place, const double* parameters, const effect_sa
   add_lost(place, sample, memory, parameters[COULOMB], parameters[COULOMB] * parameters[BEYOND], torque);
 }
 
-static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                         const double* memory, double* torque) {
-  if (k == COULOMB) {
-    add_lost(place, sample, memory, 1.0, parameters[BEYOND], torque);
-  } else {
-    add_lost(place, sample, memory, 0.0, parameters[COULOMB], torque);
-  }
-}
-
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)place; /* constant but for its memory */
@@ -82,6 +73,6 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 
 const effect_type effect_preload_friction = {
     PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
-    .advance = advance,     .torque = torque,      .by_parameter = by_parameter,
-    .slope = slope,         .slot = slot,          .size = size,
+    .advance = advance,     .torque = torque,      .slope = slope,
+    .slot = slot,           .size = size,
 };

@@ -27,16 +27,6 @@ static void torque(effect_place place, const double* parameters, const effect_sa
   torque[place.joint] -= (parameters[SINE] * at.sine + parameters[COSINE] * at.cosine) * sample->force[place.tendon];
 }
 
-static void by_parameter(effect_place place, const double* parameters, uint32_t k, const effect_sample* sample,
-                         const double* memory, double* torque) {
-  (void)memory;
-  const sine_cosine at = pulley_at(place, parameters, sample);
-  const double arm = k == SINE     ? at.sine
-                     : k == COSINE ? at.cosine
-                                   : arm_by_turn(parameters, at) * sample->angle[place.joint];
-  torque[place.joint] -= arm * sample->force[place.tendon];
-}
-
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)memory;
@@ -48,5 +38,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
 }
 
 const effect_type effect_pulley_eccentricity = {
-    PULLEY_ECCENTRICITY_FACTS, .kind = EFFECT_TORQUE, .torque = torque, .by_parameter = by_parameter, .slope = slope,
+    PULLEY_ECCENTRICITY_FACTS,
+    .kind = EFFECT_TORQUE,
+    .torque = torque,
+    .slope = slope,
 };

@@ -42,8 +42,7 @@ static effect_grip grip(effect_place place, const double* values, const double* 
   /* ratio·e^−ratio stays finite; a ratio that is not has come to its end */
   const double near = law_exponential(ratio), change = ratio < 700.0 ? values[AMPLITUDE] * near : 0.0;
   return (effect_grip){.value = 1.0 + values[AMPLITUDE] * near,
-                       .by_velocity = -change * memory[SIDE] / values[STRIBECK_VELOCITY],
-                       .by_parameter = {near, change * (ratio < 700.0 ? ratio : 0.0) / values[STRIBECK_VELOCITY]}};
+                       .by_velocity = -change * memory[SIDE] / values[STRIBECK_VELOCITY]};
 }
 
 const effect_type effect_stribeck = {

@@ -10,7 +10,7 @@
 enum { KEPT = 64 };
 
 /* memory: the newest of the kept samples, how many there are, whether they are forces, the share of this sample in what
- * comes out; their times; slopes of the signals by the delay [width]; the samples [KEPT × width] */
+ * comes out; their times; the samples [KEPT × width] */
 enum { NEWEST, COUNT, FORCES, SHARE, TIMES };
 
 /* room for what any kinematics source gives */
@@ -20,7 +20,7 @@ static size_t width_of(size_t joints, size_t tendons) {
 
 static size_t state_count(size_t joints, size_t tendons, effect_place place) {
   (void)place;
-  return TIMES + KEPT + (1 + KEPT) * width_of(joints, tendons);
+  return TIMES + KEPT + KEPT * width_of(joints, tendons);
 }
 
 /* The rows that are late. */
@@ -46,8 +46,8 @@ static size_t whole_number(double value, size_t largest) {
 /* The two kept samples between which a time lies. */
 typedef struct between {
   size_t older, newer;
-  double weight, inverse_length; /* of the newer; 1/s, 0 where it lies outside */
-  int newest;                    /* the newer one is the present sample */
+  double weight; /* of the newer */
+  int newest;    /* the newer one is the present sample */
 } between;
 
 static between samples_around(const double* times, size_t newest, size_t count, double wanted) {
@@ -56,13 +56,12 @@ static between samples_around(const double* times, size_t newest, size_t count, 
     const size_t older = (newest + KEPT - back) % KEPT;
     if (times[older] <= wanted) {
       const double length = times[newer] - times[older];
-      const int apart = length > 1e-300; /* so that 1/length is finite */
-      return (between){older, newer, apart ? (wanted - times[older]) / length : 1.0, apart ? 1.0 / length : 0.0,
-                       newer == newest};
+      const int apart = length > 1e-300; /* so that the weight is finite */
+      return (between){older, newer, apart ? (wanted - times[older]) / length : 1.0, newer == newest};
     }
     newer = older;
   }
-  return (between){newer, newer, 1.0, 0.0, newer == newest};
+  return (between){newer, newer, 1.0, newer == newest};
 }
 
 static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
@@ -78,7 +77,7 @@ static void signal(effect_place place, const double* values, effect_signals* sig
   const size_t count_before = begins ? 0 : whole_number(before[COUNT], KEPT);
   const size_t newest = count_before ? (whole_number(before[NEWEST], KEPT - 1) + 1) % KEPT : 0;
   const size_t count = count_before < KEPT ? count_before + 1 : KEPT;
-  double *slopes = after + TIMES + KEPT, *kept = slopes + width, *now = kept + newest * width;
+  double *kept = after + TIMES + KEPT, *now = kept + newest * width;
   const late_rows rows = rows_of(forces, signals);
   after[NEWEST] = (double)newest;
   after[COUNT] = (double)count;
@@ -95,24 +94,6 @@ static void signal(effect_place place, const double* values, effect_signals* sig
     for (size_t i = 0; i < rows.count[r]; ++i) {
       const double older = kept[b.older * width + at + i], newer = kept[b.newer * width + at + i];
       rows.row[r][i] = newer + (1.0 - b.weight) * (older - newer);
-      slopes[at + i] = (forces ? 1.0 : -1.0) * (newer - older) * b.inverse_length;
-    }
-  }
-}
-
-static void signal_slope(effect_place place, const double* values, uint32_t k, const double* memory,
-                         effect_signals* derivative) {
-  (void)place;
-  (void)values; /* they may have changed since the sample */
-  (void)k;
-  if (derivative->late) {
-    return;
-  }
-  const double* slopes = memory + TIMES + KEPT;
-  const late_rows rows = rows_of(memory[FORCES] != 0.0, derivative);
-  for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
-    for (size_t i = 0; i < rows.count[r]; ++i) {
-      rows.row[r][i] += slopes[at + i];
     }
   }
 }
@@ -132,6 +113,5 @@ static void signal_pass(effect_place place, const double* values, const double* 
 }
 
 const effect_type effect_time_delay = {
-    TIME_DELAY_FACTS, .kind = EFFECT_SIGNAL,        .state_count = state_count,
-    .signal = signal, .signal_slope = signal_slope, .signal_pass = signal_pass,
+    TIME_DELAY_FACTS, .kind = EFFECT_SIGNAL, .state_count = state_count, .signal = signal, .signal_pass = signal_pass,
 };

@@ -17,20 +17,6 @@ HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
   return quad_greater(remembers, quad_set(0.5));
 }
 
-/* what the cord beyond has stretched adds to the travel of every place */
-HOT_INLINE void add_stretch(tendonfmu_finger* f) {
-  const size_t lanes = f->tendon_lanes;
-  const quad compliance = quad_set(f->memory.compliance);
-  for (size_t i = 0; i < lanes; i += 4) {
-    quad beyond = quad_set(0.0);
-    for (size_t j = f->joints; j-- > 0;) {
-      const size_t at = j * lanes + i;
-      quad_store(f->scratch.turning + at, quad_add(quad_load(f->scratch.travelled + at), quad_mul(compliance, beyond)));
-      beyond = quad_add(beyond, quad_load(f->remembered.tension_change + at));
-    }
-  }
-}
-
 /* The travel of every place in this sample, and what relaxation makes of it; needs the kinematics. */
 HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
   const finger_scratch* s = &f->scratch;
@@ -44,9 +30,6 @@ HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
     quad_store(s->own_limit + j, quad_set(0.0));
   }
   f->memory.stretch = first ? 0.0 : f->memory.compliance;
-  if (f->memory.stretch > 0.0) {
-    add_stretch(f);
-  }
   if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
     find_decay(f, first ? 0.0 : step);
   }
@@ -57,7 +40,7 @@ typedef struct places {
   size_t slot, at; /* at: in rows of edges and pulleys */
   quad limit;      /* lim */
   quad turned;     /* c0 */
-  quad compliance; /* 1/k_c; 0 at joints */
+  quad compliance; /* S/k_c; 0 at joints */
 } places;
 
 HOT_INLINE quad limit_of(quad friction) {
@@ -181,9 +164,10 @@ HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, qua
   places p = {.slot = slot,
               .at = at,
               .limit = quad_mul(acting, limit_of(magnitude)),
-              .turned = quad_load((stretches ? f->scratch.turning : f->scratch.travelled) + slot),
-              .compliance = quad_set(f->memory.stretch)};
+              .turned = quad_load(f->scratch.travelled + slot),
+              .compliance = quad_set(0.0)};
   if (stretches) {
+    p.compliance = quad_mul(quad_load(f->memory.sections + slot), quad_set(f->memory.stretch));
     const quad change = quad_sub(before, quad_load(f->remembered.tension + at));
     p.turned = quad_add(p.turned, quad_mul(change, p.compliance));
   }
@@ -205,10 +189,6 @@ HOT_INLINE quad torque_of_memory(tendonfmu_finger* f, size_t joint, quad limit) 
 HOT_INLINE void keep_tension(const tendonfmu_finger* f, size_t slot, size_t row, quad force) {
   const size_t at = row * f->slots + slot;
   if (f->memory.compliance > 0.0) {
-    if (row == EDGES) {
-      const quad change = quad_sub(force, quad_load(f->remembered.tension + at));
-      quad_store(f->scratch.tension_change + slot, f->scratch.sample.first ? quad_set(0.0) : change);
-    }
     quad_store(f->scratch.tension + at, force);
   }
 }
@@ -223,6 +203,5 @@ HOT_INLINE void remember_elements(tendonfmu_finger* f) {
   memcpy(to->by_limit, from->by_limit, 2 * slots * sizeof(double));
   if (f->memory.compliance > 0.0) {
     memcpy(to->tension, from->tension, 2 * slots * sizeof(double));
-    memcpy(to->tension_change, from->tension_change, slots * sizeof(double));
   }
 }

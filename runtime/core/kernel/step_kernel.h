@@ -371,12 +371,10 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   }
   const double velocity_gain = find_kinematics(f, time, step);
   if (f->shape.extension_count) {
-    follow_signals(f, step, velocity_gain);
     if (f->memory.elements) {
       turn_places(f, step, first);
     }
     advance_extensions(f, time, step);
-    follow_memories(f);
   }
   find_grips(f);
   speed_thresholds(f, first);
