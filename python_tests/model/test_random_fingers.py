@@ -64,7 +64,7 @@ CAMPAIGNS = {
         range(100, 136),
         range(100, 136, 2),
         {
-            "gate_open", "gate_held", "gate_pushed", "hysteresis_keeps_moving", "hysteresis_stays_stuck",
+            "hysteresis_keeps_moving", "hysteresis_stays_stuck",
             "entry_load_taken_out", "exit_with_absorption", "exit_unabsorbed", "uncertain_joint", "certain_joint",
             "innovation_alone", "cusum_alone", "residual_alone", "evidence_without_bound", "evidence_emptied",
             "evidence_fastest", "evidence_full", "release_ratio_holds", "held", "update_in_contact", "start_turned",
@@ -77,8 +77,8 @@ CAMPAIGNS = {
         range(600, 640),
         range(602, 640, 3),
         {
-            "friction_drift", "stribeck", "element_slips", "element_holds", "one_element_slips", "gate_open",
-            "gate_held", "gate_pushed", "progressive_pull", "progressive_push", "inside_the_play",
+            "friction_drift", "stribeck", "element_slips", "element_holds", "one_element_slips",
+            "progressive_pull", "progressive_push", "inside_the_play",
             "play_carried_along", "before_the_oldest", "delayed_forces", "delayed_tendon_position",
             "delayed_joint_position",
         },

@@ -91,12 +91,11 @@ def test_descriptions_for_estimating_and_back() -> None:
     given = {
         "name": "x",
         "velocity_filter_cutoff": 30.0,
-        "position_filter": {"noise": [1e-4]},
         "bias": {"drift_variance": 1e-6, "noise_std": 0.004, "initial_torque": [0.0]},
     }
     kept = dict(given)
     estimating = Signals(20.0, 4).description(given)
-    assert estimating["velocity_filter_cutoff"] == 0.0 and "position_filter" not in estimating
+    assert estimating["velocity_filter_cutoff"] == 0.0
     # as much is learned of the bias in a second as from all samples
     assert estimating["bias"]["noise_std"] == pytest.approx(0.002) and estimating["bias"]["drift_variance"] == 1e-6
     assert given == kept, "what was given is not changed"

@@ -20,7 +20,6 @@ from oracle_detection import Detector, direction_above
 from oracle_elements import Elements
 from oracle_extensions import Extensions
 from oracle_finger import Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
-from oracle_position_filter import read_position_filter
 from oracle_sensors import SensorWatch, Watch
 from oracle_start import StartFriction, gain_of
 
@@ -52,7 +51,6 @@ class FingerOracle:
         self.samples = 0
         self.time = math.nan
         self.q, self.v, self.b_eff, self.P = (np.zeros(self.n) for _ in range(4))
-        self.travel: Array | None = None  # of the joints within the sample, rad, by the position filter
         self.absorbed = 0.0  # Λ
         self.last = Step()
         # of a guided run (oracle_guided.py): N·m known from elsewhere, and whether the bias begins with this sample
@@ -86,7 +84,6 @@ class FingerOracle:
     def _read_settings(self, description: Mapping[str, Any]) -> None:
         bias = given(description, "bias", {})
         self.cutoff = float(given(description, "velocity_filter_cutoff", 20.0))
-        self.position_filter = read_position_filter(description, self.branches)
         self.drift_variance = float(given(bias, "drift_variance", 1e-6))
         self.noise_std = float(given(bias, "noise_std", 0.01))
         self.noise_std_per_force = float(given(bias, "noise_std_per_force", 0.0))
@@ -119,7 +116,7 @@ class FingerOracle:
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first, out)
         x_dot = tendon_velocity(self.R, v)
-        travel = v * dt if self.travel is None else self.travel
+        travel = v * dt if self.source == 3 else q - (q if first else self.q + self.shift)
         self.travelled = travel, tendon_velocity(self.R, travel)
         self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, self.elements, out)
         self.elements.turn(self.travelled, dt, first)
@@ -217,10 +214,6 @@ class FingerOracle:
         q = self.extensions.play(q, first)
         if self.source == 3:
             return q, np.array(inputs["joint_velocity"], dtype=float)
-        if self.position_filter is not None:
-            self.position_filter.shift(self.shift)
-            v, self.travel = self.position_filter.take(q, dt, first, out)
-            return q, v
         if first:
             return q, np.zeros(self.n)
         raw = (q - (self.q + self.shift)) / dt

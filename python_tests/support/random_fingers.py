@@ -382,17 +382,6 @@ def random_extended(seed: int, finger: Description) -> Description:
     return finger | (random_axes(rng, joints) if rng.random() < 0.3 else {})
 
 
-def random_position_filter(seed: int, finger: Description) -> Description:
-    """The finger, every third one with a `position_filter`."""
-    rng = np.random.default_rng([seed, 8])
-    if rng.random() > 0.35:
-        return finger
-    found: Description = {"noise": (10.0 ** rng.uniform(-5.0, -3.0, len(finger["joints"]))).tolist()}
-    if rng.random() < 0.8:
-        found["jerk_density"] = float(10.0 ** rng.uniform(-1.0, 5.0))
-    return finger | {"position_filter": found}
-
-
 def random_case(
     seed: int, samples: int = SAMPLES, detection: bool = False, extensions: bool = False
 ) -> tuple[Description, Recording]:
@@ -406,8 +395,6 @@ def random_case(
         description = random_detection(seed, description)
     if extensions:
         description = random_extended(seed, description)
-    if detection or extensions:
-        description = random_position_filter(seed, description)
     recording = random_recording(description, seed, samples)
     if rng.random() < 0.3:
         R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])

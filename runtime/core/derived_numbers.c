@@ -101,15 +101,6 @@ static void derive_joint(derivation* d, const model_item* item) {
   }
 }
 
-/* lanes without a joint have noise too, so that their variances stay finite */
-static void derive_position_noise(derivation* d, const model_item* item) {
-  double* to = d->finger->derived.position_variance;
-  for (size_t j = 0; j < d->finger->joint_lanes; ++j) {
-    const double noise = j < item->count ? d->values[item->first + j] : 1.0;
-    to[j] = noise * noise;
-  }
-}
-
 static void derive_finger(derivation* d, const model_item* item) {
   derived_numbers* to = &d->finger->derived;
   finger_settings* settings = &to->settings;
@@ -133,8 +124,6 @@ static void derive_finger(derivation* d, const model_item* item) {
     case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
     case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
     case ITEM_HYSTERESIS: settings->hysteresis = values[0]; break;
-    case ITEM_POSITION_NOISE: derive_position_noise(d, item); break;
-    case ITEM_JERK_DENSITY: settings->jerk_density = values[0]; break;
     default: break; /* extensions read their parameters where they are */
   }
 }
@@ -229,7 +218,7 @@ static int derive_item(void* context, const model_item* item) {
     derive_joint(d, item);
   } else if (item->kind <= ITEM_EDGE_FRICTION) {
     derive_tendon(d, item);
-  } else if (item->kind <= ITEM_JERK_DENSITY || item->kind >= ITEM_EXTENSION) {
+  } else if (item->kind < ITEM_INNOVATION_TIME || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
   } else if (item->kind >= ITEM_FAULT_HOLD_TIME) {
     derive_sensors(d, item);
@@ -310,7 +299,6 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
                                                .has_start_share = (options & MODEL_HAS_START_SHARE) != 0,
                                                .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
-                                               .filters_position = (options & MODEL_HAS_POSITION_FILTER) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
                                                .bounds_presliding = (options & MODEL_BOUNDS_PRESLIDING) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,

@@ -65,18 +65,12 @@ static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* d
 /* angle and velocity along a direction of the signals */
 static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
   const finger_state* s = &l->finger->remembered;
-  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES, filtered = filters_position(l->finger);
+  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
   for (size_t j = 0; j < l->finger->joints; ++j) {
-    const double gain =
-        filtered ? filter_memory(l->finger, s->filter, FILTER_GAIN_1)[j] : s->scalar[STATE_VELOCITY_GAIN];
-    const double speed = given ? d->velocity[j] : gain * d->angle[j];
+    const double speed = given ? d->velocity[j] : s->scalar[STATE_VELOCITY_GAIN] * d->angle[j];
     l->angle[j] = (dual){s->angle[j], d->angle[j]};
     l->speed[j] = (dual){s->speed[j], speed};
-    l->motion[j] = s->scalar[STATE_STEP] * speed;
-    if (filtered) {
-      const double carries = filter_memory(l->finger, s->filter, FILTER_CARRIES)[j];
-      l->motion[j] = carries * filter_memory(l->finger, s->filter, FILTER_GAIN_0)[j] * d->angle[j];
-    }
+    l->motion[j] = given ? s->scalar[STATE_STEP] * speed : d->angle[j];
   }
 }
 

@@ -64,7 +64,6 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->load_law = take_numbers(c, joints * LAW_NUMBERS);
   d->cover_stiffness = take_numbers(c, joints);
   d->cover_rest = take_numbers(c, joints);
-  d->position_variance = take_numbers(c, f->shape.options & MODEL_HAS_POSITION_FILTER ? joints : 0);
   d->contact_threshold = take_numbers(c, joints);
   d->contact_per_force = take_numbers(c, joints);
   d->initial_torque = take_numbers(c, joints);
@@ -162,7 +161,6 @@ const state_row state_rows[] = {
     {AT(start_left), ROW_OF_SLOTS, 1, MODEL_HAS_START_SHARE, UP_TO(1.0), 0},
     {AT(unlearned), ROW_OF_JOINTS, 1, MODEL_HAS_START_SHARE, UP_TO(LARGEST_SUM), 0},
     {AT(part), ROW_OF_PARTS, 1, MODEL_HAS_UNCERTAINTY, ANYTHING, 1},
-    {AT(filter), ROW_OF_JOINTS, FILTER_ROWS, MODEL_HAS_POSITION_FILTER, ANYTHING, 1},
     {AT(drift_of_late), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
     {AT(drift_quick), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
     {AT(drift_slow), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
@@ -241,9 +239,6 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
     *slot_rows[i] = take_numbers(c, f->slots);
   }
   s->part = take_numbers(c, matrix + 3 * f->joint_lanes);
-  const int filtered = (f->shape.options & MODEL_HAS_POSITION_FILTER) != 0;
-  s->filter = take_numbers(c, filtered ? FILTER_ROWS * f->joint_lanes : 0);
-  s->travel = take_numbers(c, filtered ? f->slots : 0);
   const int starts = (f->shape.options & MODEL_HAS_START_SHARE) != 0;
   s->edge_turned = take_numbers(c, starts ? f->slots : 0);
   s->pulley_turned = take_numbers(c, starts ? f->slots : 0);

@@ -35,8 +35,6 @@ typedef struct finger_settings {
   double start_share; /* of friction as it stood before the first sample */
   int has_initial_torque, has_tendon_zero;
   double hysteresis;
-  int filters_position;
-  double jerk_density; /* rad²/s⁵ */
   int forgets_by_absorption, remembers_entry_load;
   /* the detector */
   int bounds_friction, bounds_presliding, knows_uncertainty, uses_innovation;
@@ -113,13 +111,12 @@ typedef struct derived_numbers {
   uint32_t* edge_record;   /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
   double* joint_law;       /* [N × LAW_NUMBERS] T_jv0 */
   double* load_law;        /* [N × LAW_NUMBERS] T_jvf */
-  double *cover_stiffness, *cover_rest;                /* [N] */
-  double *contact_threshold, *contact_per_force;       /* [N] */
-  double* initial_torque;                              /* [N] */
-  double* position_variance;                           /* [N] rad², with a position filter only; 1 in spare lanes */
-  double *innovation_threshold, *innovation_per_force; /* [N] */
-  double *deviation, *deviation_per_force;             /* [N] */
-  double *drift_threshold, *drift_per_force;           /* [N] with contact.drift only */
+  double *cover_stiffness, *cover_rest;                                   /* [N] */
+  double *contact_threshold, *contact_per_force;                          /* [N] */
+  double* initial_torque;                                                 /* [N] */
+  double *innovation_threshold, *innovation_per_force;                    /* [N] */
+  double *deviation, *deviation_per_force;                                /* [N] */
+  double *drift_threshold, *drift_per_force;                              /* [N] with contact.drift only */
   double *rest_threshold, *rest_per_force, *rest_creep, *rest_innovation; /* [N] with contact.rest only */
   double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
   link_geometry links; /* arrays NULL without links */
@@ -148,26 +145,6 @@ enum {
   STATE_STEP,            /* Δt of the last sample, s; 0 of the first */
   STATE_SCALARS = 20     /* a multiple of 4: the rows stay aligned */
 };
-
-#define LONGEST_FILTER_STEP 1.0 /* s; after a longer one the position filter begins anew */
-
-/* Rows of joints that the position filter remembers, beside the velocity. */
-typedef enum filter_row_kind {
-  FILTER_ANGLE,        /* x, rad */
-  FILTER_ACCELERATION, /* a, rad/s² */
-  FILTER_HELD_ANGLE,   /* z behind the gate, rad */
-  FILTER_P00,          /* covariance of x, v, a */
-  FILTER_P01,
-  FILTER_P02,
-  FILTER_P11,
-  FILTER_P12,
-  FILTER_P22,
-  FILTER_GAIN_0, /* ∂x/∂q, ∂v/∂q, ∂a/∂q of the last sample; 0 of the first */
-  FILTER_GAIN_1,
-  FILTER_GAIN_2,
-  FILTER_CARRIES, /* ∂z/∂x of the last sample: 1 or 0 */
-  FILTER_ROWS
-} filter_row_kind;
 
 /* Rows of tendons that sensor_fault remembers. */
 typedef enum sensor_row_kind {
@@ -219,8 +196,7 @@ typedef struct finger_state {
       *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
   double *start_left, *unlearned; /* [n × M + N] share of how an effect stood at the start that motion has not turned
                                      over, [N] V, N·m; with start_share only */
-  double* part;   /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
-  double* filter; /* [FILTER_ROWS × N] with a position filter only */
+  double* part; /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
   /* [N] N·m, with contact.drift only: u, p, s, what the bias has learned since the start, d */
   double *drift_of_late, *drift_quick, *drift_slow, *learned, *drift;
   /* with contact.rest only */
@@ -303,8 +279,6 @@ typedef struct finger_scratch {
   double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
   double* residual_variance;             /* [N] S, (N·m)²; of a guided sample only */
   double* part;                          /* as in the state */
-  double* filter;                        /* as in the state, after this sample */
-  double* travel;                        /* [n × M + N] of what slides, by the position filter: m, rad; with it only */
   double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
   double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
@@ -361,15 +335,6 @@ struct tendonfmu_finger {
 /* 1 while there is anything to learn of how friction stood at the start */
 static inline int start_is_open(const tendonfmu_finger* finger) {
   return finger->remembered.scalar[STATE_START_OPEN] != 0.0;
-}
-
-/* 1 where the velocity comes from the position filter; then its row of the filter in memory */
-static inline int filters_position(const tendonfmu_finger* finger) {
-  return finger->derived.settings.filters_position &&
-         (int)finger->remembered.scalar[STATE_SOURCE] != TENDONFMU_JOINT_VELOCITIES;
-}
-static inline const double* filter_memory(const tendonfmu_finger* finger, const double* filter, filter_row_kind row) {
-  return filter + (size_t)row * finger->joint_lanes;
 }
 
 /* Row of the sensors in memory. */

@@ -18,13 +18,12 @@ enum {
   MODEL_HAS_RELEASE = 1 << 14,
   MODEL_HAS_RELEASE_TIME = 1 << 15,
   MODEL_HAS_LINKS = 1 << 16,
-  MODEL_HAS_POSITION_FILTER = 1 << 17,
+  MODEL_HAS_TENDON_ZERO = 1 << 17, /* of any tendon; then every one has it */
   MODEL_HAS_REST = 1 << 18,
   MODEL_HAS_REST_INNOVATION = 1 << 19, /* beside the bit before */
   MODEL_HAS_START_SHARE = 1 << 20,
   MODEL_HAS_DRIFT = 1 << 21,
   MODEL_BOUNDS_PRESLIDING = 1 << 22, /* beside MODEL_HAS_FRICTION_BOUND */
   MODEL_HAS_SENSOR_FAULT = 1 << 23,
-  MODEL_HAS_TENDON_ZERO = 1 << 24, /* of any tendon; then every one has it */
-  MODEL_OPTION_BITS = (1 << 25) - 1
+  MODEL_OPTION_BITS = (1 << 24) - 1
 };

@@ -110,23 +110,6 @@ static const unsigned char* saved_row(const tendonfmu_finger* f, const unsigned 
   return state + 8 * (size_t)(row - f->state);
 }
 
-static int filter_is_sound(const tendonfmu_finger* f, const unsigned char* state) {
-  const size_t n = f->joint_lanes;
-  for (size_t k = 0; f->derived.settings.filters_position && k < FILTER_ROWS; ++k) {
-    const int variance = k == FILTER_P00 || k == FILTER_P11 || k == FILTER_P22, flag = k == FILTER_CARRIES;
-    const int estimate = k <= FILTER_HELD_ANGLE; /* the rest is tracked in spare lanes, too */
-    const state_row row = {.lanes = ROW_OF_JOINTS,
-                           .low = variance || flag ? 0.0 : -DBL_MAX,
-                           .high = flag ? 1.0 : DBL_MAX,
-                           .whole = flag,
-                           .spare_lanes = !estimate};
-    if (!row_is_sound(f, saved_row(f, state, f->remembered.filter + k * n), &row, n)) {
-      return 0;
-    }
-  }
-  return 1;
-}
-
 static int sensors_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const size_t m = f->tendon_lanes;
   for (size_t k = 0; f->derived.settings.watches_sensors && k < SENSOR_ROWS; ++k) {
@@ -172,8 +155,8 @@ static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_l
     return refuse(message, "damaged saved state: its checksum does not match");
   }
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
-  if (!scalars_are_sound(f, state) || !rows_are_sound(f, state) || !filter_is_sound(f, state) ||
-      !sensors_are_sound(f, state) || !rests_are_sound(f, state)) {
+  if (!scalars_are_sound(f, state) || !rows_are_sound(f, state) || !sensors_are_sound(f, state) ||
+      !rests_are_sound(f, state)) {
     return refuse(message, "damaged saved state: a number is out of its range");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);

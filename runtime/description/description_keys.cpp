@@ -10,13 +10,12 @@ namespace tendonfmu {
 
 const std::vector<std::string>& keys_of(const std::string& object) {
   static const std::map<std::string, std::vector<std::string>> keys = {
-    {"", {"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "position_filter", "bias", "contact", "extensions", "links", "tip", "sensor_fault", "estimated"}},
+    {"", {"format", "name", "joints", "tendons", "velocity_threshold", "velocity_filter_cutoff", "bias", "contact", "extensions", "links", "tip", "sensor_fault", "estimated"}},
     {"joints", {"name", "cover", "friction", "load_friction"}},
     {"joints.cover", {"stiffness", "rest_angle"}},
     {"tendons", {"name", "stiffness", "moment_arms", "zero", "pulley_friction", "edge_friction", "bidirectional"}},
     {"tendons.edge_friction", {"angles"}},
     {"velocity_threshold", {"tendon", "joint", "hysteresis"}},
-    {"position_filter", {"noise", "jerk_density"}},
     {"bias", {"drift_variance", "noise_std", "noise_std_per_force", "initial_variance", "forget_rate", "initial_torque", "noise_time", "start_share", "forgetting", "entry_load"}},
     {"contact", {"threshold", "threshold_per_force", "method", "innovation", "friction_bound", "uncertainty", "uncertainty_level", "deviation", "deviation_per_force", "release_ratio", "hold_time", "release_time", "drift", "rest"}},
     {"contact.innovation", {"time", "threshold", "threshold_per_force", "evidence_time"}},
@@ -49,7 +48,6 @@ std::vector<number_key> numbers_of(const std::string& object) {
     {"tendons", {"moment_arms", true, true, "m", 0}},
     {"tendons", {"zero", false, false, "m", MODEL_HAS_TENDON_ZERO}},
     {"velocity_threshold", {"hysteresis", false, false, "1", MODEL_HAS_HYSTERESIS}},
-    {"position_filter", {"noise", true, true, "rad", 0}},
     {"bias", {"initial_variance", false, false, "N2.m2", MODEL_HAS_INITIAL_VARIANCE}},
     {"bias", {"initial_torque", true, false, "N.m", MODEL_HAS_INITIAL_TORQUE}},
     {"bias", {"noise_time", false, false, "s", MODEL_HAS_NOISE_TIME}},

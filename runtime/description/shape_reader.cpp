@@ -304,6 +304,11 @@ void check_estimated(const json_node& estimated) {
 }
 
 void check_top(const json_node& document) {
+  const json_node dropped = document.member("position_filter");
+  if (!dropped.absent()) {
+    throw description_error(dropped.path() +
+                            ": no longer a key, presliding needs none; leave it out, or calibrate again");
+  }
   document.expect_keys(keys_of(""));
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {
@@ -339,8 +344,6 @@ finger_shape read_shape(const json_node& document) {
       read_bias_options(document.member("bias"), finger.shape.joints) |
       read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
       given_options(document.member("velocity_threshold"), "velocity_threshold") |
-      read_object(document.member("position_filter"), "position_filter", finger.shape.joints,
-                  MODEL_HAS_POSITION_FILTER) |
       read_links(document, finger.shape.joints) |
       read_object(document.member("sensor_fault"), "sensor_fault", finger.shape.joints, MODEL_HAS_SENSOR_FAULT);
   read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);

@@ -13,7 +13,6 @@ namespace {
 
 TEST(Refusal, NamesThePlaceOfAFaultWhereverItIs) {
   json finger = small_finger();
-  finger["position_filter"] = {{"noise", {1e-4, 2e-4}}, {"jerk_density", 1.0}};
   const std::vector<std::string> places = document_faults::places(finger);
   ASSERT_GT(places.size(), 70u);
   document_faults::expect_refused_everywhere(finger, places, [](const json& faulty) {
@@ -107,14 +106,6 @@ TEST(Refusal, SaysWhatIsExpected) {
       {"/tendons/0/stiffness", "1e300", " = 1e+300: expected above 0 and at most 1e+12 N/m"},
       {"/tendons/0/edge_friction/1/angles", "[0.5, 0.5]", "[2] = 0.5: expected above the angle before it, 0.5 rad"},
       {"/tendons/0/edge_friction/1/angles", "[0.5, -0.5]", "[2] = -0.5: expected above the angle before it, 0.5 rad"},
-      {"/position_filter", "{}", ".noise: missing; expected a list of 2 numbers in rad, one per joint"},
-      {"/position_filter", R"({"noise": [1e-4]})",
-       ".noise has 1 element: expected a list of 2 numbers in rad, one per joint"},
-      {"/position_filter", R"({"noise": [1e-4, 0]})", ".noise[2] = 0: expected 1e-06 to 1000 rad"},
-      {"/position_filter", R"({"noise": [1e-4, 1e-4], "jerk_density": 0})",
-       ".jerk_density = 0: expected above 0 and at most 1e+09 rad2/s5"},
-      {"/position_filter", R"({"noise": [1e-4, 1e-4], "jerk": 1})",
-       ".jerk: unknown key; expected one of noise, jerk_density"},
       {"/tendons/1/moment_arms", "[0.018, 0.008]", "tendons: moment_arms are not of full column rank"},
       // extensions that are there before
       {"/extensions",

@@ -85,20 +85,16 @@ TEST(Description, OptionalNumbersHaveDefaults) {
   EXPECT_FALSE(finger.has("bias.initial_torque[1]"));
   EXPECT_FALSE(finger.has("bias.noise_time"));
   EXPECT_FALSE(finger.has("joints[1].cover.stiffness"));
-  EXPECT_FALSE(finger.has("position_filter.jerk_density"));
   // stiffness, moment arm, 3 thresholds of velocity and filter, 4 of the bias, 2 of contact
   EXPECT_EQ(tendonfmu_parameter_count(finger.handle()), 11u);
   json more = small_finger();
   more["joints"][0]["cover"].erase("rest_angle");
   more["joints"][0]["friction"].erase("viscous");
   more["tendons"][0]["edge_friction"][0]["negative"].erase("viscous");
-  more["position_filter"] = {{"noise", {1e-4, 2e-4}}};
   Described described(more);
   EXPECT_EQ(described["joints[1].cover.rest_angle"], 0.0);
   EXPECT_EQ(described["joints[1].friction.viscous"], 0.0);
   EXPECT_EQ(described["tendons[1].edge_friction[1].negative.viscous"], 0.0);
-  EXPECT_EQ(described["position_filter.noise[2]"], 2e-4);
-  EXPECT_EQ(described["position_filter.jerk_density"], 1.0);
 }
 
 // Both are the same finger: what is null, left out, or written in another way.
@@ -126,8 +122,7 @@ TEST(Description, MayBeWrittenInSeveralWays) {
                                "/bias/initial_torque",
                                "/bias/noise_time",
                                "/contact/threshold_per_force",
-                               "/extensions",
-                               "/position_filter"}) {
+                               "/extensions"}) {
     const Reading absent = read(without(optional)), null = read(with(optional, nullptr));
     EXPECT_EQ(absent.status, TENDONFMU_OK) << optional << ": " << absent.message;
     EXPECT_EQ(null.image, absent.image) << optional;

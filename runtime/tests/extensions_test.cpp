@@ -202,35 +202,4 @@ TEST(Derivative, OfWhatNeverSticksIsThatOfItsLaw) {
   }
 }
 
-// --- position filter ------------------------------------------------------------------------------------------------
-
-// no time step and no angle makes it refuse what the core takes, or leaves its variances below 0
-TEST(PositionFilter, TakesAnySteps) {
-  for (const char* numbers :
-       {R"("noise": [1e-6, 1e-6], "jerk_density": 1e-9)", R"("noise": [1e-6, 1e-6], "jerk_density": 1e9)",
-        R"("noise": [1000, 1000], "jerk_density": 1e9)"}) {
-    SCOPED_TRACE(numbers);
-    Finger finger(image_with(R"({"effect": "presliding", "joint": 1, "displacement": 0.001})",
-                             std::string(R"("position_filter": {)") + numbers + "},"));
-    tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_POSITIONS);
-    std::mt19937 random(11);
-    std::uniform_real_distribution<double> exponent(-14.0, 9.0), angle(-1.0, 1.0);
-    const double force[] = {20.0, 20.0, 5.0};
-    double time = 0.0;
-    for (int k = 0; k < 5000; ++k) {
-      time += std::pow(10.0, k % 500 < 250 ? exponent(random) : -3.0);
-      const double angles[] = {(k % 100 == 7 ? 1e12 : 1.0) * angle(random), angle(random)};
-      ASSERT_EQ(finger.take(time, {force, nullptr, angles, nullptr}), TENDONFMU_OK) << tendonfmu_last_error(finger);
-      double speed[2] = {};
-      tendonfmu_outputs outputs = {};
-      outputs.joint_speed = speed;
-      tendonfmu_get_outputs(finger, &outputs);
-      EXPECT_TRUE(std::isfinite(speed[0]) && std::isfinite(speed[1]));
-      for (const filter_row_kind kind : {FILTER_P00, FILTER_P11, FILTER_P22}) {
-        EXPECT_GE(filter_memory(finger.handle, finger.handle->remembered.filter, kind)[0], 0.0);
-      }
-    }
-  }
-}
-
 }  // namespace

@@ -72,7 +72,6 @@ inline std::string watched_sensors() {
 // And with a position filter and every effect of `extensions`, at every kind of place.
 inline std::string every_effect() {
   std::string text = every_key();
-  put(text, name, R"("position_filter": {"noise": [2e-4, 3e-4], "jerk_density": 1e4},)");
   put(text, "\"extensions\": [", R"({"effect": "gravity", "joint": 2, "sine": 0.02, "cosine": -0.03},
     {"effect": "inertia", "joint": 1, "inertia": 1e-4}, {"effect": "joint_coupling", "joint": 1, "stiffness": 0.05},
     {"effect": "preload_friction", "tendon": 1, "coulomb": 0.4},

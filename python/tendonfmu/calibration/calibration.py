@@ -38,9 +38,9 @@ from tendonfmu.calibration.report import (
 )
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
-from tendonfmu.diagnosis import Diagnosis, FitSettings, diagnose, squared_residual
+from tendonfmu.diagnosis import Diagnosis, diagnose
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import check_given_once, check_unseen, described
+from tendonfmu.estimate import check_given_once, check_unseen, described, unseen_square
 from tendonfmu.files import finite, path_of, percent, write_text
 from tendonfmu.model import Finger, description_text, read_finger
 from tendonfmu.options import CalibrateOptions, ScoreOptions
@@ -49,7 +49,6 @@ from tendonfmu.recordings import (
     FitRecording,
     Held,
     Recording,
-    Signals,
     admit,
     learn_routing,
     prepare,
@@ -353,16 +352,10 @@ class _Run:
         """Fit the extended description to all recordings, and to four fifths of them."""
         case, options = self._case, self._options
 
+        finger = described(case.finger, lacks["extended"])
+
         def fitted(recordings: Sequence[FitRecording]) -> CalibratedFit:
-            return fit_all(
-                described(case.finger, lacks["extended"]),
-                recordings,
-                Signals(**lacks["smoothing"]),
-                FitSettings(threads=options.jobs, path=case.finger.path),
-                given=case.finger.data,
-                seed=options.seed,
-                only_sliding=lacks["fits_sliding"],
-            )
+            return fit_all(finger, recordings, threads=options.jobs, seed=options.seed)
 
         whole, most = fitted(case.free), fitted(self._most())
         return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
@@ -371,8 +364,7 @@ class _Run:
         """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
         case, inner = self._case, self._most()
         most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
-        flags = [each.held_out for each in inner]
-        before, after = (squared_residual(data, inner, flags) for data in (case.finger.data, most.data))
+        before, after = (unseen_square(data, inner) for data in (case.finger.data, most.data))
         if after <= before:
             whole = self._fitted_again([each.recording for each in case.free])
             return {"finger": whole.data, "most": most.data, "warnings": list(whole.warnings)}

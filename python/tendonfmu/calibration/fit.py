@@ -15,40 +15,32 @@ import numpy as np
 
 from tendonfmu.arrays import Data
 from tendonfmu.detect import sample_seconds
-from tendonfmu.diagnosis import (
-    Event,
-    FitSettings,
-    estimation_recordings,
-    events_of,
-    learn_numbers,
-    predicted_of,
-    series_of,
-    settled,
-    squared_residual,
-    with_known,
-    without_blocks,
-    without_stuck,
-)
+from tendonfmu.diagnosis import Event, Samples, events_of, without_events
 from tendonfmu.estimate import (
     FIT_REPORT,
+    Choice,
     FitWarning,
     FrictionFit,
+    Watch,
+    build_structure,
     evaluate,
+    learn_batch,
     parameter_uncertainty,
     read_previous_fit,
+    settings_of,
     unknowns,
+    with_known_numbers,
     with_previous_values,
     with_uncertainty,
     with_values,
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
-from tendonfmu.recordings import FitRecording, Recording, Signals, at_rows, make_grid
+from tendonfmu.recordings import FitRecording, Recording, at_rows
 
 DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
 JUDGED = 45.0  # s, in all, to judge it on
 SHORTEST = 15.0  # s, least length of a stretch
-CLEARLY_LESS = 0.9  # of the error of a fit to all samples, which one to sliding samples must stay below
 
 
 @dataclass(frozen=True)
@@ -60,52 +52,21 @@ class CalibratedFit:
     warnings: tuple[str, ...]
 
 
-def fit_all(
-    finger: Finger,
-    recordings: Sequence[FitRecording],
-    signals: Signals,
-    settings: FitSettings,
-    *,
-    given: Data,
-    seed: int,
-    only_sliding: bool = False,
-) -> CalibratedFit:
-    """Fit a diagnosed finger to all recordings of free motion, or only where everything slides if that is better.
-
-    Contact is detected in stuck samples, too, so these count unless they mislead clearly. Raises InputError.
-    """
-    data = signals.description(finger.data)
-    if not unknowns(data):
+def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int, seed: int) -> CalibratedFit:
+    """Fit a diagnosed finger to all recordings of free motion, less what looks like contact. Raises InputError."""
+    if not unknowns(finger.data):
         return CalibratedFit(finger.data, (), ())
-    start = replace(finger, data=data)
-    estimated = estimation_recordings(start, recordings, signals)
-    grid = make_grid(estimated)
-    events, out = events_of(data, estimated, grid, seed)
-
-    def fitted(chosen: Sequence[FitRecording]) -> CalibratedFit:
-        kept = [without_blocks(recording, k, grid, out) for k, recording in enumerate(chosen)]
-        clean = predicted_of(data, kept, grid, series_of(data, kept, grid, out))
-        structure, learned = learn_numbers(data, clean, settings, given=signals.description(given))
-        result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-        result = replace(result, data=with_known(result.data, clean, settings))
-        online = replace(result, data=signals.restored(result.data, finger.data))
-        if np.isfinite(learned.covariance).all():
-            judged = [evaluate(data, result.data, recording) for recording in kept]
-            directions, _ = parameter_uncertainty(structure, learned, result.data, judged)
-            level = (finger.data["contact"] or {}).get("uncertainty_level")
-            online = with_uncertainty(online, directions, level)
-        return CalibratedFit(online.data, events, tuple(learned.warnings))
-
-    whole = fitted(estimated)
-    if not only_sliding:
-        return whole
-
-    def square(of: Data) -> float:
-        return squared_residual(of, recordings)
-
-    alone = fitted(estimation_recordings(start, without_stuck(finger, recordings, signals), signals))
-    alone = replace(alone, data=settled(alone.data, square))
-    return alone if square(alone.data) < CLEARLY_LESS**2 * square(whole.data) else whole
+    events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
+    kept = [without_events(recording, events) for recording in recordings]
+    structure = build_structure(finger, Choice())
+    learned = learn_batch(structure, kept, Watch(None), settings_of(finger.data, kept, threads), None)
+    result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
+    result = with_known_numbers(result, kept)
+    if np.isfinite(learned.covariance).all():
+        judged = [evaluate(finger.data, result.data, recording) for recording in kept]
+        directions, _ = parameter_uncertainty(structure, learned, result.data, judged)
+        result = with_uncertainty(result, directions, (finger.data["contact"] or {}).get("uncertainty_level"))
+    return CalibratedFit(result.data, events, tuple(learned.warnings))
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:

@@ -16,7 +16,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .cause import Cause, CausePlace, ChangedSize, Evidence, Sensor, Where
-    from .contact_scan import events_of
+    from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes
     from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
+    from .samples import Samples
     from .sizes import size_at
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

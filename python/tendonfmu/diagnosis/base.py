@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,10 +21,9 @@ from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended
 from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import Selection
-from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
-from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms, number_of
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
 from tendonfmu.recordings import FitRecording
 
 LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
@@ -33,7 +32,6 @@ LARGE = 0.005  # s: smaller delays compete with other causes, by their derivativ
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 POSITION = ("cover_stiffness", "cover_hardening", "gravity", "joint_coupling")  # torque that depends on angles alone
-DISTANCES = (5e-5, 5e-4)  # m, of presliding beside which a delay is scanned for
 DELAY = by_name("time_delay")
 
 
@@ -85,11 +83,14 @@ def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSe
     samples = samples.as_rests_demand(nominal.data)
     nominal = refitted(nominal, samples, settings)
     least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
-    span = span_of(given.data, recordings)
-    late = _delay(nominal.data, samples, span, least)
-    position = _position_dependent(extended_description(nominal.data, late), samples, least, least_gain)
-    start = [terms for terms in (late, *position) if terms]
+    late = _delay_of_positions(nominal.data, samples, least)
+    start = list(_position_dependent(extended_description(nominal.data, late or ()), samples, least, least_gain))
+    start += [late] if late else []
     model, memory = _with_memory(given, nominal, start, samples, settings)
+    if late is None and (late := _delay_of_torque(model, samples, least)):
+        others = _with_memory(given, nominal, [*start, late], samples, settings)
+        if others[0].cost < model.cost:
+            (model, memory), start = others, [*start, late]
     return Base(samples, least, nominal, (*start, *memory), model, settings)
 
 
@@ -125,37 +126,27 @@ def _with_memory(
 # --- delay ------------------------------------------------------------------------------------------------------------
 
 
-def _delay(data: Data, samples: Samples, span: Span, least: LeastSizes) -> tuple[Term, ...]:
-    """Return a delay of forces that is too large for its derivative; () if there is none."""
-    source = samples.recordings[0].kinematics
-    if not DELAY.places(data, source):
+def _delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) -> tuple[Term, ...]:
+    """Return a delay of forces that is too large for its derivative, beside a fitted model; () if there is none."""
+    if not DELAY.places(model.data, samples.recordings[0].kinematics):
         return ()
-    known = delay_of_positions(data, samples.recordings) if source == 1 else None
-    if known is not None:
-        return _late(known) if abs(known) >= least.least("time_delay", None, None) else ()
-    delays = _delays(span.step)
+    delays = _delays(float(np.median(np.diff(samples.recordings[0].time))))
     moved = np.stack([_late_torque(samples, delay) for delay in delays], axis=2)
-    still, best, found = int(np.argmin(np.abs(delays))), np.inf, 0.0
-    for described in _elastic(data):
-        errors = _errors(described, samples, least, moved)
-        k = int(np.argmin(errors))
-        # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
-        is_large = 0 < k < len(delays) - 1 and abs(delays[k]) >= LARGE
-        clear = is_large and errors[k] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]
-        error, delay = (errors[k], delays[k]) if clear else (errors[still], 0.0)
-        if error < best:
-            best, found = float(error), float(delay)
-    return _late(found) if found else ()
+    view = look(model.data, samples, least, (), model)
+    errors = view.grams.errors_of(view.series.target[:, :, None] + moved)
+    still, best = int(np.argmin(np.abs(delays))), int(np.argmin(errors))
+    # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
+    is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
+    clear = is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]
+    return _late(float(delays[best])) if clear else ()
 
 
-def _elastic(data: Data) -> Iterator[Data]:
-    """Yield a description as it is, and with presliding over several distances: it delays the torque of friction."""
-    yield data
-    tendon = number_of(data, "velocity_threshold.tendon")
-    if tendon > 0.0 and not memory_of(data):
-        for distance in DISTANCES:
-            row = {"effect": "presliding", "displacement": distance / tendon}
-            yield {**data, "extensions": [*(data.get("extensions") or []), row]}
+def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tuple[Term, ...] | None:
+    """Return a delay of forces that positions show; None if they do not show whether there is one."""
+    known = delay_of_positions(data, samples.recordings)
+    if known is None or not DELAY.places(data, samples.recordings[0].kinematics):
+        return None
+    return _late(known) if abs(known) >= least.least("time_delay", None, None) else ()
 
 
 def _late(delay: float) -> tuple[Term, ...]:
@@ -172,22 +163,24 @@ def _delays(step: float) -> Numbers:
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
     """Return by how many seconds forces are later than positions; None if the recordings do not show it.
 
-    With more tendons than joints, the joint-side positions x0 − f0/k agree with each other only if positions and forces
-    are of the same time.
+    With joint encoders, or more tendons than joints, the joint-side positions x0 − f0/k agree with the angles, or with
+    each other, only if positions and forces are of the same time.
     """
     arms = moment_arms(data)
-    apart = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
-    if np.linalg.matrix_rank(apart) == 0:
+    measured = all({"joint_position", "tendon_position"} <= set(each.recording.groups) for each in recordings)
+    apart = np.eye(len(arms)) - (0.0 if measured else arms @ np.linalg.pinv(arms))
+    if np.linalg.matrix_rank(apart) == 0 or "tendon_position" not in recordings[0].recording.groups:
         return None
     delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + FINE / 2, FINE)
     errors = np.zeros(len(delays))
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
     for recording in recordings:
         groups = recording.recording.groups
+        position = groups["tendon_position"] - (groups["joint_position"] @ arms.T if measured else 0.0)
         for part in recording.parts:
             time, force = recording.time[part], groups["tendon_force"][part] / stiffness
             for k, delay in enumerate(delays):
-                late = [np.interp(time - delay, time, column) for column in groups["tendon_position"][part].T]
+                late = [np.interp(time - delay, time, column) for column in position[part].T]
                 left = (np.stack(late, axis=1) - force) @ apart
                 errors[k] += float(np.sum((left - left.mean(axis=0)) ** 2))
     best = int(np.argmin(errors))
@@ -195,12 +188,6 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
         return None
     before, at, after = errors[best - 1 : best + 2]
     return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
-
-
-def _errors(data: Data, samples: Samples, least: LeastSizes, moved: Numbers) -> Numbers:
-    """Return Σ e² on held-out folds, (N·m)² [K], with the target changed by `moved` [B, n, K]."""
-    view = look(data, samples, least, ())
-    return view.grams.errors_of(view.series.target[:, :, None] + moved)
 
 
 def _late_torque(samples: Samples, delay: float) -> Numbers:

@@ -22,11 +22,9 @@ from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,
     Estimator,
-    Linearised,
     MemoryProblem,
     State,
     Structure,
-    bounded_step,
     build_structure,
     get_number,
     guess_prior,
@@ -39,10 +37,11 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.model import effects, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import MEMORY
+from tendonfmu.statistics import MEMORY, bounded
 
 MOST_STEPS = 20
 LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
+STEP = 1e-3  # of a coordinate, for derivatives
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -103,15 +102,17 @@ def fit_numbers(
     structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
     problem = _Problem(structure, samples)
     fit = problem.fit
-    state, linearised = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
-    numbers = fit.estimator.values(np.clip(fit.scale.unknowns(state.u), *fit.bounds))
+    state, columns = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
+    numbers = fit.estimator.values(
+        np.clip(fit.scale.unknowns(state.u), *(fit.scale.unknowns(end) for end in (fit.lower, fit.upper)))
+    )
     return FittedModel(
         data=with_values(structure, numbers).data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
         cost=state.cost,
         fixed=fixed,
-        slopes=problem.known(linearised),
+        slopes=problem.known(columns),
         scale=np.where(fit.scale.log, np.log(10.0), fit.scale.size),
     )
 
@@ -127,27 +128,55 @@ class _Problem:
         self.keys = [key_of(structure.start.data, name) for name in unknown_names(estimator)]
         self._unit = np.where(self.fit.scale.log, 1.0, self.fit.scale.size)  # of a coordinate
 
-    def linearised(self, state: State, known: Mapping[str, Numbers]) -> Linearised:
-        """Return the derivatives at a state; those that are known are taken as they are."""
-        rows = len(state.residual)
-        shared = {k for k, key in enumerate(self.keys) if key in known and len(known[key]) == rows}
+    def columns(self, state: State, known: Mapping[str, Numbers]) -> Numbers:
+        """Return the derivatives of the residual at a state [R, n, u]; those that are known are taken as they are."""
         columns = np.empty((*state.residual.shape, len(state.u)))
-        missing = [k for k in range(len(state.u)) if k not in shared]
-        columns[:, :, missing] = self.fit.drift.without(self.fit.columns(state.u, missing))
-        for k in shared:
-            columns[:, :, k] = known[self.keys[k]] * self._unit[k]
-        return self.fit.of_columns(state, columns)
+        for k, key in enumerate(self.keys):
+            if key in known and len(known[key]) == len(state.residual):
+                columns[:, :, k] = known[key] * self._unit[k]
+                continue
+            step = STEP if state.u[k] + STEP <= self.fit.upper[k] else -STEP
+            moved = state.u.copy()
+            moved[k] += step
+            columns[:, :, k] = (self.fit.state(moved).residual - state.residual) / step
+        return columns
 
-    def known(self, linearised: Linearised) -> dict[str, Numbers]:
-        """Return the derivatives by their keys [R, n], for another fit."""
-        return {key: linearised.columns[:, :, k] / self._unit[k] for k, key in enumerate(self.keys)}
+    def known(self, columns: Numbers) -> dict[str, Numbers]:
+        """Return derivatives by their keys [R, n], for another fit."""
+        return {key: columns[:, :, k] / self._unit[k] for k, key in enumerate(self.keys)}
 
-    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
-        """Return derivatives that agree with the last step: Broyden's update, in coordinates of their own size."""
-        step = tried.u - state.u
-        missed = tried.residual - state.residual - linearised.columns @ step
-        columns = linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
-        return self.fit.of_columns(tried, columns)
+    def step(self, state: State, columns: Numbers, damping: float) -> Numbers:
+        """Return the step [u] that minimises the damped quadratic model between bounds."""
+        fit = self.fit
+        weighted = columns * (fit.blocks / len(state.residual) / fit.variance(state.residual))[:, None]
+        matrix = np.tensordot(columns, weighted, ([0, 1], [0, 1])) + fit.known
+        score = -np.tensordot(weighted, state.residual, ([0, 1], [0, 1])) - fit.known @ (state.u - fit.mean)
+        matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
+        return np.asarray(bounded(matrix[None], score[None], fit.lower - state.u, fit.upper - state.u)[0])
+
+
+def _minimised(problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool) -> tuple[State, Numbers]:
+    """Go down from coordinates `begin` [u] (Levenberg, Marquardt); return where it ends, and the derivatives there."""
+    fit = problem.fit
+    state, damping = fit.state(begin), 1e-3
+    columns, is_fresh = problem.columns(state, known), not known
+    for _ in range(MOST_STEPS if len(begin) else 0):
+        step = problem.step(state, columns, damping)
+        tried = fit.state(state.u + step)
+        fall = state.cost - tried.cost
+        if fall > 0.0:
+            missed = tried.residual - state.residual - columns @ step
+            columns = columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+            state, damping = tried, max(damping / 5.0, 1e-6)
+        if fall > LEAST_FALL * float(fit.blocks.sum()):
+            is_fresh = False
+        elif not (is_fresh or rough):
+            columns, is_fresh = problem.columns(state, {}), True
+        elif fall >= 0.0 or damping > 1.0:
+            break
+        else:
+            damping *= 10.0
+    return state, columns
 
 
 def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
@@ -173,32 +202,6 @@ def key_of(data: Data, name: str) -> str:
 
     same = sum(mark(row) == mark(rows[number]) for row in rows[:number])
     return f"{mark(rows[number])} {same}.{last}"
-
-
-def _minimised(
-    problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool
-) -> tuple[State, Linearised]:
-    """Go down from coordinates `begin` [u] (Levenberg, Marquardt); return where it ends, and the derivatives there."""
-    fit = problem.fit
-    state, damping = fit.state(begin), 1e-3
-    linearised, is_fresh = problem.linearised(state, known), not known
-    for _ in range(MOST_STEPS if len(begin) else 0):
-        gradient = linearised.gradient + fit.known @ (state.u - fit.mean)
-        matrix = linearised.information + fit.known
-        step = bounded_step(matrix, gradient, damping, fit.lower - state.u, fit.upper - state.u)
-        tried = fit.state(state.u + step)
-        fall = state.cost - tried.cost
-        if fall > 0.0:
-            linearised, state, damping = problem.moved_on(state, linearised, tried), tried, max(damping / 5.0, 1e-6)
-        if fall > LEAST_FALL * float(fit.blocks.sum()):
-            is_fresh = False
-        elif not (is_fresh or rough):
-            linearised, is_fresh = problem.linearised(state, {}), True
-        elif fall >= 0.0 or damping > 1.0:
-            break
-        else:
-            damping *= 10.0
-    return state, linearised
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fitting import FitWarning, FrictionFit
+    from .given_numbers import unseen_square
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (
         FitProgress,
@@ -33,11 +34,12 @@ if TYPE_CHECKING:
         Learned,
         Settings,
         Watch,
+        settings_of,
         unknown_names,
     )
     from .memory import has_memory
     from .memory_choice import choose_memory
-    from .memory_fit import Linearised, MemoryProblem, State, bounded_step
+    from .memory_fit import MemoryProblem, State
     from .memory_methods import guess_prior
     from .methods import learn_batch
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of

@@ -27,9 +27,9 @@ from tendonfmu.estimate.files import (
     with_previous_values,
 )
 from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
-from tendonfmu.estimate.given_numbers import is_worse, is_worse_unseen, movement
+from tendonfmu.estimate.given_numbers import is_worse, movement, unseen_square
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
-from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Settings, Watch, unknown_names
+from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
@@ -200,13 +200,11 @@ class FrictionFit(Configured):
         begin = perf_counter()
         options = self.options
         learn, passes = METHODS[options.method]
-        settings = Settings(
-            options,
-            passes=options.passes or passes,
+        settings = replace(
+            settings_of(self.start_.data, self.recordings_, passes=options.passes or passes),
+            options=options,
             effective=options.effective_samples,
             previous=previous,
-            noise=number_of(self.start_.data, "bias.noise_std"),
-            torque=float(np.sqrt(np.mean([np.mean(each.target[each.train] ** 2) for each in self.recordings_]))),
         )
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         try:
@@ -241,7 +239,8 @@ class FrictionFit(Configured):
         if learned.memory is None:
             keeps = is_worse(self.training_)
         else:
-            keeps = is_worse_unseen(self.start_.data, self.description_.data, self.recordings_)
+            before, after = (unseen_square(each.data, self.recordings_) for each in (self.start_, self.description_))
+            keeps = after > before
         if keeps:
             learned = replace(learned, z=learned.estimator.start)
             self.training_ = self._evaluated(learned)

@@ -20,15 +20,13 @@ from tendonfmu.recordings import FitRecording
 FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
 
 
-def is_worse_unseen(given: Data, fitted: Data, recordings: Sequence[FitRecording]) -> bool:
-    """Return whether fitted numbers leave more of the samples held out than the given ones, without a learning bias."""
+def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
+    """Return Σ r² over the samples held out and all joints, (N·m)², without a learning bias; 0 without any."""
     unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
     if not unseen:
-        return False
-    runs = CoreRuns(fitted, unseen)
-    drift = SlowDrift(runs.time, runs.stretch, runs.used)
-    left, before = (drift.without(each.residual()) for each in (runs, runs.of(given)))
-    return float(np.sum(left**2)) > float(np.sum(before**2))
+        return 0.0
+    runs = CoreRuns(data, unseen)
+    return float(np.sum(SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual()) ** 2))
 
 
 def is_worse(training: Sequence[Evaluation]) -> bool:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from tendonfmu.arrays import Numbers
+import numpy as np
+
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum
+from tendonfmu.model import number_of
 from tendonfmu.options import FitOptions, Number, option
+from tendonfmu.recordings import FitRecording
 
 
 @dataclass(frozen=True)
@@ -102,3 +106,10 @@ class Watch:
 def unknown_names(estimator: Estimator) -> list[str]:
     """Name the unknowns of an estimator."""
     return [unknown.name for unknown in estimator.unknowns]  # [u]
+
+
+def settings_of(data: Data, recordings: Sequence[FitRecording], threads: int = 0, passes: int = 60) -> Settings:
+    """Return the usual settings of a fit to recordings."""
+    torque = float(np.sqrt(np.mean(np.concatenate([each.target[each.train].ravel() for each in recordings]) ** 2)))
+    noise = number_of(data, "bias.noise_std")
+    return Settings(FrictionFitOptions(threads=threads), passes=passes, noise=noise, torque=torque)

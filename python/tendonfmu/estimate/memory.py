@@ -16,7 +16,7 @@ from tendonfmu.model import extension_rows
 PRESLIDING, CORDS = "presliding", "cord_stretch"
 TIMES = (1.0, 0.005)  # s, of a relaxation: cables creep for seconds, contacts of a soft constraint for milliseconds
 APART = 10.0  # ratio of the distances, or stiffnesses, that a fit starts from
-STRETCH = 2e4, 2e5  # N/m, cords to start from: 20 N stretch them by 1 mm or by 0.1 mm
+STRETCH = 2e4, 2e5  # N/m, cords to start from: 20 N stretch them by 1 mm, or by 0.1 mm
 
 
 def memory_rows(data: Data) -> list[tuple[int, Mapping[str, Any]]]:
@@ -60,7 +60,7 @@ def without_time(data: Data, path: str) -> dict[str, Any]:
 
 def starts(data: Data) -> Iterator[dict[str, float]]:
     """Yield numbers of the memory by path to start a fit from, the given ones first."""
-    given = {path: _number(data, path) for path in memory_paths(data)}
+    given = memory_values(data)
     yield given
     lengths = [path for path in given if path.endswith((".displacement", ".stiffness")) and not _is_cord(data, path)]
     times = [path for path in given if path.endswith(".relaxation_time")]
@@ -72,6 +72,11 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
         start |= {} if time is None else dict.fromkeys(times, time)
         start |= {} if cord is None else dict.fromkeys(cords, cord)
         yield start
+
+
+def memory_values(data: Data) -> dict[str, float]:
+    """Return the numbers of the memory by path."""
+    return {path: _number(data, path) for path in memory_paths(data)}
 
 
 def _is_cord(data: Data, path: str) -> bool:

@@ -9,16 +9,16 @@ stays.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.memory import CORDS, PRESLIDING, memory_rows, with_rows, without_memory
+from tendonfmu.estimate.memory import CORDS, PRESLIDING, STRETCH, memory_rows, memory_values, with_rows
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
-from tendonfmu.estimate.memory_methods import coarse_problem, from_starts, full_problem, guess_prior, no_show
+from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
 from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, make_grid
@@ -29,8 +29,10 @@ FOLDS = 8
 MATERIAL, CERTAIN = 0.02, 1.64  # of the rms, and standard errors over the folds
 DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it slips
 STEPS, TOLERANCE = 12, 0.3
-TIME, CORD = 0.1, 6e4  # s and N/m, between the starts of `memory`
-SPLIT, TYPICAL = 0.4, 0.03  # ratio of a doubled element's numbers to the single one's; friction of a place
+TIME = 0.1  # s, between the starts of `memory`
+SPLIT, SHARE = 0.4, 0.8  # ratio of a doubled element's numbers to the single one's, and share of the softer one
+TYPICAL = 0.03  # friction of a place
+LONGER = 1.0, 30.0  # times the distance: relaxation within a sample imitates friction without any
 
 
 @dataclass(frozen=True)
@@ -81,15 +83,20 @@ def choose_memory(
         The finger with all its numbers fitted in the chosen form.
     """
     search = _Search(finger, recordings, choice or Choice(), threads)
-    plain = search.fit("none", (), None)
+    plain = search.fit("none", ())
     force = float(np.mean([recording.mean_force for recording in recordings]))
-    forms = [search.fit(name, rows, plain) for name, rows in _whole_forms(finger.data, force)]
+    forms = [search.fit(name, rows) for name, rows in _whole_forms(finger.data, force)]
     best = min(forms, key=lambda form: form.errors.sum())
-    cords = {"effect": CORDS, "stiffness": CORD}
-    best = search.simpler(best, search.fit(f"{best.name}, cords", (*best.rows, cords), best))
-    best = search.simpler(search.fit(f"{best.name}, no relaxation", _without_times(best.rows), best), best)
-    best = search.simpler(best, search.fit(f"{best.name}, levels", _by_level(finger.data, best.rows), best))
-    best = search.simpler(best, search.fit(f"{best.name}, two elements", _doubled(best.rows), best))
+    cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
+    best = search.simpler(best, search.fit(f"{best.name}, cords", *[(*best.rows, row) for row in cords], near=best))
+    rigid = _without_times(best.rows)
+    best = search.simpler(
+        search.fit(f"{best.name}, no relaxation", *[_scaled(rigid, factor) for factor in LONGER], near=best), best
+    )
+    best = search.simpler(best, search.fit(f"{best.name}, levels", _by_level(finger.data, best.rows), near=best))
+    best = search.simpler(best, search.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
+    for name, rows in _pruned(best):
+        best = search.simpler(search.fit(name, rows, near=best), best)
     best = search.simpler(plain, best)
     return MemoryChoice(search.refined(best), best, tuple(search.tried))
 
@@ -99,16 +106,17 @@ class _Search:
 
     def __init__(self, finger: Finger, recordings: Sequence[FitRecording], choice: Choice, threads: int) -> None:
         self._finger, self._recordings, self._choice = finger, recordings, choice
-        self._threads, self._grid = threads, make_grid(recordings)
+        self._threads, self._grid = threads, make_grid(recordings, STEP)
         self._variance: Numbers | None = None  # [n] of what the plain model leaves
         self.tried: list[Form] = []
 
-    def fit(self, name: str, rows: Rows, near: Form | None) -> Form:
-        """Fit a form, from several starts and from the numbers of another one."""
-        structure, estimator = self._structure(rows)
+    def fit(self, name: str, *rows: Rows, near: Form | None = None) -> Form:
+        """Fit a form: from the starts of `memory.starts`, or from rows near another form and from its numbers."""
+        structure, estimator = self._structure(rows[0])
         problem = coarse_problem(structure, estimator, self._recordings, self._grid, self._threads)
-        begin = estimator.start if near is None else self._numbers_of(estimator, with_rows(near.data, *rows))
-        end = from_starts(problem, begin, TOLERANCE, no_show(problem, name))[0]
+        begin = estimator.start if near is None else self._numbers_of(estimator, with_rows(near.data, *rows[0]))
+        memories = None if near is None else [memory_values(with_rows(self._finger.data, *each)) for each in rows]
+        end = from_starts(problem, begin, TOLERANCE, no_show(problem, name), memories)[0]
         found = minimise(problem, end, STEPS, TOLERANCE)
         if self._variance is None:
             self._variance = problem.variance(found.state.residual)
@@ -132,8 +140,9 @@ class _Search:
         return second if second.is_better_than(first) else first
 
     def _structure(self, rows: Rows) -> tuple[Structure, Estimator]:
-        data = with_rows(without_memory(self._finger.data), *rows)
-        structure = build_structure(finger_from_data(data, self._finger.path), self._choice)
+        data = with_rows(self._finger.data, *rows)
+        choice = replace(self._choice, share=(*self._choice.share, *_shared(rows)))
+        structure = build_structure(finger_from_data(data, self._finger.path), choice)
         return structure, Estimator(structure.start.image, structure.group, structure.scale)
 
     def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
@@ -200,16 +209,39 @@ def _by_level(data: Data, rows: Rows) -> Rows:
     return tuple(split)
 
 
+def _shared(rows: Rows) -> list[str]:
+    """Return the patterns of what all rows share: they relax alike, and second elements have the same share."""
+    return [f"extensions[*].{key}" for key in ("relaxation_time", "share") if sum(key in row for row in rows) > 1]
+
+
+def _scaled(rows: Rows, factor: float) -> Rows:
+    """Return rows with distances, or the inverse of stiffnesses, times a factor."""
+    scaled = []
+    for row in rows:
+        key = "displacement" if "displacement" in row else "stiffness"
+        power = 1.0 if key == "displacement" else -1.0
+        scaled.append({**row, key: row[key] * factor**power} if row["effect"] == PRESLIDING else dict(row))
+    return tuple(scaled)
+
+
 def _doubled(rows: Rows) -> Rows:
-    """Return two elements of half the share in place of each, one stiffer and one softer."""
+    """Return two elements in place of each, a stiffer one and a softer one with a share."""
     doubled: list[dict[str, Any]] = []
     for row in rows:
         if row["effect"] != PRESLIDING:
             doubled.append(row)
             continue
         key = "displacement" if "displacement" in row else "stiffness"
-        doubled += [{**row, key: factor * row[key], "share": 0.5} for factor in (SPLIT, 1.0 / SPLIT)]
+        stiff, soft = (SPLIT, 1.0 / SPLIT) if key == "displacement" else (1.0 / SPLIT, SPLIT)
+        doubled += [{**row, key: stiff * row[key]}, {**row, key: soft * row[key], "share": SHARE}]
     return tuple(doubled)
+
+
+def _pruned(form: Form) -> list[tuple[str, Rows]]:
+    """Return the form without its cords, which what came after them may have replaced."""
+    if len(form.rows) > 2 and any(row["effect"] == CORDS for row in form.rows):
+        return [(f"{form.name}, no cords", tuple(row for row in form.rows if row["effect"] != CORDS))]
+    return []
 
 
 def _without_times(rows: Rows) -> Rows:

@@ -1,15 +1,17 @@
 """The fit of a finger whose friction remembers: all numbers together, by runs of the core, without a learning bias.
 
-The residual of joint j is r = τ − T less its constant or slowest drift (`slow_drift`), as block means. Its variance Q_j
-is unknown, so the negative log likelihood is ½ Σ_j N_j log Q_j(u), with N_j the effective number of blocks, plus the
-prior ½ (u − u_0)ᵀ P (u − u_0). Levenberg and Marquardt minimise it between bounds; each step solves the quadratic model
+The residual of joint j is r = τ − T less its constant or slowest drift (`slow_drift`), as block means, with the mean
+square Q_j. Its variance is s²·p_j with unknown s and given p_j, so the negative log likelihood is
+½ N log Σ_j (N_j/N)·Q_j(u)/p_j, with N_j the effective number of blocks and N their sum, plus the prior
+½ (u − u_0)ᵀ P (u − u_0). With p_j = 1 no joint is fitted at the cost of another; `reweighted` sets p_j = Q_j near the
+minimum. Levenberg and Marquardt minimise it between bounds; each step solves the quadratic model
 of the Gauss-Newton matrix within them. Numbers of the memory are fitted as their logarithms (`memory.starts`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -25,7 +27,10 @@ from tendonfmu.estimate.structure import FIXED, Structure
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
-LEAST_FALL = 1e-4  # of the cost, for each joint and effective block
+LEAST_SPREAD = 0.04  # of the mean variance over the joints
+WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
+LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
+LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -83,7 +88,9 @@ class MemoryProblem:
             low, high = (self.scale.coordinates(end) for end in ends)
         self.lower = np.where(log, np.maximum(low, -FARTHEST), low)
         self.upper = np.where(log, np.minimum(high, FARTHEST), high)
-        self.blocks = np.full(runs.joints, float(drift.used.sum()))  # N_j: those that count
+        self.span: Numbers = np.eye(len(log))  # [u, v] directions that a step may take, in coordinates
+        self.blocks = np.full(runs.joints, drift.used.sum() * runs.grid.step / LASTING)  # N_j: those that count
+        self.spread = np.ones(runs.joints)  # p_j
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30
         self.mean, self.known = np.zeros(len(log)), np.zeros((len(log), len(log)))  # u_0 and P of the prior
@@ -106,66 +113,74 @@ class MemoryProblem:
     def cost(self, residual: Numbers, u: Numbers) -> float:
         """Return the negative log likelihood with the prior."""
         away = u - self.mean
-        return float(0.5 * self.blocks @ np.log(self.variance(residual)) + 0.5 * away @ self.known @ away)
+        return float(0.5 * self.blocks.sum() * np.log(self._common(residual)) + 0.5 * away @ self.known @ away)
+
+    def _common(self, residual: Numbers) -> float:
+        """Return s²."""
+        return float(self.blocks @ (self.variance(residual) / self.spread) / self.blocks.sum())
 
     def variance(self, residual: Numbers) -> Numbers:
         """Return Q, [n] ((N·m)²)."""
         return np.asarray(np.mean(residual**2, axis=0) + self._floor)
 
-    def linearised(self, state: State, like: Linearised | None = None) -> Linearised:
-        """Return the derivatives at a state; only those by numbers of the memory are new if there are others like it."""
-        if like is None:
-            return self.of_columns(state, self.drift.without(self.columns(state.u)))
-        remembered, columns = np.flatnonzero(self.scale.log), like.columns.copy()
-        columns[:, :, remembered] = self.drift.without(self.columns(state.u, remembered.tolist()))
-        return self.of_columns(state, columns)
+    def linearised(self, state: State) -> Linearised:
+        """Return the derivatives by the directions of `span` at a state."""
+        return self.of_columns(state, self.drift.without(self._columns(state.u, self.runs, self.span)))
 
     def of_columns(self, state: State, columns: Numbers) -> Linearised:
-        """Return what follows from derivatives [R, n, u] at a state."""
-        weight = self.blocks / len(state.residual) / self.variance(state.residual)
-        information = np.zeros((len(state.u), len(state.u)))
-        gradient = np.zeros(len(state.u))
-        for j, share in enumerate(weight):
+        """Return what follows from derivatives [R, n, v] at a state."""
+        information, gradient = np.zeros((columns.shape[2],) * 2), np.zeros(columns.shape[2])
+        for j, share in enumerate(self._weight(state.residual)):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
         return Linearised(columns, information, gradient)
 
-    def columns(self, u: Numbers, chosen: Sequence[int] | None = None, runs: CoreRuns | None = None) -> Numbers:
-        """Return [B, n, c] the derivatives of τ − T by the chosen of u, or all (N·m), over some runs."""
-        here = self.values(u)
-        directions = [self._direction(k, u, here) for k in (range(len(u)) if chosen is None else chosen)]
-        return (self.runs if runs is None else runs).columns(directions, self._of_description(here))
-
-    def moved_on(self, state: State, linearised: Linearised, tried: State) -> Linearised:
-        """Return derivatives at `tried` that agree with the step there: Broyden's update."""
-        step = tried.u - state.u
+    def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
+        """Return derivatives at `tried` that agree with the step [v] there from `state`: Broyden's update."""
         missed = tried.residual - state.residual - linearised.columns @ step
-        return self.of_columns(
-            tried, linearised.columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
-        )
+        update = missed[:, :, None] * (step / max(float(step @ step), 1e-300))
+        return self.of_columns(tried, linearised.columns + update)
+
+    def columns(self, u: Numbers, chosen: Sequence[int]) -> Numbers:
+        """Return [B, n, c] the derivatives of τ − T by the chosen of u (N·m)."""
+        return self._columns(u, self.runs, np.eye(len(u))[:, list(chosen)])
+
+    def _weight(self, residual: Numbers) -> Numbers:
+        """Return [n] what a block of each joint weighs."""
+        return self.blocks / len(residual) / (self._common(residual) * self.spread)
+
+    def reweighted(self, state: State) -> State:
+        """Give each joint the weight that its residual shows, and return the state with its new cost."""
+        variance = self.variance(state.residual)
+        self.spread = np.maximum(variance / variance.mean(), LEAST_SPREAD)
+        return replace(state, cost=self.cost(state.residual, state.u))
+
+    def _columns(self, u: Numbers, runs: CoreRuns, span: Numbers) -> Numbers:
+        """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m)."""
+        here = self.values(u)
+        directions = [self._direction(way, u, here) for way in span.T]
+        return runs.columns(directions, self._of_description(here))
 
     def slopes(self, state: State, runs: CoreRuns) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
-        return -self.columns(state.u, None, runs) / self.scale.slopes(self.scale.unknowns(state.u))
+        return -self._columns(state.u, runs, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
 
     def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
         """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
         seconds = self.runs.grid.step * len(state.residual)
         length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
         size = max(1, round(length / self.runs.grid.step))
-        weight = self.blocks / len(state.residual) / self.variance(state.residual)
+        weight = self._weight(state.residual)
         rows = np.einsum("rju,rj->ru", linearised.columns, state.residual * weight)
         sums = np.add.reduceat(rows, np.arange(0, len(rows), size), axis=0)
         scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
         return scores - scores.mean(axis=0), length
 
-    def _direction(self, k: int, u: Numbers, here: Mapping[str, float]) -> Direction:
-        """Return the move of unknown k, inwards at its upper bound."""
-        step = STEP * max(1.0, abs(u[k])) if not self.scale.log[k] else STEP
-        step = -step if u[k] + step > self.upper[k] else step
-        moved = u.copy()
-        moved[k] += step
-        there = self._of_description(self.values(moved))
+    def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
+        """Return the move along a way [u], backwards where it would cross a bound."""
+        step = STEP * max(1.0, float(np.abs(u[(way != 0.0) & ~self.scale.log]).max(initial=0.0)))
+        step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
+        there = self._of_description(self.values(u + step * way))
         return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
 
     def _of_description(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -193,38 +208,52 @@ def minimise(
     tolerance: float,
     watch: Watch | None = None,
     *,
-    known: Linearised | None = None,
     rough: bool = False,
 ) -> Minimum:
     """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
 
-    Between two computations of the derivatives Broyden's update keeps them good enough (Math. Comp. 19, 1965). `known`
-    are some to begin with; a rough end has updated ones.
+    Derivatives are computed anew when steps with Broyden's update (Math. Comp. 19, 1965) no longer go down well. A
+    rough end has updated ones.
     """
-    state, damping, converged, number = begin, DAMPING[0], False, 0
-    linearised, is_fresh = (problem.linearised(state), True) if known is None else (known, False)
-    while not converged and number < most:
+    state, damping, number, converged, span = begin, DAMPING[0], 0, False, problem.span
+    linearised, is_fresh = problem.linearised(state), True
+    while number < most:
         number += 1
-        gradient = linearised.gradient + problem.known @ (state.u - problem.mean)
-        matrix = linearised.information + problem.known
-        step = bounded_step(matrix, gradient, damping, problem.lower - state.u, problem.upper - state.u)
-        tried = problem.state(state.u + step)
+        gradient = linearised.gradient + span.T @ problem.known @ (state.u - problem.mean)
+        matrix = linearised.information + span.T @ problem.known @ span
+        room = _room(span, problem.lower - state.u, problem.upper - state.u)
+        step = bounded_step(matrix, gradient, damping, *room)
+        tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
+        expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        small = step @ matrix @ step < tolerance**2 or fall < LEAST_FALL * float(problem.blocks.sum())
+        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < LEAST_FALL * float(problem.blocks.sum())
         if fall > 0.0:
-            linearised = problem.moved_on(state, linearised, tried)
+            linearised = problem.moved_on(linearised, state, step, tried)
             state, damping = tried, max(damping / 5.0, DAMPING[1])
             if watch is not None:
                 watch(number, state)
         else:
             damping *= 8.0
-        if small and (is_fresh or rough):
-            converged = fall >= 0.0 or damping > 1.0
-        elif small:
+        if (is_small and (is_fresh or rough)) or damping > DAMPING[2]:
+            converged = True
+            break
+        is_good = fall > WELL * expected
+        if is_good and not is_small:
+            is_fresh = False
+        elif not is_fresh or fall > 0.0:
             linearised, is_fresh = problem.linearised(state), True
-            continue
-        is_fresh = is_fresh and fall <= 0.0
-    return Minimum(state, linearised if is_fresh or rough else problem.linearised(state), number, converged)
+    if not (rough or is_fresh):
+        linearised = problem.linearised(state)
+    return Minimum(state, linearised, number, converged)
+
+
+def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]:
+    """Return how far a step may go along each direction [v] before one of its numbers [u] is at a bound."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([low[:, None] / span, high[:, None] / span])
+    ends[:, span == 0.0] = np.inf
+    least = np.where(span == 0.0, -np.inf, ends.min(axis=0)).max(axis=0)
+    return least, np.where(span == 0.0, np.inf, ends.max(axis=0)).min(axis=0)
 
 
 def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
@@ -240,9 +269,3 @@ def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Number
     room = np.minimum(low, -1e-300), np.maximum(high, 1e-300)
     found = lsq_linear(root, right, (room[0] * length, room[1] * length), method="bvls")
     return np.asarray(np.clip(found.x / length, low, high))
-
-
-def best_of(problem: MemoryProblem, begins: Sequence[State], most: int, tolerance: float) -> list[State]:
-    """Go a few steps down from each start; return where they end, the best first."""
-    ends = [minimise(problem, begin, most, tolerance, rough=True).state for begin in begins]
-    return sorted(ends, key=lambda state: state.cost)

@@ -1,14 +1,15 @@
 """The method `batch` for a finger whose friction remembers: starts, weights, prior and uncertainty about `memory_fit`.
 
 1. From each start of the memory's numbers (`memory.starts`) a few steps on evenly spread windows of the recordings.
-2. The best two are refined on all of them, with each block counting as one.
+2. The best is refined on all of them, with model errors that last for `LASTING`.
 3. The residuals say how many independent blocks they are worth, and the prior is the one under which the data are most
    likely (`prior`). With both the better one is refined again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,9 +26,10 @@ from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 from tendonfmu.statistics import sample_weights
 
-COARSE_RATE = 200.0  # Hz, and s in all: enough to tell starts apart
-COARSE_TIME, WINDOW = 30.0, 10.0
-COARSE_STEPS, REFINED = 12, 2  # steps from each start, and starts that are refined
+STEP, RATE = 0.02, 200.0  # s and Hz of a fit: elements take any step, and friction changes in tens of milliseconds
+COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell starts apart
+ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
+SAME = 0.3  # of a logarithm
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 
@@ -63,7 +65,7 @@ def coarse_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over few windows at a low rate, with the prior of guesses."""
-    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
+    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=RATE, threads=threads)
     problem = MemoryProblem(structure, estimator, runs, SlowDrift(runs.time, runs.stretch, runs.used))
     problem.mean, problem.known = guess_prior(problem)
     return problem
@@ -76,28 +78,60 @@ def guess_prior(problem: MemoryProblem) -> tuple[Numbers, Numbers]:
 
 
 def from_starts(
-    problem: MemoryProblem, begin: Numbers, tolerance: float, watch: Callable[[int, State], None]
+    problem: MemoryProblem,
+    begin: Numbers,
+    tolerance: float,
+    watch: Callable[[int, State], None],
+    memories: Iterable[Mapping[str, float]] | None = None,
 ) -> list[State]:
-    """Go a few steps down from each start of the memory about z = `begin` [u]; return the ends, the best first."""
+    """Go a few steps down from each start of the memory about z = `begin` [u]; return the best ends, the best first.
+
+    `memories`: numbers of the memory by path to start from; None: those of `starts`. First the numbers of the memory
+    and one factor for all friction of a kind move, then all numbers of the best.
+    """
     places = {unknown.path: k for k, unknown in enumerate(problem.estimator.unknowns)}
     first = problem.scale.coordinates(begin)
-    ends: list[Minimum] = []
-    for start in starts(problem.runs.data):
+    whole = problem.span
+    problem.span = _few_directions(problem, first)
+    ends: list[State] = []
+    for start in starts(problem.runs.data) if memories is None else memories:
         u = first.copy()
         for path, value in start.items():
             if path in places:
                 u[places[path]] = np.log(value / problem.scale.size[places[path]])
-        begin_here = problem.state(np.clip(u, problem.lower, problem.upper))
-        known = problem.linearised(begin_here, ends[-1].linearised) if ends else None
-        ends.append(minimise(problem, begin_here, COARSE_STEPS, tolerance, watch, known=known, rough=True))
-    return sorted((end.state for end in ends), key=lambda state: state.cost)
+        u = np.clip(u, problem.lower, problem.upper)
+        ends.append(minimise(problem, problem.state(u), ROUGH_STEPS, tolerance, watch, rough=True).state)
+    problem.span = whole
+    best = _distinct(sorted(ends, key=lambda state: state.cost), problem)[:POLISHED]
+    polished = [minimise(problem, end, COARSE_STEPS, tolerance, watch, rough=True).state for end in best]
+    return sorted(polished, key=lambda state: state.cost)
+
+
+def _few_directions(problem: MemoryProblem, u: Numbers) -> Numbers:
+    """Return [u, v]: each number of the memory, and all other numbers of a kind and role by one factor."""
+    groups: dict[str, Numbers] = {}
+    for k, unknown in enumerate(problem.estimator.unknowns):
+        kind = re.sub(r"\[\d+\]", "", unknown.name)
+        name = unknown.name if problem.scale.log[k] or unknown.role not in ("coulomb", "value") else kind
+        if problem.scale.log[k] or unknown.role in ("coulomb", "value"):
+            groups.setdefault(name, np.zeros(len(u)))[k] = 1.0 if problem.scale.log[k] else u[k] or 1.0
+    return np.column_stack(list(groups.values()))
+
+
+def _distinct(ends: list[State], problem: MemoryProblem) -> list[State]:
+    """Return the ends whose memory differs from that of all better ones by more than SAME in a logarithm."""
+    kept: list[State] = []
+    for end in ends:
+        if all(np.abs(end.u - other.u)[problem.scale.log].max(initial=0.0) > SAME for other in kept):
+            kept.append(end)
+    return kept
 
 
 def full_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over all samples, whose drift is the slowest that the rests demand."""
-    runs = CoreRuns(structure.start.data, recordings, grid, threads=threads)
+    runs = CoreRuns(structure.start.data, recordings, grid, rate=RATE, threads=threads)
     drift = slowest_drift(runs.residual(), runs.time, runs.stretch, runs.used, runs.still)
     return MemoryProblem(structure, estimator, runs, drift)
 
@@ -135,16 +169,13 @@ def minimum_from_starts(
 ) -> tuple[MemoryProblem, Minimum]:
     """Fit from several starts with each block counting as one, under the prior of guesses."""
     threads, tolerance = settings.options.threads, settings.options.tolerance
-    grid = make_grid(recordings)
+    grid = make_grid(recordings, STEP)
     coarse = coarse_problem(structure, estimator, recordings, grid, threads)
     ends = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))
     problem = full_problem(structure, estimator, recordings, grid, threads)
     problem.mean, problem.known = coarse.mean, coarse.known
-    found = [
-        minimise(problem, problem.state(end.u), settings.passes, tolerance, shown(problem, f"start {k}"))
-        for k, end in enumerate(ends[:REFINED], start=1)
-    ]
-    return problem, min(found, key=lambda each: each.state.cost)
+    best = problem.state(ends[0].u)
+    return problem, minimise(problem, best, settings.passes, tolerance, shown(problem, "all samples"))
 
 
 # --- the method -------------------------------------------------------------------------------------------------------
@@ -192,6 +223,7 @@ def _weighted(
     given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(problem.runs.grid.segments)
     if settings.effective:
         problem.blocks, shares = effective_blocks(problem, first.state)
+    problem.reweighted(first.state)
     if given is None:
         now = problem.linearised(first.state)
         pull = now.information @ (first.state.u - problem.mean) - now.gradient
@@ -199,7 +231,7 @@ def _weighted(
     else:
         covariance = prior.of_spread(given)
     problem.known = inverse(covariance)
-    again = replace(first.state, cost=problem.cost(first.state.residual, first.state.u))
+    again = problem.reweighted(first.state)
     tolerance, show = settings.options.tolerance, shown(problem, "effective samples")
     last = minimise(problem, again, settings.passes, tolerance, show)
     return learned_of(problem, last, prior, given, _weights(problem, recordings, shares), first.steps, passes())
@@ -257,7 +289,7 @@ def learned_with_memory_at(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], settings: Settings
 ) -> Learned:
     """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
-    problem = full_problem(structure, estimator, recordings, make_grid(recordings), settings.options.threads)
+    problem = full_problem(structure, estimator, recordings, make_grid(recordings, STEP), settings.options.threads)
     problem.mean = problem.scale.coordinates(estimator.start)
     state = problem.state(problem.mean)
     problem.blocks, shares = effective_blocks(problem, state)

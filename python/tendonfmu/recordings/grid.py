@@ -55,10 +55,10 @@ class Grid:
         return self.means([recording.recording.groups["tendon_force"] for recording in recordings])
 
 
-def make_grid(recordings: Sequence[FitRecording]) -> Grid:
-    """Cut recordings into blocks of about 10 ms."""
+def make_grid(recordings: Sequence[FitRecording], shortest: float = SHORTEST_STEP) -> Grid:
+    """Cut recordings into blocks of about 10 ms, or of another length (s)."""
     duration = sum(recording.duration for recording in recordings)
-    step = max(SHORTEST_STEP, duration / MOST_BLOCKS)
+    step = max(shortest, duration / MOST_BLOCKS)
     segments, first = [], 0
     for number, recording in enumerate(recordings):
         samples = max(1, round(step / float(np.median(np.diff(recording.time)))))

@@ -1,4 +1,4 @@
-"""How noisy the joint positions of a recording are, as `position_filter.noise` needs it.
+"""How noisy the joint positions of a recording are.
 
 The noise is the difference of a sample from the smooth curve through its neighbours. A cubic through the two samples
 before and the two after, at their true times, predicts each sample. The rest is noise if the motion is slow compared
@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
-from tendonfmu.model import RANGES, moment_arms
+from tendonfmu.model import moment_arms
 from tendonfmu.recordings.faults import value_step
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.recording import Recording
@@ -27,7 +27,7 @@ NEIGHBOURS = (-2, -1, 1, 2)  # samples of the cubic
 BLOCK = 40  # samples
 FEWEST = 60  # samples; fewer give no useful estimate
 GAP = 3.0  # times the median step; no cubic spans a longer step
-LEAST = RANGES["position_filter.noise"][0]  # rad, the smallest noise that the description accepts
+LEAST = 1e-6  # rad: no sensor of a joint resolves less
 
 
 def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitRecording, kinematics: int = 1) -> Numbers:
@@ -45,7 +45,7 @@ def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitReco
     Returns
     -------
     Numbers
-        [n] (rad), at least 1e-6, as `position_filter.noise` takes it.
+        [n] (rad), at least 1e-6.
 
     Raises
     ------

@@ -75,13 +75,12 @@ class Signals:
         if bias.get("noise_time") is None:
             for key in ("noise_std", "noise_std_per_force"):
                 bias[key] = number_of(data, f"bias.{key}") / np.sqrt(self.every)
-        kept = {key: value for key, value in data.items() if key != "position_filter"}
-        return {**kept, "velocity_filter_cutoff": 0.0, "bias": bias}
+        return {**data, "velocity_filter_cutoff": 0.0, "bias": bias}
 
     def restored(self, data: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         """Return an estimated description with the filter and bias settings of the given one, as it runs online."""
         restored = dict(data)
-        for key in ("velocity_filter_cutoff", "position_filter", "bias"):
+        for key in ("velocity_filter_cutoff", "bias"):
             restored.pop(key, None)
             if key in given:
                 restored[key] = given[key]

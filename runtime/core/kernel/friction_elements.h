@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "friction_memory.h"
+#include "kinematics.h"
 #include "quad.h"
 
 #define LARGEST_LIMIT 1e15 /* of |F|, and of the friction of a joint, N·m: no product in a step overflows */
@@ -20,14 +21,17 @@ HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
 /* The travel of every place in this sample, and what relaxation makes of it; needs the kinematics. */
 HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
   const finger_scratch* s = &f->scratch;
-  const double* moved = filters_position(f) ? s->travel : s->velocity;
-  const quad duration = quad_set(first ? 0.0 : filters_position(f) ? 1.0 : step);
-  for (size_t slot = 0; slot < f->slots; slot += 4) {
-    quad_store(s->travelled + slot, quad_mul(quad_load(moved + slot), duration));
-    quad_store(s->kept + slot, quad_set(0.0));
-  }
+  const int given = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
+  const size_t joint_row = f->joints * f->tendon_lanes;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    const quad turned = quad_sub(quad_load(s->angle + j), angle_before_step(f, f->remembered.angle, j));
+    const quad travel = given ? quad_mul(quad_load(s->velocity + joint_row + j), quad_set(step)) : turned;
+    quad_store(s->travelled + joint_row + j, first ? quad_set(0.0) : travel);
     quad_store(s->own_limit + j, quad_set(0.0));
+  }
+  relative_velocities(f, s->travelled);
+  for (size_t slot = 0; slot < f->slots && f->derived.settings.has_start_share; slot += 4) {
+    quad_store(s->kept + slot, quad_set(0.0));
   }
   f->memory.stretch = first ? 0.0 : f->memory.compliance;
   if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {

@@ -8,7 +8,6 @@
 #include "force_propagation.h"
 #include "kernel_choice.h"
 #include "kinematics.h"
-#include "position_filter.h"
 #include "sensor_fault.h"
 #include "unlearned_friction.h"
 
@@ -52,7 +51,7 @@ HOT_INLINE void take_zeros(tendonfmu_finger* f) {
   }
 }
 
-/* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s), 0 with a position filter */
+/* joint angles and all velocities, into scratch; returns ∂v/∂q of this sample (1/s) */
 HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
   double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
@@ -64,12 +63,7 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step)
   if (f->extensions.signals) {
     shape_signals(f, time, 1);
   }
-  if (filters_position(f)) {
-    filter_positions(f, s->angle, step, joint_velocity, s->travel + f->joints * f->tendon_lanes);
-    if (f->memory.elements) {
-      relative_velocities(f, s->travel);
-    }
-  } else if (source != TENDONFMU_JOINT_VELOCITIES) {
+  if (source != TENDONFMU_JOINT_VELOCITIES) {
     if (is_first(f)) {
       for (size_t j = 0; j < f->joint_lanes; ++j) {
         joint_velocity[j] = 0.0;
@@ -145,7 +139,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
     probe =
         quad_add(probe, quad_add(quad_mul(zero, quad_mul(quad_set(1e160), sum)), motion)); /* infinite above 1.8e148 */
   }
-  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == 15 && (!filters_position(f) || filter_is_finite(f)) &&
+  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == 15 &&
          (!f->derived.settings.watches_sensors || sensors_are_finite(f));
 }
 
@@ -199,9 +193,6 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   }
   if (f->derived.settings.knows_uncertainty) {
     copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
-  }
-  if (filters_position(f)) {
-    copy_row(s->filter, f->scratch.filter, FILTER_ROWS * f->joint_lanes);
   }
   if (f->derived.settings.watches_sensors) {
     remember_sensors(f);
