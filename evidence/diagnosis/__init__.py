@@ -56,7 +56,10 @@ def run_case(family: str, number: int, folder: Path) -> Row:
             return {**row, "hidden": hidden, "dropped": True}
         truth = truth_of(family, hidden, kept.hidden.joint, kept.hidden.tendon)
         train, test = kept.recordings["train"], kept.recordings["test"]
-        case, true = Case(kept.nominal, train, truth, test, kinematics=2), sizes.true_numbers(kept.hidden)
+        case, true = (
+            Case(kept.nominal, train, truth, test, kinematics=2),
+            sizes.true_numbers(*cases.machine(family, number)[:2]),
+        )
     report, seconds = diagnosed(case)
     return {
         **row,

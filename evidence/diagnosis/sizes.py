@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from evidence.diagnosis.judge import Cause, Truth, is_at_place, places
-from evidence.families.finger import Hidden
+from evidence.families.finger import Finger, Hidden
 
 # Last key of the number in a description that says how large an effect is.
 NUMBERS = {
@@ -26,11 +26,14 @@ NUMBERS = {
 }
 
 
-def true_numbers(hidden: Hidden) -> dict[str, float]:
+def true_numbers(made: Finger, hidden: Hidden) -> dict[str, float]:
     """By the last key of a number; empty where the description's numbers have another meaning than the simulator's."""
+    size, j = hidden.size, (hidden.joint or 1) - 1
     if hidden.effect == "gravity":
-        return {"sine": hidden.size * float(np.cos(hidden.second)), "cosine": hidden.size * float(np.sin(hidden.second))}
-    return {NUMBERS[hidden.effect]: hidden.size} if hidden.effect in NUMBERS else {}
+        return {"sine": size * float(np.cos(hidden.second)), "cosine": size * float(np.sin(hidden.second))}
+    if hidden.effect == "cover_stiffness":  # the description has none at all
+        size += float(made.cover[j])
+    return {NUMBERS[hidden.effect]: size} if hidden.effect in NUMBERS else {}
 
 
 def are_covered(causes: Sequence[Cause], truth: Truth, true: Mapping[str, float]) -> bool | None:

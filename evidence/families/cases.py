@@ -42,14 +42,23 @@ class Case:
     noise: float  # N·m rms of the sensors there, in means over 10 ms
 
 
-def make(family: str, seed: int, effect: str | None = None) -> Case:
-    """The case of a seed, or one that hides a given effect."""
+def machine(family: str, seed: int, effect: str | None = None) -> tuple[Finger, Hidden, np.random.Generator]:
+    """The finger of a seed, what it hides, and the generator of all that follows."""
     joints = elastic.JOINTS if family == "elastic" else imposed.KINDS[family].joints
     rng = np.random.default_rng((FAMILIES.index(family), seed))
     made = finger.finger(joints, rng)
-    hidden = drawn(effect or ORDER[(seed // 2) % len(ORDER)], made, rng)
+    return made, drawn(effect or ORDER[(seed // 2) % len(ORDER)], made, rng), rng
+
+
+def make(family: str, seed: int, effect: str | None = None) -> Case:
+    """The case of a seed, or one that hides a given effect."""
+    made, hidden, rng = machine(family, seed, effect)
+    joints = len(made.cover)
     nominal = finger.describe(made, hidden, rng)
-    motions = {"train": random_motion(joints, made.pretension, rng), "test": random_motion(joints, made.pretension, rng)}
+    motions = {
+        "train": random_motion(joints, made.pretension, rng),
+        "test": random_motion(joints, made.pretension, rng),
+    }
     recordings = {}
     seen = noise = 0.0
     for number, (name, motion) in enumerate(motions.items()):

@@ -105,14 +105,10 @@ def _from_the_tip(values: Array) -> Array:
     return np.asarray(np.cumsum(values[:, :, ::-1], axis=2)[:, :, ::-1])
 
 
-def _passing(
-    kind: Kind, finger: Finger, hidden: Hidden, time: Array, angle: Array, speed: Array, edge: Array
-) -> Array:
+def _passing(kind: Kind, finger: Finger, hidden: Hidden, time: Array, angle: Array, speed: Array, edge: Array) -> Array:
     """[N, m, n] share of the force that passes each edge."""
     load = np.zeros(finger.edge.shape)
-    factors = [
-        edge_factor(hidden, t, q, v, load) for t, q, v in zip(time.tolist(), angle, speed, strict=True)
-    ]
+    factors = [edge_factor(hidden, t, q, v, load) for t, q, v in zip(time.tolist(), angle, speed, strict=True)]
     lost = finger.edge * edge * np.array(factors)
     return np.asarray(np.exp(-lost) if kind.capstan else 1.0 - lost)
 
