@@ -28,11 +28,11 @@ NUMBERS = {
 
 def true_numbers(made: Finger, hidden: Hidden) -> dict[str, float]:
     """By the last key of a number; empty where the description's numbers have another meaning than the simulator's."""
-    size, j = hidden.size, (hidden.joint or 1) - 1
+    size = hidden.size
     if hidden.effect == "gravity":
         return {"sine": size * float(np.cos(hidden.second)), "cosine": size * float(np.sin(hidden.second))}
     if hidden.effect == "cover_stiffness":  # the description has none at all
-        size += float(made.cover[j])
+        size += float(made.cover[hidden.j])
     return {NUMBERS[hidden.effect]: size} if hidden.effect in NUMBERS else {}
 
 

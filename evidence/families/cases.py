@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -78,13 +77,12 @@ def run(family: str, made: Finger, hidden: Hidden, motion: Motion, seconds: floa
 
 
 def changed(made: Finger, hidden: Hidden, trace: Trace, without: Trace) -> tuple[float, float]:
-    """What the effect changes in the measured torque, or in the tendons' positions where those show it [N·m], and noise.
+    """What the effect changes in the measured torque, or in what positions show, and the noise there [N·m].
 
     Positions count by the torque that their springs make of them.
     """
-    silent = _Silent()
     rate = round(1.0 / (trace.time[1] - trace.time[0]))
-    with_it, plain = (finger.record(t, h, silent) for t, h in ((trace, hidden), (without, Hidden())))
+    with_it, plain = (finger.record(t, h, None) for t, h in ((trace, hidden), (without, Hidden())))
     m = len(made.arms)
     difference = _columns(with_it, "tendon_force", m) - _columns(plain, "tendon_force", m)
     if hidden.effect in ENCODERS:
@@ -104,15 +102,8 @@ def changed(made: Finger, hidden: Hidden, trace: Trace, without: Trace) -> tuple
     return float(sizes[joint]), float(noise[joint])
 
 
-class _Silent:
-    """A source of noise without noise."""
-
-    def standard_normal(self, shape: Any) -> Array:
-        return np.zeros(shape)
-
-
 def _columns(frame: pd.DataFrame, name: str, count: int) -> Array:
-    return frame[[f"{name}[{k + 1}]" for k in range(count)]].to_numpy()
+    return np.asarray(frame[[f"{name}[{k + 1}]" for k in range(count)]])
 
 
 def _means(values: Array, length: int) -> Array:
@@ -122,9 +113,12 @@ def _means(values: Array, length: int) -> Array:
 
 def is_case(case: Case, left: float) -> bool:
     """Whether what is hidden can be seen beside what a perfect friction model would leave [N·m]."""
-    if case.hidden.effect == NONE:
-        return True
-    return case.seen > case.noise and np.hypot(case.seen, left) > (1.0 + MATERIAL) * left
+    return case.hidden.effect == NONE or is_seen(case.seen, case.noise, left)
+
+
+def is_seen(seen: float, noise: float, left: float) -> bool:
+    """Whether a torque is above the sensors' noise, and material beside what is left without it [N·m]."""
+    return bool(seen > noise and np.hypot(seen, left) > (1.0 + MATERIAL) * left)
 
 
 # --- what is hidden ---------------------------------------------------------------------------------------------------

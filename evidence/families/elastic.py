@@ -1,8 +1,8 @@
 """In MuJoCo: 3 joints and 6 elastic cords over pulleys that turn in journals of their own.
 
-A cord is a chain of springs from the motor, over a pulley before each joint that it crosses, to the link behind its last
-one. What a journal rubs (frictionloss of its hinge, held by MuJoCo's constraint solver) grows with the forces on both
-sides of its pulley. Motors are inputs: they move the end of the first spring.
+A cord is a chain of springs from the motor, over a pulley before each joint that it crosses, to the link behind its
+last one. What a journal rubs (frictionloss of its hinge, held by MuJoCo's constraint solver) grows with the forces on
+both sides of its pulley. Motors are inputs: they move the end of the first spring.
 """
 
 from __future__ import annotations
@@ -124,12 +124,12 @@ class Mechanism:
         load[self.rows, self.columns] = 0.5 * (tension[self.arriving] + tension[self.arriving + 1])
         speed[self.rows, self.columns] = RADIUS * self.data.qvel[self.pulleys]
         lost = finger.edge * load * edge_factor(hidden, t, self.data.qpos[self.hinges], speed, load)
-        if hidden.effect == "preload_friction" and hidden.tendon:
-            lost[hidden.tendon - 1, 0] += hidden.size
+        if hidden.effect == "preload_friction":
+            lost[hidden.i, 0] += hidden.size
         self.model.dof_frictionloss[self.pulleys] = RADIUS * lost[self.rows, self.columns] + TINY
         friction = finger.friction.copy()
-        if hidden.effect == "joint_load_friction" and hidden.joint:
-            friction[hidden.joint - 1] += hidden.size * tension[self.first].sum()
+        if hidden.effect == "joint_load_friction":
+            friction[hidden.j] += hidden.size * tension[self.first].sum()
         self.model.dof_frictionloss[self.hinges] = friction * drift(hidden, t)
 
     def advance(self, t: float, motors: Array) -> tuple[Array, Array]:

@@ -27,6 +27,16 @@ class Hidden:
     size: float = 0.0  # in the unit of the description's number
     second: float = 0.0  # what else it takes: a time constant, a phase, a velocity, a frequency
 
+    @property
+    def i(self) -> int:
+        """Its tendon from 0."""
+        return (self.tendon or 1) - 1
+
+    @property
+    def j(self) -> int:
+        """Its joint from 0."""
+        return (self.joint or 1) - 1
+
     def at(self, effect: str) -> float:
         """Its size if it is this effect, else 0."""
         return self.size if self.effect == effect else 0.0
@@ -44,10 +54,6 @@ class Finger:
     cover: Array  # [n] N·m/rad
     rest: Array  # [n] rad
     pretension: float  # N
-
-    @property
-    def crossed(self) -> npt.NDArray[np.bool_]:
-        return self.arms != 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +100,7 @@ def edge_factor(hidden: Hidden, time: float, angle: Array, speed: Array, load: A
     elif hidden.effect == "stribeck":
         factor = 1.0 + hidden.size * np.exp(-np.abs(speed) / hidden.second)
     elif hidden.effect == "preload_friction":
-        factor[hidden.tendon - 1, 0] = 1.0  # type: ignore[operator]
+        factor[hidden.i, 0] = 1.0
     return factor
 
 
@@ -102,9 +108,9 @@ def is_at(hidden: Hidden, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
     """[m, n] where a hidden effect at edges sits."""
     here = np.ones(shape, dtype=bool)
     if hidden.tendon is not None:
-        here[np.arange(shape[0]) != hidden.tendon - 1] = False
+        here[np.arange(shape[0]) != hidden.i] = False
     if hidden.joint is not None:
-        here[:, np.arange(shape[1]) != hidden.joint - 1] = False
+        here[:, np.arange(shape[1]) != hidden.j] = False
     return here
 
 
@@ -116,7 +122,7 @@ def drift(hidden: Hidden, time: float) -> float:
 
 def extra_torque(hidden: Hidden, time: Array, angle: Array, velocity: Array, crept: Array) -> Array:
     """[N, n] N·m that the tendons hold in addition; crept [N, n] rad: angles as a cover with a memory has them."""
-    torque, j = np.zeros_like(angle), (hidden.joint or 1) - 1
+    torque, j = np.zeros_like(angle), hidden.j
     q = angle[:, j]
     if hidden.effect == "gravity":
         torque[:, : j + 1] = (hidden.size * np.sin(angle[:, : j + 1].sum(axis=1) + hidden.second))[:, None]
@@ -141,8 +147,8 @@ def extra_torque(hidden: Hidden, time: Array, angle: Array, velocity: Array, cre
 def true_arms(arms: Array, hidden: Hidden) -> Array:
     if hidden.effect != "moment_arm":
         return arms
-    changed = arms.copy()
-    changed[hidden.tendon - 1, hidden.joint - 1] += hidden.size  # type: ignore[operator]
+    changed: Array = arms.copy()
+    changed[hidden.i, hidden.j] += hidden.size
     return changed
 
 
@@ -150,34 +156,35 @@ def hardening(hidden: Hidden, tendons: int) -> Array:
     """[m] N/m² of springs whose force is stiffness·e + hardening·e²."""
     made = np.zeros(tendons)
     if hidden.effect == "tendon_nonlinearity":
-        made[hidden.tendon - 1] = hidden.size  # type: ignore[operator]
+        made[hidden.i] = hidden.size
     return made
 
 
 # --- recording and description ----------------------------------------------------------------------------------------
 
 
-def record(trace: Trace, hidden: Hidden, rng: np.random.Generator) -> pd.DataFrame:
-    """What the sensors give, with their noise and the hidden effects of sensors."""
+def record(trace: Trace, hidden: Hidden, rng: np.random.Generator | None) -> pd.DataFrame:
+    """What the sensors give, with the hidden effects of sensors, and with noise if there is a source of it."""
     force, position, angle = trace.force.copy(), trace.position.copy(), trace.angle.copy()
     if hidden.effect == "time_delay":
         late = trace.time - hidden.size
         force = np.column_stack([np.interp(late, trace.time, column) for column in force.T])
     elif hidden.effect == "force_gain":  # the true force is (1 + size) times the measured one
-        force[:, hidden.tendon - 1] /= 1.0 + hidden.size  # type: ignore[operator]
+        force[:, hidden.i] /= 1.0 + hidden.size
     elif hidden.effect == "zero":
-        position[:, hidden.tendon - 1] += hidden.size  # type: ignore[operator]
+        position[:, hidden.i] += hidden.size
     elif hidden.effect == "encoder_offset":
-        angle[:, hidden.joint - 1] += hidden.size  # type: ignore[operator]
+        angle[:, hidden.j] += hidden.size
     columns = {"time": trace.time}
     for name, values, noise in (
         ("tendon_force", force, FORCE_NOISE),
         ("tendon_position", position, POSITION_NOISE),
         ("joint_position", angle, ANGLE_NOISE),
     ):
-        noisy = values + noise * rng.standard_normal(values.shape)
+        noisy = values + noise * rng.standard_normal(values.shape) if rng else values
         columns |= {f"{name}[{k + 1}]": noisy[:, k] for k in range(values.shape[1])}
-    return pd.DataFrame(columns)
+    made: pd.DataFrame = pd.DataFrame(columns)
+    return made
 
 
 def describe(made: Finger, hidden: Hidden, rng: np.random.Generator) -> Nominal:

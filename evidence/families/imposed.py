@@ -78,19 +78,19 @@ def simulate(kind: Kind, finger: Finger, hidden: Hidden, motion: Motion, seconds
     angle = motion.angles(time)
     velocity = np.gradient(angle, time, axis=0)
     travel = _from_the_tip(angle[:, None, :] * arms)
-    distance, joint_distance = own.uniform(1e-4, 4e-4, arms.shape), own.uniform(0.01, 0.04, angle.shape[1])
+    distance, joint_distance = own.uniform(1e-4, 4e-4, arms.shape), own.uniform(0.01, 0.04, arms.shape[1:])
     edge = kind.built(travel, distance, own)
     joint = kind.built(angle, joint_distance, own)
     speed = _from_the_tip(velocity[:, None, :] * arms)
     passing = _passing(kind, finger, hidden, time, angle, speed, edge)
-    worn = np.array([drift(hidden, t) for t in time.tolist()])[:, None]
+    worn = np.array([float(drift(hidden, t)) for t in time.tolist()])[:, None]
     needed = finger.cover * (angle - finger.rest) + finger.damping * velocity + finger.friction * joint * worn
     needed = needed + extra_torque(hidden, time, angle, velocity, _crept(angle))
     matrix = np.cumprod(passing, axis=2).transpose(0, 2, 1) * arms.T  # [N, n, m]
-    if hidden.effect == "joint_load_friction" and hidden.joint:
-        matrix[:, hidden.joint - 1, :] -= (hidden.size * joint[:, hidden.joint - 1])[:, None]
-    if hidden.effect == "preload_friction" and hidden.tendon:
-        i = hidden.tendon - 1
+    if hidden.effect == "joint_load_friction":
+        matrix[:, hidden.j, :] -= (hidden.size * joint[:, hidden.j])[:, None]
+    if hidden.effect == "preload_friction":
+        i = hidden.i
         behind = np.cumprod(passing[:, i, :], axis=1) / passing[:, i, :1]
         needed = needed + hidden.size * edge[:, i, :1] * behind * arms[i]
     wanted = motion.pull(time)[:, None] * np.ones(len(arms))
