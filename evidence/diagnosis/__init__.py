@@ -30,7 +30,7 @@ SEEDS = range(1, 2 * len(cases.ORDER), 2)
 ALSO = {
     "elastic": ("inertia", "inertia_variation", "cord_stretch", "relaxation"),
     "dahl": (),
-    "maxwell": ("tendon_nonlinearity",),  # its springs stiffen
+    "maxwell": (),
     "recorded": (),
 }
 MEMORY = ("presliding", "relaxation", "cord_stretch")

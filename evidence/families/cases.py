@@ -43,9 +43,9 @@ class Case:
 
 def machine(family: str, seed: int, effect: str | None = None) -> tuple[Finger, Hidden, np.random.Generator]:
     """The finger of a seed, what it hides, and the generator of all that follows."""
-    joints = elastic.JOINTS if family == "elastic" else imposed.KINDS[family].joints
+    kind = imposed.KINDS.get(family)
     rng = np.random.default_rng((FAMILIES.index(family), seed))
-    made = finger.finger(joints, rng)
+    made = finger.finger(kind.joints, rng, kind.stiffening) if kind else finger.finger(elastic.JOINTS, rng)
     return made, drawn(effect or ORDER[(seed // 2) % len(ORDER)], made, rng), rng
 
 

@@ -54,6 +54,14 @@ class Finger:
     cover: Array  # [n] N·m/rad
     rest: Array  # [n] rad
     pretension: float  # N
+    stiffening: float = 0.0  # of the tendons' springs at the pretension, over their stiffness
+
+    @property
+    def springs(self) -> tuple[Array, Array]:
+        """[m] stiffness N/m and hardening N/m² of springs whose force is stiffness·e + hardening·e²."""
+        usual = self.pretension / self.stiffness
+        hard = self.stiffening * self.stiffness / usual
+        return self.stiffness - hard * usual, hard
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +74,7 @@ class Trace:
     position: Array  # [N, m] m, of the motors
 
 
-def finger(joints: int, rng: np.random.Generator, pretension: float = 18.0) -> Finger:
+def finger(joints: int, rng: np.random.Generator, stiffening: float = 0.0, pretension: float = 18.0) -> Finger:
     """Two tendons a joint, an antagonistic pair each, which cross all joints before theirs."""
     n, m = joints, 2 * joints
     arms = np.zeros((m, n))
@@ -82,6 +90,7 @@ def finger(joints: int, rng: np.random.Generator, pretension: float = 18.0) -> F
         cover=rng.uniform(0.015, 0.035, n),
         rest=rng.uniform(-0.05, 0.1, n),
         pretension=pretension,
+        stiffening=stiffening,
     )
 
 
@@ -196,10 +205,13 @@ def describe(made: Finger, hidden: Hidden, rng: np.random.Generator) -> Nominal:
         if not (hidden.effect == "cover_stiffness" and hidden.joint == j + 1):
             joint["cover"] = {"stiffness": rough(cover, rng), "rest_angle": rough(made.rest[j], rng)}
         joints.append(joint)
+    soft, hard = made.springs
+    stiffens = hard * (hardening(hidden, len(hard)) == 0.0)  # what is hidden is left out altogether
+    stiffness = np.where(stiffens > 0.0, soft, made.stiffness)
     tendons = [
         {
             "name": f"tendon_{i + 1}",
-            "stiffness": float(made.stiffness[i]),
+            "stiffness": float(stiffness[i]),
             "moment_arms": arms.tolist(),
             "edge_friction": [law(share, 0.005, rng) if share > 0.0 else None for share in made.edge[i]],
         }
@@ -213,6 +225,10 @@ def describe(made: Finger, hidden: Hidden, rng: np.random.Generator) -> Nominal:
         "velocity_threshold": {"tendon": 0.0005, "joint": 0.01},
         "velocity_filter_cutoff": 20.0,
         "contact": {"threshold": [0.03] * len(joints)},
+        "extensions": [
+            {"effect": "tendon_nonlinearity", "tendon": i + 1, "hardening": float(stiffens[i])}
+            for i in np.flatnonzero(stiffens)
+        ],
     }
 
 

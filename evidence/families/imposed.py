@@ -61,7 +61,7 @@ class Kind:
     joints: int
     built: Built
     capstan: bool = False  # edges lose exp(−μφ) of the force, not a share of it
-    stiffening: float = 0.0  # of a spring at the pretension, by the force
+    stiffening: float = 0.0  # of the tendons' springs
 
 
 KINDS = {
@@ -96,7 +96,7 @@ def simulate(kind: Kind, finger: Finger, hidden: Hidden, motion: Motion, seconds
     wanted = motion.pull(time)[:, None] * np.ones(len(arms))
     missing = needed - np.einsum("kjm,km->kj", matrix, wanted)
     force = wanted + np.einsum("kmj,kj->km", np.linalg.pinv(matrix), missing)
-    position = angle @ arms.T + _stretch(kind, finger, hidden, force)
+    position = angle @ arms.T + _stretch(finger, hidden, force)
     return Trace(time, angle, force, position)
 
 
@@ -120,12 +120,9 @@ def _crept(angle: Array) -> Array:
     return crept
 
 
-def _stretch(kind: Kind, finger: Finger, hidden: Hidden, force: Array) -> Array:
+def _stretch(finger: Finger, hidden: Hidden, force: Array) -> Array:
     """[N, m] m of the springs, whose force is stiffness·e + hardening·e²."""
-    # the described stiffness is that of the straight line through zero and the pretension
-    usual = finger.pretension / finger.stiffness
-    own = kind.stiffening * finger.stiffness / usual
-    soft = finger.stiffness - own * usual
-    hard = own + hardening(hidden, len(finger.stiffness))
+    soft, hard = finger.springs
+    hard = hard + hardening(hidden, len(hard))
     root = np.sqrt(soft**2 + 4 * hard * force)
     return np.asarray(2 * force / (soft + root))
