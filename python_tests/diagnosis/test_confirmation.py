@@ -19,7 +19,7 @@ Numbers = NDArray[np.float64]
 
 
 def confirmation(series: Series, nominal: Numbers) -> Confirmation:
-    return Confirmation(series, make_folds(series), bias_splines(series), bias_splines(series, TRENDS), nominal)
+    return Confirmation(series, make_folds(series), bias_splines(series), nominal)
 
 
 def most(level: float, tests: int) -> int:

@@ -12,7 +12,7 @@ import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -224,9 +224,3 @@ def _used(recording: FitRecording, segment: Segment, step: float) -> Flags:
     longest, share = SETTLED
     used[: int(min(longest / step, share * segment.count))] = False
     return np.asarray(used)
-
-
-def with_angles(recording: FitRecording, angle: Numbers) -> FitRecording:
-    """Return a recording whose runs take these joint angles [N, n] (rad)."""
-    groups = {**recording.recording.groups, "joint_position": angle}
-    return replace(recording, recording=replace(recording.recording, groups=groups), kinematics=2)

@@ -35,6 +35,7 @@ def build_report(
     training: Sequence[Evaluation],
     comparisons: Sequence[Evaluation],
     uncertainty: Mapping[str, Any] | None,  # of the modelled friction torque; None if not asked for
+    memory: Mapping[str, Any] | None,  # how friction that remembers was fitted; None if there is none
 ) -> dict[str, Any]:
     """Build the report of a finished fit; numbers that are not finite become None."""
     units = {parameter.path: parameter.unit for parameter in native.Instance(fitted.image).parameters()}
@@ -67,6 +68,7 @@ def build_report(
         },
         "innovations": _innovations(innovations, learned.weights),
         "uncertainty": uncertainty,
+        "memory": memory,
     }
     return {key: finite(value) for key, value in report.items()}
 

@@ -30,8 +30,10 @@ from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sen
 from tendonfmu.estimate.given_numbers import is_worse, movement, unseen_square
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
+from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
+from tendonfmu.estimate.remembered import Remembered, learn_remembered
 from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
 from tendonfmu.estimate.uncertainty import parameter_uncertainty
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
@@ -158,8 +160,8 @@ class FrictionFit(Configured):
             finger = with_previous_values(finger, previous)
         else:
             previous = estimated_numbers(finger)
-        choice = Choice(_sides(options), options.only, options.fix, options.share, options.scale)
-        self.structure_ = build_structure(finger, choice)
+        self._choice = Choice(_sides(options), options.only, options.fix, options.share, options.scale)
+        self.structure_ = build_structure(finger, self._choice)
         self.start_ = self.structure_.start
         held = Held(options.holdout, options.holdout_block, strict=True)
         training, others = read_recordings(given), read_recordings(compared_with, "compare")
@@ -207,8 +209,15 @@ class FrictionFit(Configured):
             previous=previous,
         )
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
+        self.remembered_: Remembered | None = None
         try:
-            learned = learn(self.structure_, self.recordings_, watch, settings, start)
+            if options.method == "batch" and has_memory(self.start_.data):
+                self.remembered_ = learn_remembered(
+                    self.structure_, self._choice, self.recordings_, watch, settings, start
+                )
+                self.structure_, learned = self.remembered_.structure, self.remembered_.learned
+            else:
+                learned = learn(self.structure_, self.recordings_, watch, settings, start)
         except Interrupted as stopped:
             self.unfinished_ = self._unfinished(stopped)
             if stopped.by_user:
@@ -269,8 +278,12 @@ class FrictionFit(Configured):
             training=self.training_,
             comparisons=self.comparisons_,
             uncertainty=uncertainty,
+            memory=None if self.remembered_ is None else self.remembered_.entry(),
         )
-        self.warnings_ += noise_sentences(self.report_["innovations"])
+        if self.remembered_ is None:
+            self.warnings_ += noise_sentences(self.report_["innovations"])
+        else:
+            self.warnings_ += self.remembered_.sentences()
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
 

@@ -33,6 +33,7 @@ class Settings:
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
     torque: float = 0.0  # rms of the torque to explain (N·m)
+    near: bool = False  # whether the start is near the minimum: then a memory needs no other starts
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,11 @@ def memory_values(data: Data) -> dict[str, float]:
     return {path: _number(data, path) for path in memory_paths(data)}
 
 
+def optional_paths(data: Data) -> list[str]:
+    """Return the paths of the numbers that the memory can be without: relaxation times, and the stiffness of cords."""
+    return [path for path in memory_paths(data) if path.endswith(".relaxation_time") or _is_cord(data, path)]
+
+
 def _is_cord(data: Data, path: str) -> bool:
     return bool(extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]["effect"] == CORDS)
 

@@ -29,6 +29,7 @@ FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_SPREAD = 0.04  # of the mean variance over the joints
 WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
+RIGID = 1e12  # N/m
 LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
 LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
@@ -80,7 +81,8 @@ class MemoryProblem:
         remembered = set(memory_paths(structure.start.data))
         self._paths = [path for path, k in structure.index.items() if structure.group[k] != FIXED]
         self._rows = [structure.index[path] for path in self._paths]
-        unknowns = estimator.unknowns
+        unknowns, of_row = estimator.unknowns, {row: path for path, row in structure.index.items()}
+        self.shared = [[of_row[row] for row in unknown.parameters] for unknown in unknowns]  # paths of each unknown
         log = np.array([unknown.path in remembered for unknown in unknowns])
         self.scale = Scale(log, estimator.scale)
         ends = (np.array([getattr(unknown, end) for unknown in unknowns]) for end in ("lower", "upper"))
@@ -182,6 +184,14 @@ class MemoryProblem:
         step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
         there = self._of_description(self.values(u + step * way))
         return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
+
+    def without(self, state: State, path: str) -> float:
+        """Return the cost at a state without a relaxation time, and all that share it, or with rigid cords."""
+        least = RIGID if path.endswith(".stiffness") else 0.0
+        values = self.values(state.u)
+        shared = next(unknown for unknown in self.shared if path in unknown)
+        left = self.runs.residual(self._of_description(values | dict.fromkeys(shared, least)))
+        return self.cost(self.drift.without(left), state.u)
 
     def _of_description(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return the values without those of the bias, which runs lack."""

@@ -170,12 +170,13 @@ def minimum_from_starts(
     """Fit from several starts with each block counting as one, under the prior of guesses."""
     threads, tolerance = settings.options.threads, settings.options.tolerance
     grid = make_grid(recordings, STEP)
-    coarse = coarse_problem(structure, estimator, recordings, grid, threads)
-    ends = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))
     problem = full_problem(structure, estimator, recordings, grid, threads)
-    problem.mean, problem.known = coarse.mean, coarse.known
-    best = problem.state(ends[0].u)
-    return problem, minimise(problem, best, settings.passes, tolerance, shown(problem, "all samples"))
+    problem.mean, problem.known = guess_prior(problem)
+    u = problem.scale.coordinates(begin)
+    if not settings.near:
+        coarse = coarse_problem(structure, estimator, recordings, grid, threads)
+        u = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))[0].u
+    return problem, minimise(problem, problem.state(u), settings.passes, tolerance, shown(problem, "all samples"))
 
 
 # --- the method -------------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ _LEAST = 1e-3  # of an unknown's expected magnitude: lets an unknown that ended 
 CHANGE = 0.02  # of a number that was estimated before: what wear, temperature and another instrument may have changed
 GUESS = 1.0  # of a number that nobody has estimated
 _SPREADS = np.geomspace(1e-3, GUESS, 31)
-_CLEARLY = 2.0  # by which the log likelihood must rise before numbers leave where they were (Edwards 1972: support)
+CLEARLY = 2.0  # by which the log likelihood must rise before numbers leave where they were (Edwards 1972: support)
 
 
 @dataclass(frozen=True)
@@ -88,4 +88,4 @@ def most_likely(information: Numbers, pull: Numbers, prior: Prior) -> Numbers:
     shares = (0.0, 1.0) if prior.covariance.any() else (0.0,)
     least, *others = (prior.of_spread(spread, share) for share in shares for spread in _SPREADS)
     best = max(others, key=log_likelihood)
-    return best if log_likelihood(best) > log_likelihood(least) + _CLEARLY else least
+    return best if log_likelihood(best) > log_likelihood(least) + CLEARLY else least

@@ -18,13 +18,12 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Indices, Numbers, rounded
-from tendonfmu.estimate.core_runs import with_angles
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
 from tendonfmu.estimate.learning import Learned, MemoryEvidence
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import NEVER, native
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, with_angles
 from tendonfmu.statistics import error_directions
 
 LOAD = 4.0  # times the recorded forces: the directions must also hold at other pretensions

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from .best_angles import BestAngles, best_angles, with_angles
     from .columns import GROUPS, element_of, right_spelling
     from .converters import convert_file
     from .converters.inspection import Inspection, inspect_log

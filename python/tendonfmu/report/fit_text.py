@@ -107,6 +107,7 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     yield f"{method}{rounds}, {report['seconds']:.3g} s."
     yield from _how_well(tables)
     yield from (report.get("routing") or {}).get("sentences", ())
+    yield from memory_sentences(report)
     if "given_numbers" in report:  # reports of earlier versions have none
         yield report["given_numbers"]["paragraph"]
     count, of = report["identified"]["count"], report["identified"]["of"]
@@ -120,6 +121,17 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     if count + kept < of:
         yield f"What would identify the other {of - count - kept} is listed below."
     yield from sums_known(picture.fitted)
+
+
+def memory_sentences(report: Mapping[str, Any]) -> Iterator[str]:
+    """Say which angles friction that remembers was fitted to, and what is left with them and as delivered."""
+    memory = report.get("memory")
+    if memory:
+        left, delivered = (
+            ", ".join(f"{1e3 * value:.3g}" for value in memory[key]) for key in ("left", "left_delivered")
+        )
+        beside = "" if left == delivered else f"; {delivered} mN·m with the kinematics asked for"
+        yield f"Fitted to the angles of {memory['angles']}: {left} mN·m by joint left without a learning bias{beside}."
 
 
 def sums_known(finger: Finger) -> Iterator[str]:
@@ -301,6 +313,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
         by_joint = ", ".join(f"{count:.0f}" for count in worth)
         yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
     yield from (report["routing"] or {}).get("sentences", ())
+    yield from memory_sentences(report)
     yield report["given_numbers"]["paragraph"]
     if report["uncertainty"]:
         yield _uncertainty(report["uncertainty"])
