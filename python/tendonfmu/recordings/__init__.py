@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles
-    from .grid import Grid, Segment, make_grid, sample_blocks
+    from .grid import Grid, Segment, make_grid
     from .match import UNFIT_FOR_SEARCH, admit, belongs
     from .match_text import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .prepared import (
