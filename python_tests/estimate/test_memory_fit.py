@@ -95,9 +95,7 @@ def test_a_number_of_another_extension_is_found_without_presliding() -> None:
 
 
 def test_the_kalman_filter_refuses_by_name() -> None:
-    with pytest.raises(
-        InputError, match=r"presliding: .* expected --method batch, or a description without presliding"
-    ):
+    with pytest.raises(InputError, match=r"presliding: .* expected --method batch, or a description without"):
         fitted((RELATIVE,), (RELATIVE,), method="ekf")
 
 

@@ -62,6 +62,6 @@ if TYPE_CHECKING:
         smooth_speeds,
     )
     from .signal_noise import FEWEST, joint_position_noise
-    from .smoothing import Signals, smoothing_of, zero_phase
+    from .smoothing import zero_phase
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
