@@ -26,6 +26,7 @@ class Case:
     truth: Truth
     test: pd.DataFrame | None = None
     reference: pd.DataFrame | None = None
+    kinematics: int = 1  # 2: the recorded joint angles
 
     def write(self, folder: Path) -> list[str]:
         """Write finger.json and the recordings; return the arguments of `tendonfmu diagnose` in that folder."""
@@ -36,7 +37,7 @@ class Case:
             if frame is not None:
                 frame.to_parquet(folder / f"{option}.parquet", index=False)
                 arguments += [f"--{option}", f"{option}.parquet"]
-        return [*arguments, "--kinematics", "1"]
+        return [*arguments, "--kinematics", str(self.kinematics)]
 
 
 def diagnosed(case: Case) -> tuple[dict[str, Any], float]:

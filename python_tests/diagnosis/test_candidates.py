@@ -1,12 +1,13 @@
 """The candidates of a diagnosis: where they are proposed, and that their columns are what the C core makes of them.
 
-Derivatives are compared with differences of whole runs of the core; the term's own torque is tested elsewhere.
+Columns are compared with differences of whole runs of the core; the term's own torque is tested elsewhere.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,38 +17,33 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis.candidate_columns import (
-    CandidateColumns,
-    Proposal,
-    candidate_columns,
-    nominal_directions,
-)
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
 from tendonfmu.diagnosis.effects import CANDIDATES, Place, Variant, by_name
 from tendonfmu.diagnosis.effects.description_edit import add_to_number
-from tendonfmu.diagnosis.series import block_prediction
+from tendonfmu.diagnosis.extension_fit import number_columns
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.span import Span, _turning_points, span_of
-from tendonfmu.errors import InputError
+from tendonfmu.estimate import unknowns
 from tendonfmu.estimate.structure import own_copy
 from tendonfmu.model import native
 from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.blocks import SampleBlocks, regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]
 
-# docs/reference/commands/diagnose.md#the-effects, without `contact` and `unknown`, which are no terms of a model, and
-# `calibration`, which is several
+# docs/reference/commands/diagnose.md#the-effects, without `contact` and `unknown`, which are no terms of a model,
+# `calibration`, which is several, and the memory of friction, which is chosen first
 CONTRACT = (
     "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",
     "joint_load_friction", "preload_friction", "load_friction", "cover_stiffness", "cover_hardening", "gravity",
-    "inertia", "inertia_variation", "presliding", "friction_drift", "force_gain", "force_offset", "time_delay",
+    "inertia", "inertia_variation", "friction_drift", "force_gain", "force_offset", "time_delay",
     "moment_arm",
     "moment_arm_variation", "pulley_eccentricity", "tendon_nonlinearity", "joint_coupling", "backlash",
 )  # fmt: skip
-EXACT = 1e-5  # of a column's largest value
+MEMORY = ("presliding", "relaxation", "cord_stretch")
 NOTHING = 1e-11  # N·m at an ordinary magnitude: a column that is all zero but for rounding
 
 
@@ -111,26 +107,19 @@ def moved(data: Data, seconds: float, seed: int, gap: bool = False) -> Recording
 
 
 class Case:
-    """Columns of two recordings, one with a gap, in blocks that leave some samples out."""
+    """Columns of two recordings, one with a gap."""
 
     def __init__(self) -> None:
         self.data = finger_data()
         finger = described(self.data)
         made = (moved(self.data, 6.0, 1, gap=True), moved(self.data, 5.0, 2))
         self.recordings: list[FitRecording] = [prepare(finger, each, 1, Held()) for each in made]
-        whole = regular_blocks([each.time for each in made], [each.parts for each in self.recordings], 0.024)
-        shortened = [each.copy() for each in whole.of]
-        shortened[0][:7] = -1
-        shortened[1][400:500] = -1
-        kept = np.unique(np.concatenate(shortened))
-        number = {int(old): new for new, old in enumerate(kept[kept >= 0])} | {-1: -1}
-        numbered = tuple(np.array([number[int(b)] for b in each]) for each in shortened)
-        self.blocks = SampleBlocks(numbered, len(number) - 1)
+        self.samples = Samples.of(self.data, self.recordings)
         self.span: Span = span_of(self.data, self.recordings)
-        self.columns: CandidateColumns = candidate_columns(self.data, self.recordings, self.blocks, span=self.span)
+        self.columns: CandidateColumns = candidate_columns(self.data, self.samples, span=self.span)
 
-    def prediction(self, data: Mapping[str, Any]) -> Numbers:
-        return block_prediction(data, self.recordings, self.blocks)
+    def left(self, data: Mapping[str, Any]) -> Numbers:
+        return self.samples.left(data)
 
     def proposals(self, name: str) -> list[tuple[Proposal, Variant]]:
         return [(each, each.variant) for each in self.columns.proposals if each.candidate.name == name]
@@ -141,27 +130,25 @@ def case() -> Case:
     return Case()
 
 
-def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float, one_sided: bool) -> Numbers:
-    def prediction(size: float) -> Numbers:
-        changed = own_copy(base)
-        for path, share in numbers.items():
-            add_to_number(changed, path, size * share)
-        return case.prediction(changed)
-
-    low = 0.0 if one_sided else -step
-    return np.asarray((prediction(step) - prediction(low)) / (step - low))
+def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float) -> Numbers:
+    changed = own_copy(base)
+    for path, share in numbers.items():
+        add_to_number(changed, path, step * share)
+    return np.asarray((case.left(base) - case.left(changed)) / step)
 
 
-def assert_column(found: NDArray[Any], expected: Numbers, ordinary: float, what: str) -> None:
-    largest = max(float(np.abs(expected).max()), NOTHING / ordinary / EXACT)
-    assert np.abs(found - expected).max() < EXACT * largest, what
+def assert_column(found: NDArray[Any], expected: Numbers, ordinary: float, what: str, exact: float = 1e-5) -> None:
+    largest = max(float(np.abs(expected).max()), NOTHING / ordinary / exact)
+    assert np.abs(found - expected).max() < exact * largest, what
 
 
 # --- which there are --------------------------------------------------------------------------------------------------
 
 
 def test_every_effect_of_the_contract_has_a_candidate() -> None:
-    assert tuple(candidate.name for candidate in CANDIDATES if candidate.name != "calibration") == CONTRACT
+    assert (
+        tuple(candidate.name for candidate in CANDIDATES if candidate.name not in ("calibration", *MEMORY)) == CONTRACT
+    )
 
 
 def test_every_candidate_is_proposed(case: Case) -> None:
@@ -189,49 +176,12 @@ def test_places_follow_the_structure(case: Case) -> None:
         "load_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
         "preload_friction": {(1, 1), (1, 2), (1, 3), (2, 3), (1, 4), (2, 4)},
         "friction_drift": {(None, None), (1, None), (2, None), (None, 1), (None, 3), (None, 4)},
-        "presliding": {(None, None)},
+        "presliding": set(),
         "force_gain": {(None, 1), (None, 2), (None, 3), (None, 4)},
     }
     for name, places in expected.items():
         found = {(place.joint, place.tendon) for place in by_name(name).places(case.data)}
         assert found == places, name
-
-
-def presliding_places(data: Data, rows: list[Data], **settings: Any) -> set[tuple[int | None, int | None]]:
-    places = by_name("presliding").places({**data, "extensions": rows, **settings})
-    return {(place.joint, place.tendon) for place in places}
-
-
-def test_presliding_is_everywhere_first_and_at_single_places_beside_it(case: Case) -> None:
-    whole = {"effect": "presliding", "displacement": 0.05}
-    own = {"effect": "presliding", "joint": 1, "displacement": 0.002}
-    single = {(1, None), (2, None), (None, 1), (None, 3), (None, 4)}
-    assert presliding_places(case.data, []) == {(None, None)}
-    assert presliding_places(case.data, [whole]) == single
-    assert presliding_places(case.data, [whole, own]) == single - {(1, None)}
-    # a threshold of 0 gives "everywhere" no scale
-    assert presliding_places(case.data, [], velocity_threshold={"tendon": 0.0, "joint": 0.05}) == single
-
-
-def test_distances_of_presliding_follow_the_motion_and_what_there_is(case: Case) -> None:
-    candidate = by_name("presliding")
-
-    def distances(data: Data, place: Place) -> list[float]:
-        return [each.shape["displacement"] for each in candidate.variants(data, place, case.span)]
-
-    thresholds = {"tendon": 0.0005, "joint": 0.05}
-    data = case.data | {"velocity_threshold": thresholds, "extensions": []}
-    times = [*(case.span.travel / 0.05), *(case.span.tendon_travel[[0, 2, 3]] / 0.0005)]
-    everywhere = distances(data, Place())
-    assert everywhere == sorted(everywhere) and len(everywhere) >= 3
-    assert everywhere[0] < 0.01 * np.median(times) and 0.05 * np.median(times) < everywhere[-1] < np.median(times)
-    slower = data | {"velocity_threshold": {key: 2.0 * value for key, value in thresholds.items()}}
-    assert distances(slower, Place()) == pytest.approx([each / 2.0 for each in everywhere])
-    # beside it a place is tried with less and with more than it has
-    known = data | {"extensions": [{"effect": "presliding", "displacement": 0.04}]}
-    for place, threshold in ((Place(1), 0.05), (Place(tendon=3), 0.0005)):
-        low, high = distances(known, place)
-        assert low < 0.04 * threshold < high
 
 
 def test_kinematics_decide_what_can_matter(case: Case) -> None:
@@ -255,48 +205,30 @@ def test_what_is_present_is_not_proposed_again(case: Case, name: str) -> None:
         if proposal.place in candidate.places(extended) and not variant.rows:
             again = [each for each in again if each.shape.keys() == variant.shape.keys()]
             assert again == [], proposal.place
-        elif variant.rows or variant.secant_rows:
+        elif variant.rows or variant.full is not None:
             assert proposal.place not in candidate.places(extended) or name == "stribeck"
 
 
 # --- columns ----------------------------------------------------------------------------------------------------------
 
 
-def test_prediction_is_what_a_run_says(case: Case) -> None:
-    """G = T + all jumps, by plain averaging of each part's run."""
-    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
-    alone = {**case.data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}
-    for recording, block in zip(case.recordings, case.blocks.of, strict=True):
-        whole = np.full((len(recording.time), 2), np.nan)
-        for part in recording.parts:
-            whole[part] = native.run_recording(alone, recording.arrays(part))["friction_torque"]
-        for number in np.unique(block[block >= 0]):
-            mean = whole[block == number].mean(axis=0)
-            assert case.columns.prediction[number] == pytest.approx(mean, rel=1e-9, abs=1e-13)
-
-
 @pytest.mark.parametrize("name", CONTRACT)
 def test_columns_are_differences_of_the_core(case: Case, name: str) -> None:
-    """Derivatives at a strength of zero by small steps, secants by the term at full strength."""
+    """By the term at its ordinary size, or at full strength where it has no derivative at zero."""
     assert_all_columns(case, name)
 
 
 def late_forces(case: Case, delay: float) -> Numbers:
-    """τ − G with forces measured late, less τ − G as it is, by whole runs."""
-    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
-    alone = {**case.data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}
-    found = np.zeros_like(case.columns.prediction)
-    for recording, block in zip(case.recordings, case.blocks.of, strict=True):
-        whole = np.zeros((len(recording.time), 2))
+    """What is left with forces measured late, less what is left as it is."""
+    late = []
+    for recording in case.recordings:
+        groups = dict(recording.recording.groups)
+        force = groups["tendon_force"].copy()
         for part in recording.parts:
-            arrays = recording.arrays(part)
-            force = [np.interp(arrays["time"] - delay, arrays["time"], one) for one in arrays["tendon_force"].T]
-            late = native.run_recording(alone, {**arrays, "tendon_force": np.stack(force, axis=1)})
-            now = native.run_recording(alone, arrays)
-            whole[part] = late["compensated_torque"] - now["compensated_torque"]
-        for number in np.unique(block[block >= 0]):
-            found[number] = whole[block == number].mean(axis=0)
-    return found
+            time = recording.time[part]
+            force[part] = np.stack([np.interp(time - delay, time, one) for one in force[part].T], axis=1)
+        late.append(replace(recording, recording=replace(recording.recording, groups=groups | {"tendon_force": force})))
+    return Samples.of(case.data, late).left(case.data) - case.left(case.data)
 
 
 def assert_all_columns(case: Case, name: str) -> None:
@@ -308,34 +240,25 @@ def assert_all_columns(case: Case, name: str) -> None:
         if name == "time_delay":
             assert_column(values[:, :, 0], late_forces(case, variant.shape["delay"]), 1.0, f"{name} {variant.shape}")
             continue
-        if variant.secant_rows:
-            expected = case.prediction(variant.secant or {}) - case.columns.prediction
-            assert np.abs(expected).max() > 1e-5 or name == "presliding"
+        if variant.full is not None:
+            expected = case.left(case.data) - case.left(variant.full(1.0))
+            assert np.abs(expected).max() > 1e-5
             assert_column(values[:, :, 0], expected, 1.0, f"{name} {variant.shape}")
             continue
-        assert case.prediction(variant.data) == pytest.approx(case.columns.prediction, rel=1e-9, abs=1e-10)
+        assert case.left(variant.data) == pytest.approx(case.left(case.data), rel=1e-9, abs=1e-10)
         for k, column in enumerate(variant.columns):
-            step = 1e-4 * column.expected
-            expected = by_difference(case, variant.data, column.numbers, step, one_sided=column.sign > 0)
+            expected = by_difference(case, variant.data, column.numbers, column.expected)
             assert_column(values[:, :, k], expected, column.expected, f"{name} {variant.shape} {column.path}")
 
 
-def test_nominal_columns_are_differences_of_the_core(case: Case) -> None:
-    names, directions = nominal_directions(case.data)
-    assert len(names) == case.columns.nominal.shape[2]
-    assert {"joints[1].friction.rate", "tendons[4].edge_friction[1].negative.coulomb", "extensions[1].sine"} <= set(
-        names
-    )
-    for k, (name, direction) in enumerate(zip(names, directions, strict=True)):
-        path = next(iter(direction))
-        value = native.Instance.from_description(case.data).get(path)
-        found = case.columns.nominal[:, :, k]
-        if name.endswith(".rate"):  # by 1/v_s
-            expected = -(value**2) * by_difference(case, case.data, direction, 1e-4 * value, one_sided=False)
-            assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max(), name
-        else:
-            expected = by_difference(case, case.data, direction, 1e-4 * value, one_sided=False)
-            assert_column(found, expected, value, name)
+def test_columns_of_numbers_are_differences_of_the_core(case: Case) -> None:
+    columns, scale = number_columns(case.data, case.samples)
+    listed = [number for number in unknowns(case.data) if number.key != "stribeck_velocity" and number.key != "static"]
+    assert columns.shape[2] == len(scale) >= len(listed)
+    for number in listed:
+        expected = by_difference(case, case.data, {number.path: 1.0}, 1e-4 * number.reference)
+        errors = np.abs(columns - expected[:, :, None]).max(axis=(0, 1))
+        assert errors.min() < 1e-2 * np.abs(expected).max(), number.path
 
 
 # --- what a magnitude means -------------------------------------------------------------------------------------------
@@ -344,13 +267,13 @@ def test_nominal_columns_are_differences_of_the_core(case: Case) -> None:
 @pytest.mark.parametrize("name", CONTRACT)
 def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
     """All numbers of the term, also from magnitudes of 0: what is 0 would stay 0."""
-    before = set(nominal_directions(case.data)[0])
+    before = {number.path for number in unknowns(case.data)}
     for proposal, variant in case.proposals(name):
         extended = proposal.candidate.extended(case.data, proposal.place, variant.shape, [0.0] * variant.count)
-        added = set(nominal_directions(extended)[0]) - before
-        wanted = {f"extensions[{len(extended['extensions'])}]."} if variant.rows or variant.secant_rows else set()
+        added = {number.path for number in unknowns(extended)} - before
+        wanted = {f"extensions[{len(extended['extensions'])}]."} if variant.rows or variant.full is not None else set()
         for path in () if wanted else (path for column in variant.columns for path in column.numbers):
-            wanted.add(path.removesuffix("static") + "drop" if path.endswith(".static") else path)
+            wanted.add(path)
         assert all(any(each.startswith(path) for each in added | before) for path in wanted), (proposal.place, wanted)
         assert added, (name, proposal.place, variant.shape)
 
@@ -370,16 +293,6 @@ def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:
 
 
 # --- averages ---------------------------------------------------------------------------------------------------------
-
-
-def test_regular_blocks_have_no_gap_in_them() -> None:
-    time = np.concatenate([np.arange(25) * 0.004, 7.0 + np.arange(13) * 0.004, 9.0 + np.arange(4) * 0.05])
-    parts = [slice(0, 25), slice(25, 38), slice(38, 42)]
-    blocks = regular_blocks([time], [parts], 0.02)
-    assert blocks.of[0].tolist() == [k // 5 for k in range(25)] + [5 + k // 5 for k in range(13)] + [8, 9, 10, 11]
-    assert blocks.count == 12 and blocks.sizes().sum() == 42
-    with pytest.raises(InputError, match="length of a block = 0 s: expected above 0"):
-        regular_blocks([time], [parts], 0.0)
 
 
 def test_a_pulley_has_few_forms_however_far_a_joint_seems_to_turn() -> None:

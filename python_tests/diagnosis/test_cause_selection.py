@@ -16,8 +16,6 @@ from tendonfmu.diagnosis.effects import Place, by_name
 from tendonfmu.diagnosis.hypotheses import LARGEST_SCALING, LARGEST_SECANT, hypotheses
 from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
-from tendonfmu.diagnosis.signal_choice import lag_of
-from tendonfmu.recordings import Signals
 from tendonfmu.statistics.block_grams import standard_error
 
 Numbers = NDArray[np.float64]
@@ -294,7 +292,7 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     delay = OF_SAMPLE * 0.004
     assert SENSORS.least("time_delay", None, None) == pytest.approx(delay)
     assert SENSORS.least("backlash", 2, None) == pytest.approx(OF_NOISE * 2e-4)
-    assert SENSORS.least("presliding", None, 3) == pytest.approx(OF_NOISE * 3e-6)
+    assert SENSORS.least("backlash", None, 3) == pytest.approx(OF_NOISE * 3e-6)
     assert SENSORS.least("gravity", 1, None) == 0.0
     shows = SENSORS.shows
     assert not shows("backlash", Place(2), {"width": 3.9 * 2e-4})
@@ -305,28 +303,19 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     assert shows("gravity", Place(1), {"sine": 1e-9}) and shows("backlash", Place(2), None)
 
 
-def test_velocities_lag_behind_positions_by_half_a_sample_and_the_filter() -> None:
-    data = {"velocity_filter_cutoff": 20.0}
-    assert lag_of(data, Signals(), 2, 0.004) == pytest.approx(0.002 + 1.0 / (40.0 * np.pi))
-    assert lag_of(data, Signals(10.0), 1, 0.004) == pytest.approx(0.002), "smoothed both ways"
-    assert lag_of(data, Signals(), 3, 0.004) == 0.0, "velocities are measured"
-
-
 def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:
     made = [
         Made("backlash", 1, shapes=({"width": 2e-4},), secant=True),
         Made("time_delay", shapes=({"delay": -0.01},), secant=True),
-        Made("presliding", 1, shapes=({"displacement": 1e-6},), secant=True),
         Made("gravity", 1),
     ]
-    found = {each.effect: each for each in hypotheses_of(candidate_columns(columns[:, :, :4], made))}
+    found = {each.effect: each for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))}
     # before the fit half of the least size will do: 4 times 0.1 mrad of noise; three quarters of 4 ms
     for effect, step, least in (("backlash", 2e-4, 4e-4), ("time_delay", 0.01, 0.003)):
         for times, resolved in ((0.95, False), (1.05, True)):
             magnitude = times * BEFORE_FIT * least / step
             assert SENSORS.resolved(found[effect], [magnitude]) == resolved
             assert SENSORS.resolved(found[effect], [-magnitude]) == resolved
-    assert SENSORS.resolved(found["presliding"], [1e-9])
     assert SENSORS.resolved(found["gravity"], [1e-12])
 
 

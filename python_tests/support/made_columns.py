@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from synthetic_series import bias_splines
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.block_grams import Grams, Products
 from tendonfmu.statistics.blocks import make_folds
-from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]
@@ -91,10 +91,9 @@ def candidate_columns(values: Array, made: Sequence[Made]) -> CandidateColumns:
         for shape in each.shapes:
             expected = tuple(each.expected) * (each.size if len(each.expected) == 1 else 1)
             columns = tuple(Column({"": 1.0}, each.sign, size) for size in expected)
-            variant = Variant({}, shape, secant_rows=({},)) if each.secant else Variant({}, shape, columns)
+            variant = Variant({}, shape, full=lambda factor: {}) if each.secant else Variant({}, shape, columns)
             place = Place(each.joint, each.tendon)
             proposals.append(Proposal(by_name(each.effect), place, variant, slice(first, first + each.size)))
             first += each.size
     assert first == values.shape[2]
-    nothing = np.zeros((*values.shape[:2], 0), dtype=np.float32)
-    return CandidateColumns(np.zeros(values.shape[:2]), nothing, values.astype(np.float32), tuple(proposals))
+    return CandidateColumns(values.astype(np.float32), tuple(proposals))

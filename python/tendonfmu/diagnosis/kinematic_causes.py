@@ -38,7 +38,7 @@ from tendonfmu.recordings import (
 )
 from tendonfmu.statistics import Interval
 
-LEAST_SHARE = {ARM: 0.01, SPRING: 0.03, COUPLING: 0.02}  # of the number; of a coupling, of the tendon's largest arm
+LEAST_SHARE = {ARM: 0.02, SPRING: 0.03, COUPLING: 0.02}  # of the number; of a coupling, of the tendon's largest arm
 LEAST_ANGLE = 0.004  # rad, a quarter of a degree: of an encoder; a zero turns the joint by as much
 LONGER = "record a minute or more of motion of all joints"
 
@@ -89,6 +89,11 @@ class KinematicCauses:
                 path, number = off.number.path, off.number
                 now = data_number(data, path) + number.off if self.is_change else number.rounded
                 add_to_number(edited, path, now - data_number(data, path))
+        before, after = Geometry.of(data), Geometry.of(edited)
+        for off in self.off:
+            if off.where.effect in (ARM, COUPLING, SPRING) and off.where.tendon is not None:
+                moved = after.turned(off) - before.turned(off)
+                add_to_number(edited, f"tendons[{off.where.tendon}].zero", -moved)
         return edited
 
     def in_diagnosis(self, diagnosis: Diagnosis) -> Diagnosis:
@@ -211,10 +216,19 @@ def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
         for j, arm in each.arms.items():
             effect = ARM if arms[i, j] else COUPLING
             least = LEAST_SHARE[effect] * abs(arms[i, j] or largest)
-            yield Off(Where(effect, j + 1, i + 1), arm, least)
-        spring = each.stiffness
-        yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described)
-        yield Off(Where(ZERO, None, i + 1), each.zero, LEAST_ANGLE * largest)
+            yield Off(Where(effect, j + 1, i + 1), arm, least, float(each.span[0, j]))
+        spring, force = each.stiffness, float(each.span[0, -1])
+        yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described, force)
+        yield Off(Where(ZERO, None, i + 1), _zero_in_the_middle(each, force), LEAST_ANGLE * largest)
+
+
+def _zero_in_the_middle(routing: TendonRouting, force: float) -> Learned:
+    """Return a tendon's zero as it is off in the middle of the motion, where it tells nothing of arms and spring."""
+    zero, spring = routing.zero, routing.stiffness
+    off = zero.off + sum(arm.off * float(routing.span[0, j]) for j, arm in routing.arms.items())
+    off += force * (1.0 / spring.value - 1.0 / spring.described)
+    p_value = 2.0 * float(ndtr(-1.96 * abs(off) / max(zero.half, 1e-300)))
+    return replace(zero, value=zero.described + off, p_value=p_value)
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.base import Base, refitted
+from tendonfmu.diagnosis.base import POSITION, Base, refitted
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of
@@ -80,6 +80,8 @@ class ExtensionSearch(CauseSearch):
         trials = [self._tried(cause) for cause in named]
         chosen = min(trials, key=lambda trial: float(trial.error.sum()))
         same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, chosen.error)]
+        # friction takes up torque that depends on the angles, so of what cannot be distinguished that torque comes first
+        chosen = next((trial for trial in same if trial.cause.effect in POSITION), chosen)
         fitted = {trial.cause.effect for trial in trials}
         alike = [trial.cause for trial in same if trial is not chosen]
         alike += [rival for rival in best.alike if rival.effect not in fitted]
