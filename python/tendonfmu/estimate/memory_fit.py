@@ -84,6 +84,8 @@ class MemoryProblem:
         unknowns, of_row = estimator.unknowns, {row: path for path, row in structure.index.items()}
         self.shared = [[of_row[row] for row in unknown.parameters] for unknown in unknowns]  # paths of each unknown
         log = np.array([unknown.path in remembered for unknown in unknowns])
+        initial = {k: each.path for k, each in enumerate(unknowns) if each.path.startswith("bias.initial_torque[")}
+        self._constants = {k: int(path.rpartition("[")[2][:-1]) - 1 for k, path in initial.items()}  # joints from 0
         self.scale = Scale(log, estimator.scale)
         ends = (np.array([getattr(unknown, end) for unknown in unknowns]) for end in ("lower", "upper"))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,6 +114,15 @@ class MemoryProblem:
         residual = self.drift.without(self.runs.residual(self._of_description(self.values(u))))
         return State(u, residual, self.cost(residual, u))
 
+    def unknowns_at(self, state: State) -> Numbers:
+        """Return the unknowns z [u] of a state; `bias.initial_torque` is the constant that the residual leaves."""
+        z = self.scale.unknowns(state.u)
+        if self._constants:
+            left = self.runs.residual(self._of_description(self.values(state.u)))[self.drift.used].mean(axis=0)
+            for k, joint in self._constants.items():
+                z[k] = left[joint]
+        return z
+
     def cost(self, residual: Numbers, u: Numbers) -> float:
         """Return the negative log likelihood with the prior."""
         away = u - self.mean
@@ -135,6 +146,8 @@ class MemoryProblem:
         for j, share in enumerate(self._weight(state.residual)):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
+        for k, joint in self._constants.items() if columns.shape[2] == len(self.scale.log) else ():
+            information[k, k] += self.blocks[joint] / self.variance(state.residual)[joint] * self.scale.size[k] ** 2
         return Linearised(columns, information, gradient)
 
     def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
