@@ -19,7 +19,6 @@ from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant
 from tendonfmu.diagnosis.samples import Samples, with_late_forces
 from tendonfmu.diagnosis.span import Span, span_of
 from tendonfmu.errors import TooLargeError
-from tendonfmu.estimate import CoreRuns
 
 Single = NDArray[np.float32]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
@@ -72,8 +71,8 @@ def candidate_columns(
 def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> Iterator[Numbers]:
     """Yield the columns of a variant [B, n]; `base` is what the description leaves [B, n], N·m."""
     if variant.late:
-        late = CoreRuns(data, with_late_forces(samples.recordings, variant.late), samples.grid, threads=samples.threads)
-        yield late.residual() + samples.runs.added - base
+        late = samples.of_recordings(data, with_late_forces(samples.recordings, variant.late))
+        yield late.left(data) - base
     elif variant.secant is not None:
         yield base - samples.left(variant.secant)
     else:

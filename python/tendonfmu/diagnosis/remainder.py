@@ -72,7 +72,7 @@ def measure_remainder(
     if not folds.enough:
         nothing = np.zeros((folds.stretches, joints))
         return Remainder((0.0,) * joints, nothing, nothing, np.zeros(joints), 1.0, "", np.zeros_like(residual), ())
-    seen = features(series, force=force, torque=torque, seed=seed)
+    seen = features(series, force=force, torque=torque, seed=seed, elastic=True)
     learner = Learner(seen, residual, splines, folds)
     everything, law = _predicted(
         learner, seen, tree_states(series, series.force if force is None else force, torque), seed

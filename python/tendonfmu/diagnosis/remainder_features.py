@@ -76,7 +76,14 @@ LAW = ("velocity", "friction over force", "acceleration", "travel", "elastic", "
 HISTORY = (0.1, 1.0, 10.0)  # s, for the trees
 
 
-def features(series: Series, *, force: Numbers | None = None, torque: Numbers | None = None, seed: int = 0) -> Features:
+def features(
+    series: Series,
+    *,
+    force: Numbers | None = None,
+    torque: Numbers | None = None,
+    seed: int = 0,
+    elastic: bool = False,
+) -> Features:
     """Compute all columns for the blocks of a series, standardised; constant columns are left out."""
     # torque: of the model, N·m [B, n]; a measured torque or force would carry the residual
     series = replace(series, force=_without_torque(series) if force is None else force)
@@ -90,7 +97,7 @@ def features(series: Series, *, force: Numbers | None = None, torque: Numbers | 
         _of_forces,
         _of_accelerations,
         _of_memory,
-        _of_states,
+        *((_of_states,) if elastic else ()),
         _of_slides,
         _of_time,
         _of_tendons,

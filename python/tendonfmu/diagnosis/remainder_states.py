@@ -26,9 +26,12 @@ PLANTED = 3  # states planted at each joint
 def states_of(series: Series, starts: Indices) -> Iterator[tuple[str, Numbers]]:
     """Yield (part of the finger, its states of every width and time [B, k]), for each joint and tendon."""
     widths, times = np.array(list(product(WIDTHS, TIMES))).T
-    for who, driver, load in _drivers(series):
-        states = stopped(np.repeat(driver[:, None], len(widths), axis=1), widths, times, series.step, starts)
-        yield who, states if load is None else states * load[:, None]
+    drivers, count = list(_drivers(series)), len(widths)
+    moved = np.repeat(np.stack([driver for _, driver, _ in drivers], axis=1), count, axis=1)
+    states = stopped(moved, np.tile(widths, len(drivers)), np.tile(times, len(drivers)), series.step, starts)
+    for k, (who, _, load) in enumerate(drivers):
+        own = states[:, k * count : (k + 1) * count]
+        yield who, own if load is None else own * load[:, None]
 
 
 def planted(series: Series, starts: Indices, random: np.random.Generator) -> Numbers:

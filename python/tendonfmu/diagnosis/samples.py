@@ -25,6 +25,7 @@ from tendonfmu.model import moment_arms
 from tendonfmu.recordings import FitRecording, Grid
 from tendonfmu.statistics import Splines
 
+RATE = 160.0  # Hz, of the runs, at least: elements take any step, and friction changes in tens of milliseconds
 MOST_SHIFT = 10.0  # times the largest measured force
 
 
@@ -40,7 +41,7 @@ class Samples:
     @classmethod
     def of(cls, data: Data, recordings: Sequence[FitRecording], threads: int = 1) -> Samples:
         """Prepare recordings as they were measured."""
-        runs = CoreRuns(data, recordings, threads=threads)
+        runs = CoreRuns(data, recordings, rate=RATE, threads=threads)
         return cls(recordings, runs, SlowDrift(runs.time, runs.stretch, runs.used), threads)
 
     @property
@@ -82,18 +83,20 @@ class Samples:
         """Return the block means of a description's signals and of what it leaves."""
         return replace(make_series(data, self.recordings, self.grid, self.left(data)), used=self.used)
 
+    def of_recordings(self, data: Data, recordings: Sequence[FitRecording]) -> Samples:
+        """Return the samples with the forces of other recordings of the same times; the measured torque stays."""
+        runs = CoreRuns(data, recordings, self.grid, rate=RATE, threads=self.threads)
+        runs.added = self.runs.added
+        return replace(self, recordings=recordings, runs=runs)
+
     def at_predicted_forces(self, data: Data) -> Samples:
         """Return the samples with the forces that a description predicts."""
-        predicted = predicted_forces(data, self.recordings)
-        runs, arms = CoreRuns(data, predicted, self.grid, threads=self.threads), moment_arms(data)
-        added = self.grid.means([one.target for one in self.recordings]) - self.grid.means(
-            [
-                each.recording.groups["tendon_force"] @ arms - (0.0 if each.external is None else each.external)
-                for each in predicted
-            ]
-        )
-        runs.added = self.runs.added + added
-        return replace(self, recordings=predicted, runs=runs)
+        predicted, arms = predicted_forces(data, self.recordings), moment_arms(data)
+        both = zip(self.recordings, predicted, strict=True)
+        forces = [one.recording.groups["tendon_force"] - other.recording.groups["tendon_force"] for one, other in both]
+        samples = self.of_recordings(data, predicted)
+        samples.runs.added = self.runs.added + self.grid.means([force @ arms for force in forces])
+        return samples
 
 
 # --- forces that a model predicts ------------------------------------------------------------------------------------

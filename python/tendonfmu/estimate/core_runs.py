@@ -196,7 +196,7 @@ class _Instances:
 
 def _image(data: Data) -> bytes:
     """Return the image of a description whose bias neither learns nor forgets, without contact detection."""
-    bare = without_learning(data, "entry_load")
+    bare = without_learning(data)
     return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
 
 
