@@ -46,10 +46,6 @@ class Base:
     model: FittedModel  # fitted with `start`
     settings: FitSettings
 
-    @property
-    def terms(self) -> list[Term]:
-        return [term for terms in self.start for term in terms]
-
     def look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         """Return what a model that was fitted to the samples lacks."""
         return look(model.data, self.samples, self.least, candidates, model)
@@ -117,7 +113,14 @@ def _with_memory(
     given: Finger, nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
 ) -> tuple[FittedModel, list[tuple[Term, ...]]]:
     """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
-    described = replace(given, data=extended_description(nominal.data, [term for terms in start for term in terms]))
+    described = extended_description(nominal.data, [term for terms in start for term in terms])
+    return remembering(replace(given, data=described), nominal, samples, settings)
+
+
+def remembering(
+    described: Finger, nominal: FittedModel, samples: Samples, settings: FitSettings
+) -> tuple[FittedModel, list[tuple[Term, ...]]]:
+    """Fit a description with the memory that recordings choose, from several starts; return what is new of it, too."""
     choice = choose_memory(described, samples.recordings, settings.choice, threads=settings.threads)
     model = FittedModel(choice.finger.data, nominal.given, {})
     return refitted(model, samples, settings), memory_terms(nominal.data, memory_of(choice.finger.data))

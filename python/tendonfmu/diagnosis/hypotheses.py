@@ -7,9 +7,9 @@ that the description has may have changed, too.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction, Where
 from tendonfmu.diagnosis.effects import BY_NAME, SCALING, SHARED, Place, Term, Variant
-from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
-from tendonfmu.model import law_path, native, steps_of
+from tendonfmu.estimate import Choice, Estimator, Unknown, build_structure, own_copy, set_number
+from tendonfmu.model import finger_from_data, law_path, native, steps_of
 
 LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
 LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
@@ -153,8 +153,9 @@ def numbers_of(data: Data) -> list[Number]:
 
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
     """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
-    image = native.image_from_json(json.dumps({**data, "sensor_fault": None}))
-    return Estimator(image), [parameter.path for parameter in native.Instance(image).parameters()]
+    structure = build_structure(finger_from_data(data, Path("finger")), Choice())
+    paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
+    return Estimator(structure.start.image, structure.group, structure.scale), paths
 
 
 def _number(data: Data, index: int, unknown: Unknown) -> Number:

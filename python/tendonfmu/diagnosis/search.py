@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.base import POSITION, Base, refitted
+from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of
 from tendonfmu.diagnosis.effects import CALIBRATED, SCALING, Place, Term
+from tendonfmu.diagnosis.effects.memory import MEMORY, memory_of
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, possible
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.selection import (
@@ -30,9 +31,11 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.view import View
+from tendonfmu.model import finger_from_data
 from tendonfmu.tasks import Phases, Step
 
 MOST_CAUSES = 8
+LARGE = 0.1  # of the rms: the memory was fitted to what lacked such a cause
 MOST_FITTED = 3  # effects that columns cannot distinguish
 NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
 
@@ -80,7 +83,7 @@ class ExtensionSearch(CauseSearch):
         trials = [self._tried(cause) for cause in named]
         chosen = min(trials, key=lambda trial: float(trial.error.sum()))
         same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, chosen.error)]
-        # friction takes up torque that depends on the angles, so of what cannot be distinguished that torque comes first
+        # friction takes up torque of position, so of what cannot be distinguished that torque comes first
         chosen = next((trial for trial in same if trial.cause.effect in POSITION), chosen)
         fitted = {trial.cause.effect for trial in trials}
         alike = [trial.cause for trial in same if trial is not chosen]
@@ -126,10 +129,23 @@ class ExtensionSearch(CauseSearch):
             return False
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
-        self.model = model = refitted(model, self.base.samples, self.base.settings)
+        self.model = model = self._settled(refitted(model, self.base.samples, self.base.settings), gain)
         self.view = self.view.lean  # frees memory for the next one
         self.view = self.base.look(model)
         return True
+
+    def _settled(self, model: FittedModel, gain: float) -> FittedModel:
+        """Return a model with its memory chosen anew, from several starts, if that is better beside a large cause."""
+        base = self.base
+        if gain < LARGE or not memory_of(model.data):
+            return model
+        described = finger_from_data(model.data, base.settings.path)
+        other, memory = remembering(described, base.nominal, base.samples, base.settings)
+        if other.cost >= model.cost:
+            return model
+        self.causes = [cause for cause in self.causes if cause.effect not in MEMORY]
+        self.causes += [_of_start(terms) for terms in memory]
+        return other
 
     def small(self) -> list[Cause]:
         """Return the best place of every effect that is certain but not material."""

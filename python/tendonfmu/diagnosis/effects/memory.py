@@ -10,7 +10,7 @@ from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.effects.candidate import Place, Term
 from tendonfmu.diagnosis.effects.table import by_name
 
-PRESLIDING, RELAXATION, CORDS = "presliding", "relaxation", "cord_stretch"
+MEMORY = PRESLIDING, RELAXATION, CORDS = "presliding", "relaxation", "cord_stretch"
 Row = Mapping[str, Any]  # of `extensions`
 
 
