@@ -68,6 +68,8 @@ def run_case(family: str, number: int, folder: Path) -> Row:
         "verdict": report["verdict"],
         "left": report["extended"]["test_rms"],
         "causes": [in_words(cause) for cause in report["causes"]],
+        "gains": [cause["gain"]["value"] for cause in report["causes"]],
+        "sizes": [cause["size"] for cause in report["causes"]],
         "too_small": [in_words(cause) for cause in report["too_small"]],
         **judge(report["causes"], truth, report["too_small"]),
         "sized": sizes.are_covered(report["causes"], truth, true),

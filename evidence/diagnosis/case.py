@@ -43,7 +43,7 @@ class Case:
 def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
     """diagnosis.json of the command as a user calls it, in a folder of its own, and its processor time [s].
 
-    Raises RuntimeError with the command's last line where it fails.
+    Raises RuntimeError with the command's last lines where it fails.
     """
     with tempfile.TemporaryDirectory() as name:
         folder, before = Path(name), _seconds_of_children()
@@ -57,9 +57,15 @@ def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
             text=True,
         )
         if ended.returncode:
-            raise RuntimeError((ended.stdout.strip().splitlines() or [f"exit status {ended.returncode}"])[-1])
+            raise RuntimeError(_reason(folder, ended.stdout, ended.returncode))
         report = json.loads((folder / "report" / "diagnosis.json").read_text(encoding="utf-8"))
     return report, _seconds_of_children() - before
+
+
+def _reason(folder: Path, said: str, status: int) -> str:
+    """The last lines of the report of an internal error, else of what the command said."""
+    reports = [file.read_text(encoding="utf-8") for file in sorted(folder.glob("tendonfmu-error-*.txt"))]
+    return "\n".join((reports[-1] if reports else said).strip().splitlines()[-4:]) or f"exit status {status}"
 
 
 def _seconds_of_children() -> float:

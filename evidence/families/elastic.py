@@ -29,7 +29,7 @@ STEP, TICK, SETTLE = 0.0005, 0.001, 1.5  # s; friction is set at every tick
 LINK, MASS, RADIUS, PULLEY = 0.03, 0.008, 0.008, 5e-7  # m, kg, m, kg·m²
 SECTION = 2e4  # N/m, of a cord from one joint to the next
 DAMPING = 2e-4  # s, of a cord between pulleys, over its stiffness
-HARD, SOFT = 0.999, 0.97  # impedance of friction in journals and joints: they creep below 0.5 mm/s and 10 mrad/s
+HARD, SOFT = 0.995, 0.87  # impedance of friction in journals and joints: they creep below 0.5 mm/s and 10 mrad/s
 FREE, TINY = -1e3, 1e-9  # m: springs only pull; N·m: MuJoCo leaves out a frictionloss of 0
 
 
@@ -56,7 +56,7 @@ def mjcf(arms: Array, finger: Finger) -> str:
     return f"""
 <mujoco><compiler angle="radian"/>
   <option timestep="{STEP}" integrator="implicitfast" jacobian="dense" gravity="0 0 0"/>
-  <default><joint solreffriction="0.01 1"/></default>
+  <default><joint solreffriction="0.002 1"/></default>
   <worldbody>{body}</worldbody><tendon>{runs}</tendon>
 </mujoco>"""
 
@@ -99,6 +99,10 @@ class Mechanism:
         self.rows, self.columns = (np.array(part) for part in zip(*passes, strict=True))
         self.hinges = np.array([self.model.joint(f"joint_{j}").dofadr[0] for j in range(n)])
         self.pulleys = np.array([self.model.joint(f"pulley_{i}_{j}").dofadr[0] for i, j in passes])
+        self.lengths = np.zeros((self.model.ntendon, self.model.nv))  # of the runs, by coordinate
+        for k, (begin, count) in enumerate(zip(self.model.tendon_adr, self.model.tendon_num, strict=True)):
+            joints = self.model.wrap_objid[begin : begin + count]
+            self.lengths[k, self.model.jnt_dofadr[joints]] = self.model.wrap_prm[begin : begin + count]
         self.first = np.array([self.model.tendon(f"run_{i}_0").id for i in range(m)])
         self.arriving = np.array([self.model.tendon(f"run_{i}_{j}").id for i, j in passes])
         self.stiffness = self.model.tendon_stiffness.reshape(self.model.ntendon, -1)[:, 0].copy()
@@ -107,13 +111,13 @@ class Mechanism:
         self.crept = np.zeros((1, n))
 
     def tension(self) -> Array:
-        """[runs] N of every part of the cords."""
-        stretch = self.data.ten_length - self.model.tendon_lengthspring[:, 1]
+        """[runs] N of every part of the cords where they are now: MuJoCo's own lengths are a step old."""
+        stretch = self.lengths @ self.data.qpos - self.model.tendon_lengthspring[:, 1]
         return np.asarray(self.stiffness * np.maximum(stretch, 0.0))
 
     def pull(self, motors: Array) -> None:
         """Move the cords' ends; a spring that stiffens is one whose end moves further."""
-        stretch = np.maximum(self.data.ten_length[self.first] + motors, 0.0)
+        stretch = np.maximum(self.lengths[self.first] @ self.data.qpos + motors, 0.0)
         further = self.hardening * stretch**2 / self.stiffness[self.first]
         self.model.tendon_lengthspring[self.first, 1] = -(motors + further)
 
