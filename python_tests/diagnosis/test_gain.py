@@ -154,7 +154,7 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     unseen = Unseen(before.data, [training], [test])
     gains = [unseen.gain(each, found.data, 0) for each in without]
     assert gains[0].low > 0.1 and gains[1].high < 0.05
-    assert result.value.low > 0.0 and not result.held_out
+    assert result.value.value > 0.0 and not result.held_out
     first, _, last = result.steps
     assert 1 - last / first == pytest.approx(result.value.value)
     assert result.steps[1] == pytest.approx(last, rel=0.05)

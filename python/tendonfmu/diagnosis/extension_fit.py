@@ -42,6 +42,7 @@ from tendonfmu.statistics import MEMORY, bounded
 MOST_STEPS = 20
 LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 STEP = 1e-3  # of a coordinate, for derivatives
+FARTHEST = 10.0  # times its expected magnitude, that a step moves a number
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -152,7 +153,8 @@ class _Problem:
         matrix = np.tensordot(columns, weighted, ([0, 1], [0, 1])) + fit.known
         score = -np.tensordot(weighted, state.residual, ([0, 1], [0, 1])) - fit.known @ (state.u - fit.mean)
         matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
-        return np.asarray(bounded(matrix[None], score[None], fit.lower - state.u, fit.upper - state.u)[0])
+        low, high = np.maximum(fit.lower - state.u, -FARTHEST), np.minimum(fit.upper - state.u, FARTHEST)
+        return np.asarray(bounded(matrix[None], score[None], low, high)[0])
 
 
 def _minimised(problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool) -> tuple[State, Numbers]:

@@ -91,9 +91,10 @@ class KinematicCauses:
                 add_to_number(edited, path, now - data_number(data, path))
         before, after = Geometry.of(data), Geometry.of(edited)
         for off in self.off:
-            if off.where.effect in (ARM, COUPLING, SPRING) and off.where.tendon is not None:
-                moved = after.turned(off) - before.turned(off)
-                add_to_number(edited, f"tendons[{off.where.tendon}].zero", -moved)
+            if off.where.effect == SPRING and off.where.tendon is not None:
+                row = off.where.tendon - 1
+                moved = (after.compliance[row] - before.compliance[row]) * off.centre
+                add_to_number(edited, f"tendons[{off.where.tendon}].zero", -float(moved))
         return edited
 
     def in_diagnosis(self, diagnosis: Diagnosis) -> Diagnosis:
@@ -216,19 +217,25 @@ def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
         for j, arm in each.arms.items():
             effect = ARM if arms[i, j] else COUPLING
             least = LEAST_SHARE[effect] * abs(arms[i, j] or largest)
-            yield Off(Where(effect, j + 1, i + 1), arm, least, float(each.span[0, j]))
-        spring, force = each.stiffness, float(each.span[0, -1])
+            yield Off(Where(effect, j + 1, i + 1), arm, least)
+        zero, force = _zero(each)
+        spring = each.stiffness
         yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described, force)
-        yield Off(Where(ZERO, None, i + 1), _zero_in_the_middle(each, force), LEAST_ANGLE * largest)
+        yield Off(Where(ZERO, None, i + 1), zero, LEAST_ANGLE * largest)
 
 
-def _zero_in_the_middle(routing: TendonRouting, force: float) -> Learned:
-    """Return a tendon's zero as it is off in the middle of the motion, where it tells nothing of arms and spring."""
-    zero, spring = routing.zero, routing.stiffness
-    off = zero.off + sum(arm.off * float(routing.span[0, j]) for j, arm in routing.arms.items())
-    off += force * (1.0 / spring.value - 1.0 / spring.described)
+def _zero(routing: TendonRouting) -> tuple[Learned, float]:
+    """Return a tendon's zero, and the force (N) about which its spring is off.
+
+    A spring may be off from no force on, or, where it is not linear, about the force in the middle of the motion. Of
+    both, the zero that is less off is the simpler answer.
+    """
+    zero, spring, force = routing.zero, routing.stiffness, float(routing.span[0, -1])
+    off = zero.off + force * (1.0 / spring.value - 1.0 / spring.described)
+    if not spring.is_known or abs(off) >= abs(zero.off):
+        return zero, 0.0
     p_value = 2.0 * float(ndtr(-1.96 * abs(off) / max(zero.half, 1e-300)))
-    return replace(zero, value=zero.described + off, p_value=p_value)
+    return replace(zero, value=zero.described + off, p_value=p_value), force
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------

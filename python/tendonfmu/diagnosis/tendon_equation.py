@@ -28,7 +28,7 @@ class Off:
     where: Where
     number: Learned  # of an encoder: by how much it reads too much
     least: float  # a smaller one does not matter
-    centre: float = 0.0  # of an arm or a spring: angle (rad) or force (N) in the middle of the motion, where it turns
+    centre: float = 0.0  # of a spring: the force about which it is off, N
 
     @property
     def unit(self) -> str:
@@ -84,9 +84,7 @@ class Geometry:
         new = Geometry(*(values.copy() for values in self._all))
         for each in off:
             joint, tendon, value = (each.where.joint or 0) - 1, (each.where.tendon or 0) - 1, of(each.number)
-            # about the middle of the motion: from there, zeros tell nothing of arms and springs
             if each.where.effect in (ARM, COUPLING):
-                new.zero[tendon] -= (value - new.arms[tendon, joint]) * each.centre
                 new.arms[tendon, joint] = value
             elif each.where.effect == SPRING:
                 new.zero[tendon] -= (1.0 / value - new.compliance[tendon]) * each.centre
@@ -96,12 +94,6 @@ class Geometry:
             else:
                 new.encoder[joint] = value
         return new
-
-    def turned(self, off: Off) -> float:
-        """Return the position of a tendon in the middle of the motion, by the number that is off alone, m."""
-        joint, tendon = (off.where.joint or 0) - 1, (off.where.tendon or 0) - 1
-        value = self.compliance[tendon] if off.where.effect == SPRING else self.arms[tendon, joint]
-        return float(value) * off.centre
 
     def left(self, recording: Recording) -> Numbers:
         """Return what the equation leaves, m [N, m]; 0 where a tendon is slack."""
