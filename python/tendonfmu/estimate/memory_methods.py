@@ -248,7 +248,7 @@ def learned_of(
     passes: int,
 ) -> Learned:
     """Return what a minimum tells, in unknowns z instead of coordinates u."""
-    z = problem.scale.unknowns(last.state.u)
+    z = problem.unknowns_at(last.state)
     turn = problem.scale.slopes(z)
     information, both = last.linearised.information, np.outer(turn, turn)
     known = prior.reported(given)
