@@ -27,14 +27,12 @@ from evidence.fingers import foreign, numpy_capstan, numpy_cases, numpy_karnopp,
 from evidence.fingers.foreign import Array
 from evidence.part import Figures, Part
 from evidence.table import Row, table
+from tendonfmu.diagnosis.base import find_base
 from tendonfmu.diagnosis.extension_fit import FitSettings
-from tendonfmu.diagnosis.signal_choice import choose
-from tendonfmu.diagnosis.view import look
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.model import read_finger
 from tendonfmu.recordings import Held, prepare, read_recording
 from tendonfmu.statistics.intervals import share
-from tendonfmu.statistics.splines import residual_of
 
 RATE = 250.0  # Hz, of the recordings: means of what the simulator samples
 SEED = 1414
@@ -273,19 +271,15 @@ def make(number: int) -> tuple[Case, float]:
 
 
 def visible(finger: Mapping[str, Any], recording: pd.DataFrame, added: Array) -> float:
-    """Variance of an added torque [N, n], less the slow bias, over that of what the finger leaves of the recording, at
+    """Variance of an added torque [N, n], less its mean, over that of what the finger leaves of the recording, at
     the joint where it is largest; by the product's residual."""
     given = read_finger(finger)
     prepared = prepare(given, read_recording(recording), 1, Held())
-    chosen = choose(given, [prepared], FitSettings(threads=1))
-    view = look(chosen.model.data, chosen.recordings, chosen.grid, chosen.least, candidates=())
-    used = view.series.used
-    # the recording may begin at another time after its signals are prepared, and has other samples then
-    time, then = chosen.recordings[0].time, recording["time"].to_numpy()
-    there = np.column_stack([np.interp(time - time[0], then - then[0], column) for column in added.T])
-    blocks = np.concatenate([segment.mean(there[segment.part]) for segment in chosen.grid.segments])
-    torque = residual_of(replace(view.series, target=blocks), view.splines, view.columns.nominal[:, :, :0])
-    return float(np.max(torque[used].var(axis=0) / view.residual[used].var(axis=0)))
+    base = find_base(given, [prepared], FitSettings(threads=1), 0.03)
+    torque = base.samples.drift.without(base.samples.grid.means([added]))
+    return float(
+        np.max(torque.var(axis=0) / base.samples.drift.without(base.samples.left(base.model.data)).var(axis=0))
+    )
 
 
 def run_case(number: int) -> Row:
