@@ -139,7 +139,7 @@ def description_file(folder: Path, number: int) -> Path:
 
 def make(folder: Path, number: int, kinds: tuple[str, ...] = FREE + PUSHED) -> None:
     """All recordings of a finger of PLANS (from 1) that are missing."""
-    plan = PLANS[number - 1]
+    plan = PLANS[number]
     rng = np.random.default_rng(7100 + number)  # as evidence/fingers makes it
     plain = finger(plan, rng)
     physics = dataclasses.replace(plain, **plan.add(plain))

@@ -26,6 +26,7 @@ class Case:
     truth: Truth
     test: pd.DataFrame | None = None
     reference: pd.DataFrame | None = None
+    kinematics: int = 1  # 2: the recorded joint angles
 
     def write(self, folder: Path) -> list[str]:
         """Write finger.json and the recordings; return the arguments of `tendonfmu diagnose` in that folder."""
@@ -36,13 +37,13 @@ class Case:
             if frame is not None:
                 frame.to_parquet(folder / f"{option}.parquet", index=False)
                 arguments += [f"--{option}", f"{option}.parquet"]
-        return [*arguments, "--kinematics", "1"]
+        return [*arguments, "--kinematics", str(self.kinematics)]
 
 
 def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
     """diagnosis.json of the command as a user calls it, in a folder of its own, and its processor time [s].
 
-    Raises RuntimeError with the command's last line where it fails.
+    Raises RuntimeError with the command's last lines where it fails.
     """
     with tempfile.TemporaryDirectory() as name:
         folder, before = Path(name), _seconds_of_children()
@@ -56,9 +57,15 @@ def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
             text=True,
         )
         if ended.returncode:
-            raise RuntimeError((ended.stdout.strip().splitlines() or [f"exit status {ended.returncode}"])[-1])
+            raise RuntimeError(_reason(folder, ended.stdout, ended.returncode))
         report = json.loads((folder / "report" / "diagnosis.json").read_text(encoding="utf-8"))
     return report, _seconds_of_children() - before
+
+
+def _reason(folder: Path, said: str, status: int) -> str:
+    """The last lines of the report of an internal error, else of what the command said."""
+    reports = [file.read_text(encoding="utf-8") for file in sorted(folder.glob("tendonfmu-error-*.txt"))]
+    return "\n".join((reports[-1] if reports else said).strip().splitlines()[-4:]) or f"exit status {status}"
 
 
 def _seconds_of_children() -> float:

@@ -101,6 +101,12 @@ def places(cause: Cause) -> list[Cause]:
     return [{**whole, **place} for place in cause.get("places") or ()] or [whole]
 
 
+def in_words(cause: Cause) -> str:
+    """An effect and its place in a few signs: gravity j1, edge_friction j2 t3."""
+    signs = [f"{sign}{cause[key]}" for key, sign in (("joint", "j"), ("tendon", "t")) if cause.get(key)]
+    return " ".join([cause["effect"], *signs])
+
+
 def leaves_unnamed(report: Mapping[str, Any]) -> bool:
     """Whether the report says that something is there that it cannot name."""
     first = [cause["effect"] for leading in report["causes"][:1] for cause in statements(leading)]

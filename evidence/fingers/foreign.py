@@ -1,11 +1,7 @@
-"""What a foreign case is: a rough description of a finger, two recordings, and what the description hides.
-
-The folder shares no code and no assumption with the product: numpy, scipy, pandas and mujoco make its fingers.
-"""
+"""What the fingers that are pushed share: noise, quantisation, and the form of a description."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,31 +11,6 @@ import pandas as pd
 
 Array = npt.NDArray[np.float64]
 Nominal = dict[str, Any]
-
-TRAIN_SECONDS = 60.0
-TEST_SECONDS = 30.0
-
-
-@dataclasses.dataclass(frozen=True)
-class Truth:
-    """What a case hides, and where."""
-
-    hidden: str  # one of docs/reference/commands/diagnose.md#the-effects, `none`, or `unknown_*` for what is on no list
-    joint: int | None = None  # place, from 1; None: the whole finger, or it has no such place
-    tendon: int | None = None
-    also: tuple[str, ...] = ()  # effects that the simulator has although the description lacks them
-    # variance of what refitting the description leaves of the hidden term over that of the residual, where it is little
-    survives: float | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class Case:
-    """A finger description whose structure is right but for the hidden effect, and its recordings."""
-
-    nominal: Nominal
-    train: pd.DataFrame
-    test: pd.DataFrame
-    truth: Truth
 
 
 def frame(time: Array, force: Array, position: Array, angle: Array | None) -> pd.DataFrame:

@@ -30,24 +30,13 @@ class Physics:
     edge: Array  # friction before joint j, as a share of the tendon force
     pulley: Array  # friction at the pulley of joint j, as a share of the tendon force
     joint_friction: Array  # N·m
-    load_friction: Array  # m
     damping: Array  # N·m·s/rad
     cover: Array  # N·m/rad
     rest_angle: Array  # rad
     spatial: bool = False
-    preload: tuple[int, float] | None = None  # tendon, N: constant friction before its first joint
     heavy: tuple[int, ...] = ()  # links with weight, from 1
     load: float = 0.15  # kg, mass of a heavy link
     hardening: tuple[int, float] | None = None  # joint, N·m/rad³
-    coupling: tuple[int, float] | None = None  # joint and the next one, N·m/rad
-    eccentric: tuple[int, int, float] | None = None  # tendon, joint, m from axis to centre of the pulley
-    bowstring: tuple[int, int, float] | None = None  # tendon, joint, m from axis to the sites: no pulley
-    stribeck: tuple[float, float] | None = None  # share at rest, m/s
-    drift: tuple[float, float] | None = None  # share after a long time, s
-    hum: tuple[int, float, float] | None = None  # joint, N·m, Hz
-    catch: tuple[int, float, float] | None = None  # joint, N·m, rad where it is
-    creep: tuple[int, float, float] | None = None  # joint, N·m/rad, s
-    pushes: tuple[tuple[float, float, float], ...] = ()  # s, s, N
 
     @property
     def tendons(self) -> int:
@@ -65,17 +54,11 @@ class Physics:
         """(tendon, joint) from 0 where something rubs on the part from that joint on."""
         rubs = self.edge.copy()
         rubs[:, 1:] += self.pulley[:, :-1]
-        if self.preload:
-            rubs[self.preload[0] - 1, 0] += 1.0
         return [(i, j) for i in range(self.tendons) for j in range(self.reaches(i)) if rubs[i, j] > 0.0]
-
-    def preload_at(self, i: int, j: int) -> float:
-        """Constant friction of tendon i before joint j [N], both from 0."""
-        return self.preload[1] if self.preload and (self.preload[0] - 1, 0) == (i, j) else 0.0
 
     def rubbing(self) -> list[int]:
         """Joints (from 0) with friction of their own."""
-        return [int(j) for j in np.flatnonzero((self.joint_friction > 0.0) | (self.load_friction > 0.0))]
+        return [int(j) for j in np.flatnonzero(self.joint_friction > 0.0)]
 
 
 def compiled(physics: Physics, step: float) -> mujoco.MjModel:
@@ -101,16 +84,13 @@ def mjcf(physics: Physics, step: float) -> str:
     {"".join(motor(i) for i in range(physics.tendons))}
     {before(physics, 0)}
     {link(physics, 0)}
-    {probe(physics)}
   </worldbody>
   <tendon>
     {"".join(tendon(physics, i, 0, f"spring_{i}", physics.stiffness[i]) for i in range(physics.tendons))}
     {"".join(tendon(physics, i, j, f"drag_{i}_{j}", 0.0) for i, j in physics.drags())}
-    {coupling(physics)}
   </tendon>
   <actuator>
     {"".join(f'<position joint="motor_{i}" kp="40000" kv="240"/>' for i in range(physics.tendons))}
-    {'<motor joint="probe"/>' if physics.pushes else ""}
   </actuator>
 </mujoco>"""
 
@@ -134,14 +114,13 @@ def link(physics: Physics, j: int) -> str:
         return ""
     heavy = j + 1 in physics.heavy
     mass = physics.load if heavy else 0.015
-    touch = ' contype="1" conaffinity="1"' if physics.pushes and j + 1 == physics.joints else ""
     inertia = mass * LINK**2 / 12
     return f"""
 <body pos="{LINK if j else 0.0} 0 0" gravcomp="{0 if heavy else 1}">
   <joint name="joint_{j}" axis="0 -1 0" stiffness="{physics.cover[j]}" springref="{physics.rest_angle[j]}"
          damping="{physics.damping[j]}" frictionloss="{1e-6 if j in physics.rubbing() else 0.0}"/>
   <inertial pos="{0.6 * LINK} 0 0" mass="{mass}" diaginertia="{inertia / 8} {inertia} {inertia}"/>
-  <geom type="capsule" size="0.005" fromto="0.008 0 0 {LINK} 0 0"{touch}/>
+  <geom type="capsule" size="0.005" fromto="0.008 0 0 {LINK} 0 0"/>
   <site name="after_{j}" pos="{REACH} 0 0"/>
   {pulleys(physics, j)}
   {before(physics, j + 1)}
@@ -150,15 +129,10 @@ def link(physics: Physics, j: int) -> str:
 
 
 def before(physics: Physics, j: int) -> str:
-    """Sites before joint j, on the body that carries it; a bowstring has its own."""
+    """Site before joint j, on the body that carries it."""
     if j >= physics.joints:
         return ""
-    axis = LINK if j else 0.0
-    text = f'<site name="before_{j}" pos="{axis - REACH} 0 0"/>'
-    if physics.bowstring and physics.bowstring[1] == j + 1:
-        i, _, ahead = physics.bowstring
-        text += f'<site name="bow_before" pos="{axis - ahead} 0 {physics.arms[i - 1, j]}"/>'
-    return text
+    return f'<site name="before_{j}" pos="{(LINK if j else 0.0) - REACH} 0 0"/>'
 
 
 def pulleys(physics: Physics, j: int) -> str:
@@ -168,21 +142,9 @@ def pulleys(physics: Physics, j: int) -> str:
         arm = float(physics.arms[i, j])
         if arm == 0.0 or not physics.spatial:
             continue
-        x, z = centre(physics, i, j)
-        text += f'<geom name="pulley_{i}_{j}" type="cylinder" size="{abs(arm)} 0.002" pos="{x} 0 {z}" zaxis="0 1 0"/>'
+        text += f'<geom name="pulley_{i}_{j}" type="cylinder" size="{abs(arm)} 0.002" pos="0 0 0" zaxis="0 1 0"/>'
         text += f'<site name="side_{i}_{j}" pos="0 0 {arm + np.sign(arm) * 0.004}"/>'
-        if physics.bowstring and physics.bowstring[:2] == (i + 1, j + 1):
-            text += f'<site name="bow_after" pos="{physics.bowstring[2]} 0 {arm}"/>'
     return text
-
-
-def centre(physics: Physics, i: int, j: int) -> tuple[float, float]:
-    """Centre of a pulley [m], off the joint's axis if it is the eccentric one: at right angles to the tendon's line."""
-    if not physics.eccentric or physics.eccentric[:2] != (i + 1, j + 1):
-        return 0.0, 0.0
-    arm = float(physics.arms[i, j])
-    angle = np.arccos(abs(arm) / REACH)
-    return float(physics.eccentric[2] * np.sin(angle)), float(physics.eccentric[2] * np.cos(angle) * np.sign(arm))
 
 
 def tendon(physics: Physics, i: int, first: int, name: str, stiffness: float) -> str:
@@ -196,29 +158,6 @@ def tendon(physics: Physics, i: int, first: int, name: str, stiffness: float) ->
         return f"<fixed {properties}>{''.join(parts)}</fixed>"
     parts = [f'<site site="motor_{i}"/><site site="entry"/>'] if is_spring else []
     for j in range(first, end):
-        if physics.bowstring and physics.bowstring[:2] == (i + 1, j + 1):
-            parts.append('<site site="bow_before"/><site site="bow_after"/>')
-        else:
-            wrap = f'<geom geom="pulley_{i}_{j}" sidesite="side_{i}_{j}"/>' if physics.arms[i, j] else ""
-            parts.append(f'<site site="before_{j}"/>{wrap}<site site="after_{j}"/>')
+        wrap = f'<geom geom="pulley_{i}_{j}" sidesite="side_{i}_{j}"/>' if physics.arms[i, j] else ""
+        parts.append(f'<site site="before_{j}"/>{wrap}<site site="after_{j}"/>')
     return f"<spatial {properties}>{''.join(parts)}</spatial>"
-
-
-def coupling(physics: Physics) -> str:
-    if not physics.coupling:
-        return ""
-    joint, stiffness = physics.coupling
-    ends = f'<joint joint="joint_{joint - 1}" coef="1"/><joint joint="joint_{joint}" coef="-1"/>'
-    return f'<fixed name="coupling" stiffness="{stiffness}" springlength="0">{ends}</fixed>'
-
-
-def probe(physics: Physics) -> str:
-    """A plate above the finger that a force presses down on the last link."""
-    if not physics.pushes:
-        return ""
-    return (
-        '<body pos="0.05 0 0.14" gravcomp="1">'
-        '<joint name="probe" type="slide" axis="0 0 -1" range="0 0.28" damping="1"/>'
-        '<inertial pos="0 0 0" mass="0.03" diaginertia="1e-4 1e-4 1e-4"/>'
-        '<geom type="box" size="0.15 0.02 0.005" contype="1" conaffinity="1"/></body>'
-    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import mujoco
 import numpy as np
@@ -69,10 +68,7 @@ class Runner:
         self.hinges = slice(m, m + n)
         self.drags = physics.drags()
         self.rubbing = physics.rubbing()
-        # per drag: share of the force, N of constant friction
         self.shares = [float(physics.edge[i, j] + (physics.pulley[i, j - 1] if j else 0.0)) for i, j in self.drags]
-        self.constants = [physics.preload_at(i, j) for i, j in self.drags]
-        self.crept = np.zeros(n)
         mujoco.mj_forward(self.model, self.data)
 
     def tension(self) -> Array:
@@ -81,53 +77,30 @@ class Runner:
         stretch = self.data.ten_length[:m] - self.model.tendon_lengthspring[:m, 1]
         return np.asarray(self.physics.stiffness * np.maximum(0.0, stretch))
 
-    def drift(self, t: float) -> float:
-        p = self.physics
-        return 1.0 + p.drift[0] * (1 - math.exp(-max(t, 0.0) / p.drift[1])) if p.drift else 1.0
-
-    def set_friction(self, t: float) -> None:
+    def set_friction(self) -> None:
         """Frictionloss of tendons and joints in proportion to the force there, from proximal to distal."""
         p, m = self.physics, self.physics.tendons
-        drift = self.drift(t)
         force = self.tension().tolist()  # falls (or grows) along the tendon by what rubbed in the step before
         rubbed = self.data.efc_force[len(self.rubbing) : len(self.rubbing) + len(self.drags)].tolist()
-        speed = self.data.ten_velocity[m : m + len(self.drags)].tolist()
-        load, losses = [0.0] * p.joints, []
-        for k, (i, j) in enumerate(self.drags):
-            factor = drift * (1 + p.stribeck[0] * math.exp(-abs(speed[k]) / p.stribeck[1]) if p.stribeck else 1.0)
-            losses.append(factor * (self.shares[k] * force[i] + self.constants[k]) + TINY)
+        losses = []
+        for k, (i, _) in enumerate(self.drags):
+            losses.append(self.shares[k] * force[i] + TINY)
             force[i] = max(force[i] - rubbed[k], 0.0)  # lengths count against x1
-            load[j] += force[i]
         self.model.tendon_frictionloss[m : m + len(self.drags)] = losses
-        self.model.dof_frictionloss[self.hinges] = drift * (p.joint_friction + p.load_friction * load)
+        self.model.dof_frictionloss[self.hinges] = p.joint_friction
 
     def disturbance(self, t: float) -> Array:
         """Torques on the joints that MuJoCo has no element for [N·m], as they act."""
         p = self.physics
-        q, v = self.data.qpos[self.hinges], self.data.qvel[self.hinges]
-        torque = np.zeros(p.joints)
+        q, torque = self.data.qpos[self.hinges], np.zeros(p.joints)
         if p.hardening:
             torque[p.hardening[0] - 1] -= p.hardening[1] * q[p.hardening[0] - 1] ** 3
-        if p.hum:
-            torque[p.hum[0] - 1] += p.hum[1] * np.sin(2 * np.pi * p.hum[2] * t)
-        if p.catch and v[p.catch[0] - 1] > 0.0:
-            torque[p.catch[0] - 1] -= p.catch[1] * np.exp(-(((q[p.catch[0] - 1] - p.catch[2]) / 0.06) ** 2))
-        if p.creep:
-            j, stiffness, memory = p.creep[0] - 1, p.creep[1], p.creep[2]
-            torque[j] -= stiffness * (q[j] - self.crept[j])
-            self.crept[j] += STEP * (q[j] - self.crept[j]) / memory
         return torque
-
-    def push(self, t: float) -> float:
-        """Force on the probe [N]; it goes back up when nobody pushes."""
-        return next((force for begin, end, force in self.physics.pushes if begin <= t < end), -0.5)
 
     def advance(self, t: float, motors: Array) -> None:
         """One step from time t."""
-        self.set_friction(t)
+        self.set_friction()
         self.data.ctrl[self.motors] = motors
-        if self.physics.pushes:
-            self.data.ctrl[self.physics.tendons] = self.push(t)
         self.data.qfrc_applied[self.hinges] = self.disturbance(t)
         mujoco.mj_step(self.model, self.data)
 

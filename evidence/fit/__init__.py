@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from evidence.cases import EXAMPLES
-from evidence.fit import paper_figures, recalibration
+from evidence.fit import memory, paper_figures, recalibration
 from evidence.part import Figures, Part
 from evidence.table import of_cells, table
 
@@ -65,6 +65,12 @@ PARTS = {
         virtual_hand,
         headlines={"left.0": (10, 20), "left.1": (10, 25), "left.2": (10, 20), "left.3": (10, 25)},
         tables={"residual": of_cells("lines", ["bias", "training", *HAND], 2)},
+    ),
+    "memory": Part(
+        memory.measure,
+        needs=("mujoco",),
+        headlines={"chosen.elastic": (0.0, 1.5), "chosen.dahl": (0.0, 2.0), "chosen.maxwell": (0.0, 2.0)},
+        tables={"forms": memory.forms_table, "pretensions": memory.pretensions_table},
     ),
     "paper": Part(
         paper_figures.measure,

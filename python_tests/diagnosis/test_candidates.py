@@ -23,7 +23,6 @@ from tendonfmu.diagnosis.effects.description_edit import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.span import Span, _turning_points, span_of
-from tendonfmu.errors import InputError
 from tendonfmu.estimate import unknowns
 from tendonfmu.estimate.structure import own_copy
 from tendonfmu.model import native
@@ -31,7 +30,6 @@ from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.statistics.blocks import regular_blocks
 
 Numbers = NDArray[np.float64]
 Data = dict[str, Any]
@@ -295,16 +293,6 @@ def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:
 
 
 # --- averages ---------------------------------------------------------------------------------------------------------
-
-
-def test_regular_blocks_have_no_gap_in_them() -> None:
-    time = np.concatenate([np.arange(25) * 0.004, 7.0 + np.arange(13) * 0.004, 9.0 + np.arange(4) * 0.05])
-    parts = [slice(0, 25), slice(25, 38), slice(38, 42)]
-    blocks = regular_blocks([time], [parts], 0.02)
-    assert blocks.of[0].tolist() == [k // 5 for k in range(25)] + [5 + k // 5 for k in range(13)] + [8, 9, 10, 11]
-    assert blocks.count == 12 and blocks.sizes().sum() == 42
-    with pytest.raises(InputError, match="length of a block = 0 s: expected above 0"):
-        regular_blocks([time], [parts], 0.0)
 
 
 def test_a_pulley_has_few_forms_however_far_a_joint_seems_to_turn() -> None:

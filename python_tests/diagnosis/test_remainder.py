@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from repetitions import repeated
-from synthetic_series import low_passed, make_series, nuisance_of, residual_of, with_effect
+from synthetic_series import bias_splines, low_passed, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis.pictures import residual_views, whiteness
 from tendonfmu.diagnosis.remainder import measure_remainder
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]
 

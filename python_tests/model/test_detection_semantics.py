@@ -42,63 +42,7 @@ def contact_of(out: Outputs) -> list[int]:
     return [int(each) for each in out["joint_contact"][:, 0]]
 
 
-# --- step 2: hysteresis, forgetting, entry load
-
-
-def hysteresis(h: float, **settings: Any) -> Any:
-    return one_edge(ASYMMETRIC, velocity_threshold={"tendon": V_MIN, "joint": 0.01, "hysteresis": h}, **settings)
-
-
-def test_a_blip_within_the_hysteresis_does_nothing(runner: Runner) -> None:
-    """v_min is 0.05 rad/s at the joint: 0.07 rad/s from rest stays at rest with h = 1/2, and leaves without."""
-    speed = [1.0, 0.0, 0.0, 0.07, -0.07, 0.0]
-    rest = 0.1 - 0.1 * law_value(ASYMMETRIC, 0.01) + 0.1 * law_value(ASYMMETRIC, V_MIN)
-    still = run(runner, hysteresis(0.5), 10.0, speed)
-    close(still["bias_torque"][1:, 0], rest)
-    np.testing.assert_array_equal(still["friction_torque"][1:], still["bias_torque"][1:])
-    plain = run(runner, hysteresis(0.0), 10.0, speed)
-    assert abs(plain["friction_torque"][3, 0] - rest) > 1e-5
-
-
-def test_what_moves_goes_on_down_to_its_lower_limit(runner: Runner) -> None:
-    """(1 − h)·v_min is 0.025 rad/s: 0.03 rad/s moves by F(v) itself, 0.02 stops with F(v_min); 0.08 leaves again."""
-    out = run(runner, hysteresis(0.5), 10.0, [1.0, 0.03, -0.03, 0.02, 0.08])
-    start = 0.1 - 0.1 * law_value(ASYMMETRIC, 0.01)
-    close(out["bias_torque"][:3, 0], start)  # reversed between samples: no entry, no exit
-    close(out["friction_torque"][1:3, 0], [start + 0.1 * law_value(ASYMMETRIC, v) for v in (3e-4, -3e-4)])
-    close(out["bias_torque"][3, 0], start + 0.1 * law_value(ASYMMETRIC, -V_MIN))
-    close(out["bias_torque"][4, 0], start)  # nothing of one sample of rest is forgotten
-    close(out["friction_torque"][4, 0], start + 0.1 * law_value(ASYMMETRIC, 8e-4))
-
-
-def entry_load(tendon: Any, joint: Any, **bias: Any) -> Any:
-    return finger([tendon | FREE], [{"name": "j"} | joint], bias=NO_UPDATE | {"entry_load": True} | bias)
-
-
-STRUCTURES: dict[str, tuple[Any, Any, Callable[[float], float]]] = {
-    "edge": ({"edge_friction": [ASYMMETRIC]}, {}, lambda f: ARM * f),
-    "loop": ({"edge_friction": [ASYMMETRIC], "bidirectional": True}, {}, lambda f: ARM * abs(f)),
-    "joint": ({}, {"friction": ASYMMETRIC}, lambda f: 1.0),
-    "load": ({}, {"load_friction": ASYMMETRIC}, lambda f: f),
-    "load of a loop": ({"bidirectional": True}, {"load_friction": ASYMMETRIC}, abs),
-}
-
-
-@pytest.mark.parametrize("name", STRUCTURES)
-def test_entry_load_takes_out_what_entering_put_in(runner: Runner, name: str) -> None:
-    """Stopped with 10 N, left with 20 N the other way: nothing forgotten, nothing left; then half of it."""
-    tendon, joint, lever = STRUCTURES[name]
-    sign = -1.0 if "loop" in name else 1.0
-    force = sign * np.array([10.0, 10.0, 20.0, 20.0, 20.0])
-    v_min = 0.01 if joint else V_MIN
-    F1, F2 = law_value(ASYMMETRIC, v_min), law_value(ASYMMETRIC, -v_min)
-    half = math.log(2.0) / (2.0 * DT)
-    for rate, kept in ((0.0, 1.0), (half, 0.5)):
-        out = run(runner, entry_load(tendon, joint, forget_rate=rate), force, [1.0, 0.0, 0.0, 0.0, -1.0])
-        change = out["bias_torque"][:, 0] - out["bias_torque"][0, 0]
-        entered = lever(force[1]) * F1
-        close(change[1:4], entered)
-        close(change[4], (1.0 - kept) * (entered - lever(force[4]) * F2))
+# --- step 2: forgetting
 
 
 def absorbed(bias: float, steps: list[tuple[float, float]]) -> Array:
@@ -111,14 +55,13 @@ def absorbed(bias: float, steps: list[tuple[float, float]]) -> Array:
     return np.array(found)
 
 
-@pytest.mark.parametrize("with_entry_load", [False, True])
-def test_absorption_leaves_what_the_filter_has_left(runner: Runner, with_entry_load: bool) -> None:
+def test_absorption_leaves_what_the_filter_has_left(runner: Runner) -> None:
     """Entered at the second update with 10 N, left at the fourth with 20 N: two updates have left (4/7)·(7/10)."""
-    bias = HALF | {"forgetting": "absorption", "forget_rate": 1e3, "entry_load": with_entry_load}
+    bias = HALF | {"forgetting": "absorption", "forget_rate": 1e3}
     force = np.array([10.0, 10.0, 10.0, 20.0, 20.0])
     out = run(runner, one_edge(ASYMMETRIC, bias=bias), force, [1.0, 1.0, 0.0, 0.0, -1.0])
     F1, F2 = law_value(ASYMMETRIC, V_MIN), law_value(ASYMMETRIC, -V_MIN)
-    entered = ARM * (10.0 if with_entry_load else 20.0) * F1
+    entered = ARM * 20.0 * F1
     leave = -0.4 * entered - 0.6 * ARM * 20.0 * F2
     T = ARM * force * np.array([law_value(ASYMMETRIC, ARM * v) if v else 0.0 for v in (1.0, 1.0, 0.0, 0.0, -1.0)])
     jumps = [0.0, ARM * 10.0 * F1, 0.0, leave]

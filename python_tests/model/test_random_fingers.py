@@ -40,7 +40,7 @@ def with_detection(seed: int) -> tuple[Description, Recording]:
 
 
 def with_extensions(seed: int) -> tuple[Description, Recording]:
-    """Every other finger has optional keys of the detection too, entry_load and hysteresis among them."""
+    """Every other finger has optional keys of the detection too."""
     return random_case(seed, 130, detection=seed % 2 == 0, extensions=True)
 
 
@@ -64,8 +64,7 @@ CAMPAIGNS = {
         range(100, 136),
         range(100, 136, 2),
         {
-            "hysteresis_keeps_moving", "hysteresis_stays_stuck",
-            "entry_load_taken_out", "exit_with_absorption", "exit_unabsorbed", "uncertain_joint", "certain_joint",
+            "exit_with_absorption", "exit_unabsorbed", "uncertain_joint", "certain_joint",
             "innovation_alone", "cusum_alone", "residual_alone", "evidence_without_bound", "evidence_emptied",
             "evidence_fastest", "evidence_full", "release_ratio_holds", "held", "update_in_contact", "start_turned",
             "drift_alone", "drift_begins_anew", "start_stands",

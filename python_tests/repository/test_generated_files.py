@@ -124,7 +124,6 @@ def test_the_compiled_runtime_has_the_numbers_of_the_table() -> None:
     tendon = {"stiffness": 5000, "moment_arms": [0.01]}
     full = plain | {
         "tendons": [tendon | {"zero": 0.0}, tendon],
-        "velocity_threshold": {"hysteresis": 0.0},
         "sensor_fault": {},
         "links": [{"axis": [0, 0, 1]}],
         "tip": [0, 0, 0],

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.statistics.whitening import correlation_time, effective_samples, sample_weights
+from tendonfmu.statistics.whitening import _correlation, effective_samples, sample_weights
 
 Numbers = NDArray[np.float64]
+
+
+def correlation_time(values: Numbers) -> float:
+    return _correlation(values)[0]
 
 
 def coloured(seed: int, samples: int, memory: float) -> Numbers:

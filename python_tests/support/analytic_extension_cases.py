@@ -15,7 +15,6 @@ from analytic_cases import (  # fmt: skip
     ARM,
     ASYMMETRIC,
     DRY,
-    NO_UPDATE,
     V_MIN,
     Description,
     Outputs,
@@ -236,18 +235,6 @@ def friction_that_drifts(run: Run) -> None:
     # enters with φ_2·F, leaves after one sample with −F(s2)−(F(s1)−F(s2))·1 = −0.1, times φ_3
     jumps = 0.01 * np.cumsum([0.0, 0.0, phi[2], -phi[3]])
     close(out["bias_torque"][:, 0], 0.09 + jumps)
-
-
-@case
-def drift_and_entry_load(run: Run) -> None:
-    """What entering added, by the factor and force of then, is taken out; what is forgotten counts by those of now."""
-    rows = [{"effect": "friction_drift", "amplitude": 1.0, "time_constant": HALF}]
-    bias = NO_UPDATE | {"entry_load": True, "forget_rate": math.log(2.0)}
-    rec = recording([0.0, 1.0, 2.0, 3.0], [10.0, 20.0, 20.0, 30.0], [1.0, 0.0, 0.0, -1.0])
-    out = run(one_edge(DRY, bias=bias, extensions=rows), rec)
-    e = 0.01 * 20.0 * 0.1 * 1.5
-    leave = -0.5 * e + 0.5 * 0.01 * 30.0 * 0.1 * 1.875  # rested from 1 s to 2 s: κ = 1/2
-    close(out["bias_torque"][:, 0], 0.09 + np.array([0.0, e, e, e + leave]))
 
 
 @case

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from synthetic_series import bias_splines
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
 from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.statistics.block_grams import Grams, Products
 from tendonfmu.statistics.blocks import make_folds
-from tendonfmu.statistics.splines import bias_splines
 
 Numbers = NDArray[np.float64]
 Array = NDArray[Any]

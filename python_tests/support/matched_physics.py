@@ -197,7 +197,7 @@ class Values:
 
 
 def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
-    """Friction over the whole series by docs/reference/semantics/friction_law.md (`entry_load`), or presliding."""
+    """Friction over the whole series by docs/reference/semantics/friction_law.md, or presliding."""
     v = velocity_seen(effect, motion)
     threshold = finger.tendon_threshold if effect.kind in ("edge", "pulley") else finger.joint_threshold
     contacts = contacts_of(v, threshold)
@@ -220,17 +220,15 @@ def values_of(effect: Effect, motion: Motion, finger: Finger) -> Values:
 
 
 def jumps(values: Values, load: Array) -> Array:
-    """[N] cumulated Δb of one effect, its loads [N] multiplied in (semantics/friction_law.md#entry-load)."""
+    """[N] cumulated Δb of one effect, its loads [N] multiplied in (semantics/friction_law.md)."""
     contacts, total = values.contacts, np.zeros(len(load))
     if contacts is None:
         return total
     assert values.entry is not None and values.kept is not None and values.leaving is not None
-    e = values.entry * load[contacts.enters]
-    np.add.at(total, contacts.enters, e)
-    back = np.where(contacts.entered >= 0, e[np.maximum(contacts.entered, 0)] if len(e) else 0.0, 0.0)
-    np.add.at(
-        total, contacts.leaves, -values.kept * back + (1.0 - values.kept) * values.leaving * load[contacts.leaves]
-    )  # fmt: skip
+    np.add.at(total, contacts.enters, values.entry * load[contacts.enters])
+    entered = values.entry[np.maximum(contacts.entered, 0)] if len(values.entry) else 0.0
+    back = values.kept * np.where(contacts.entered >= 0, entered, 0.0)
+    np.add.at(total, contacts.leaves, ((1.0 - values.kept) * values.leaving - back) * load[contacts.leaves])
     return np.asarray(np.cumsum(total))
 
 

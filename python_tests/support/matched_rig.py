@@ -154,7 +154,7 @@ def random_truth(rng: np.random.Generator, joints: int, presliding: bool) -> Des
         "tendons": [{"name": f"tendon_{i + 1}", **tendon} for i, tendon in enumerate(tendons)],
         "velocity_threshold": {"tendon": 0.0004, "joint": 0.04},
         "velocity_filter_cutoff": 0.0,
-        "bias": {"initial_variance": 1e-4, "forget_rate": 0.0, "entry_load": True},
+        "bias": {"initial_variance": 1e-4, "forget_rate": 0.0},
         "contact": {"threshold": [1.0] * joints},
         "extensions": [],
     }  # fmt: skip

@@ -59,7 +59,6 @@ class FingerOracle:
 
     def _read_structure(self, description: Mapping[str, Any]) -> None:
         threshold = given(description, "velocity_threshold", {})
-        self.hysteresis = float(given(threshold, "hysteresis", 0.0))
         self.thresholds = float(given(threshold, "tendon", 0.0005)), float(given(threshold, "joint", 0.01))
         self.n = len(description["joints"])
         self.m = len(description["tendons"])
@@ -92,7 +91,6 @@ class FingerOracle:
         self.initial_torque = given(bias, "initial_torque", None)
         self.noise_time = given(bias, "noise_time", None)
         self.by_absorption = given(bias, "forgetting", "time") == "absorption"
-        self.has_entry_load = bool(given(bias, "entry_load", False))
         self.start = StartFriction(given(bias, "start_share", None), self.n, self.branches)
 
     def step(self, time: float, inputs: Mapping[str, Array], forced: Mapping[Key, Any] | None = None) -> Step:
@@ -129,7 +127,7 @@ class FingerOracle:
         products = self._remembered(F * f, lost, out)
         self._start_of_elements(F, first)
         T = self._total(products) + self._springs(q)
-        db = self._total(self._increments(b * f))
+        db = self._total(b * f)
         tau = self.R.T @ f0 - self.known_torque
         mean_force = float(np.mean(np.abs(f0))) if self.sensors is None else self.sensors.mean_force(f0)
         noise = (self.noise_std + self.noise_std_per_force * mean_force) ** 2
@@ -233,7 +231,7 @@ class FingerOracle:
             if self._remembers(kind, at):
                 taken = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle)), 0.0
                 effect.whole = factor * taken[0]
-                direction = direction_above(velocity, effect.limit(self.hysteresis), key, out)
+                direction = direction_above(velocity, effect.threshold, key, out)
                 effect.side, effect.rests = direction or effect.side, direction == 0
                 if effect.rests and self.detector.bounds_presliding:
                     getattr(hidden, kind)[at] = effect.whole
@@ -286,10 +284,9 @@ class FingerOracle:
         self, effect: Effect, v: float, angle: float, time: float, first: bool, key: Key, out: Step,
     ) -> tuple[float, float]:  # fmt: skip
         """Step 2 of section 5: (F, b) of one effect, and what it remembers."""
-        direction = direction_above(v, effect.limit(self.hysteresis), key, out)
-        self._count_place(effect, direction, abs(v), angle)
+        direction = direction_above(v, effect.threshold, key, out)
+        self._count_place(effect, direction, angle)
 
-        effect.taken_out, effect.enters = 0.0, False
         if direction != 0:  # the effect moves
             F = effect.value(direction, abs(v), angle)
             b = 0.0
@@ -301,13 +298,8 @@ class FingerOracle:
                     out.decisions[("first_exit",)] = True
                 else:
                     kept = self._kept(effect)
-                    if self.has_entry_load:  # what entering added, by the forces of that sample, is taken out
-                        effect.taken_out = kept * effect.entry_load
-                        b = -(1.0 - kept) * leaving
-                        self.branches["entry_load_taken_out"] += 1
-                    else:
-                        entered = effect.at_threshold(effect.side, angle)
-                        b = -leaving - (entered - leaving) * kept
+                    entered = effect.at_threshold(effect.side, angle)
+                    b = -leaving - (entered - leaving) * kept
                     self.branches["exit_same_side" if effect.side == direction else "exit_other_side"] += 1
                     out.decisions[("exit",)] = True
             elif not first:
@@ -327,7 +319,6 @@ class FingerOracle:
             b = effect.at_threshold(effect.side, angle)
             effect.stuck_since = time
             effect.absorbed_since = self.absorbed
-            effect.enters = True
             self.branches["enter"] += 1
             out.decisions[("enter",)] = True
         else:
@@ -345,16 +336,6 @@ class FingerOracle:
         rested = effect.last_stuck - effect.stuck_since
         self.branches["exit_after_one_sample" if rested == 0.0 else "exit_with_memory"] += 1
         return math.exp(-self.forget_rate * rested)
-
-    def _increments(self, products: Places) -> Places:
-        """What the effects add to the bias: b·f, but what entry_load takes out has the forces of another sample."""
-        if self.has_entry_load:
-            for kind, at, effect in self.places:
-                product = getattr(products, kind)
-                if effect.enters:
-                    effect.entry_load = float(product[at])
-                product[at] -= effect.taken_out
-        return products
 
     def _propagate(
         self, f0: Array, F_B: Array, F_A: Array, out: Step
@@ -460,15 +441,13 @@ class FingerOracle:
                 effect.stuck_since = time
                 self.branches["stuck_in_contact"] += 1
 
-    def _count_place(self, effect: Effect, direction: int, speed: float, angle: float) -> None:
+    def _count_place(self, effect: Effect, direction: int, angle: float) -> None:
         if direction != 0:
             symmetric = all(law.positive == law.negative for law in effect.laws)
             side = "positive" if direction > 0 else "negative"
             self.branches[f"{'symmetric' if symmetric else 'asymmetric'}_{side}"] += 1
             if effect.threshold == 0.0:
                 self.branches["moves_above_zero_threshold"] += 1
-        if self.hysteresis > 0.0 and (speed > effect.threshold) != (direction != 0):
-            self.branches["hysteresis_keeps_moving" if direction else "hysteresis_stays_stuck"] += 1
         if len(effect.angles) > 1:
             inside = effect.angles[0] < angle < effect.angles[-1]
             place = "inside" if inside else ("below" if angle <= effect.angles[0] else "above")

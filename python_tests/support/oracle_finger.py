@@ -46,20 +46,10 @@ class Effect:
     stuck_since: float = math.nan
     last_stuck: float = math.nan
     absorbed_since: float = 0.0  # Λ_since: Λ when the effect came to rest
-    entry_load: float = 0.0  # e: the product b·f that it added on coming to rest
-    enters: bool = False  # of the present sample alone, like
-    taken_out: float = 0.0  # κ·e
     rests: bool | None = None  # with `presliding`, which never sticks: whether it is slower than what counts as motion
     start_left: float = 0.0  # of `bias.start_share`: share of how it stood at the start that motion has not turned over
     turned: float = 0.0  # of the present sample alone, like
     whole: float = 0.0  # by how much it may stand otherwise than the model took it
-
-    def limit(self, hysteresis: float) -> float:
-        """The |v| above which the effect moves at this sample."""
-        rested = self.stuck if self.rests is None else self.rests
-        if rested is None:
-            return self.threshold
-        return (1.0 + hysteresis if rested else 1.0 - hysteresis) * self.threshold
 
     def value(self, side: int, speed: float, angle: float) -> float:
         """F(side * speed); the laws' values are interpolated over the angle, constant outside."""

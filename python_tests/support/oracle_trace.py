@@ -138,8 +138,6 @@ class Trace:
         self, description: Mapping[str, Any], recording: Mapping[str, Array], kinematics_source: int = 1
     ) -> None:
         finger, self.torque, self.jump, steps = run_recorder(description, recording, kinematics_source)
-        if finger.has_entry_load:
-            raise ValueError("bias.entry_load: b then belongs to the loads of two samples, which no Course tells")
         self.description = description
         self.n, self.m, self.R = finger.n, finger.m, finger.R
         self.bidirectional = [tendon.bidirectional for tendon in finger.tendons]

@@ -255,7 +255,7 @@ def random_recording(
         if held > 0 and rest[held - 1]:
             position[held], measured_angle[held] = position[held - 1], measured_angle[held - 1]
             # where everything above 0 moves, a compensated step would leave the direction of motion to rounding
-            if rng.random() < 0.9 or thresholds.get("tendon") == 0.0 or thresholds.get("hysteresis") == 1.0:
+            if rng.random() < 0.9 or thresholds.get("tendon") == 0.0:
                 force[held] = force[held - 1]
             else:  # a force step at rest, without a change of the angle
                 position[held] = position[held - 1] + (force[held] - force[held - 1]) / k
@@ -353,16 +353,11 @@ def random_detection(seed: int, finger: Description) -> Description:
     finger = finger | {"contact": contact}
     bias = dict(finger.get("bias", {}))
     if rng.random() < 0.6:
-        bias["entry_load"] = bool(rng.random() < 0.8)
-    if rng.random() < 0.6:
         bias["forgetting"] = "absorption" if rng.random() < 0.8 else "time"
     if rng.random() < 0.5:
         bias["start_share"] = float(rng.choice([0.0, 1.0, rng.uniform(0.1, 1.0)]))
     if bias:
         finger["bias"] = bias
-    if rng.random() < 0.6:
-        hysteresis = float(rng.choice([0.0, rng.uniform(0.05, 0.95), 1.0], p=[0.1, 0.65, 0.25]))
-        finger["velocity_threshold"] = finger.get("velocity_threshold", {}) | {"hysteresis": hysteresis}
     if rng.random() < 0.3:
         hardening = {
             "effect": "cover_hardening",

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.signal import lfilter
 
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.splines import basis, bias_splines, without
+from tendonfmu.statistics.blocks import BlockSeries
+from tendonfmu.statistics.splines import basis, spline_basis, without
 
 Numbers = NDArray[np.float64]
 
 STEP = 0.01  # s
 NOISE = 0.01  # N·m
 ARMS = np.array([[0.008, 0.006], [-0.009, 0.007], [0.007, -0.01], [-0.01, -0.008]])  # m
+
+
+def bias_splines(series: BlockSeries, knots: float = 2.0) -> Any:
+    """[B, s] sparse: splines of a slow bias, apart for each stretch without a gap."""
+    blocks = []
+    for number in np.unique(series.segment):
+        time = series.time[series.segment == number]
+        blocks.append(spline_basis(time, max(float(time[-1] - time[0]), series.step), knots))
+    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
 
 def strokes(rng: np.random.Generator, blocks: int) -> tuple[Numbers, Numbers, Numbers]:

@@ -123,7 +123,6 @@ static void derive_finger(derivation* d, const model_item* item) {
       break;
     case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
     case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
-    case ITEM_HYSTERESIS: settings->hysteresis = values[0]; break;
     default: break; /* extensions read their parameters where they are */
   }
 }
@@ -298,7 +297,6 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
                                                .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
                                                .has_start_share = (options & MODEL_HAS_START_SHARE) != 0,
-                                               .remembers_entry_load = (options & MODEL_REMEMBERS_ENTRY_LOAD) != 0,
                                                .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
                                                .bounds_presliding = (options & MODEL_BOUNDS_PRESLIDING) != 0,
                                                .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,

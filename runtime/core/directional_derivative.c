@@ -169,9 +169,6 @@ static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot
   }
   const dual friction_now = product(grip, scaled(now, magnitude_at(laws, now < 0.0, speed)));
   const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(l->finger, slot));
-  if (l->finger->derived.settings.remembers_entry_load) {
-    return scaled(kept - 1.0, friction_now); /* the rest of it, −κ·e, is remembered */
-  }
   return sum(scaled(-1.0, friction_now), scaled(-kept, difference(friction_before, friction_now)));
 }
 

@@ -156,8 +156,6 @@ const state_row state_rows[] = {
     {AT(event), ROW_OF_SLOTS, 1, 0, SIGN, 0},
     {AT(stuck_since), ROW_OF_SLOTS, 1, 0, -LARGEST_TIME, LARGEST_SQUARE, 0, 1}, /* of time, or of absorption */
     {AT(last_stuck), ROW_OF_SLOTS, 1, 0, WITHIN(LARGEST_TIME), 1},
-    {AT(entry_edge), ROW_OF_SLOTS, 1, MODEL_REMEMBERS_ENTRY_LOAD, ANYTHING, 1},
-    {AT(entry_pulley), ROW_OF_SLOTS, 1, MODEL_REMEMBERS_ENTRY_LOAD, ANYTHING, 1},
     {AT(start_left), ROW_OF_SLOTS, 1, MODEL_HAS_START_SHARE, UP_TO(1.0), 0},
     {AT(unlearned), ROW_OF_JOINTS, 1, MODEL_HAS_START_SHARE, UP_TO(LARGEST_SUM), 0},
     {AT(part), ROW_OF_PARTS, 1, MODEL_HAS_UNCERTAINTY, ANYTHING, 1},
@@ -223,7 +221,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   double** const joint_rows[] = {&s->angle,     &s->torque,         &s->friction,      &s->bias_step,
                                  &s->load,      &s->joint_friction, &s->load_friction, &s->joint_bias,
                                  &s->load_bias, &s->stuck_friction, &s->uncertainty,   &s->residual_variance};
-  double** const slot_rows[] = {&s->edge_kept, &s->pulley_kept, &s->edge_stuck, &s->pulley_stuck};
+  double** const slot_rows[] = {&s->edge_stuck, &s->pulley_stuck};
   double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,
                                &s->edge_loss, &s->pulley_loss, &s->force_at,  &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {

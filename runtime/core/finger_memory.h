@@ -34,8 +34,7 @@ typedef struct finger_settings {
   int has_start_share;
   double start_share; /* of friction as it stood before the first sample */
   int has_initial_torque, has_tendon_zero;
-  double hysteresis;
-  int forgets_by_absorption, remembers_entry_load;
+  int forgets_by_absorption;
   /* the detector */
   int bounds_friction, bounds_presliding, knows_uncertainty, uses_innovation;
   double innovation_time;
@@ -192,10 +191,8 @@ typedef struct finger_state {
   double* side_before;              /* side before the last sample */
   double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
   double *stuck_since, *last_stuck; /* s */
-  double *entry_edge,
-      *entry_pulley; /* e, as the effects came to rest: N; of joints T_jv0 and T_jvf·Σ f_B, N·m; with entry_load only */
-  double *start_left, *unlearned; /* [n × M + N] share of how an effect stood at the start that motion has not turned
-                                     over, [N] V, N·m; with start_share only */
+  double *start_left, *unlearned;   /* [n × M + N] share of how an effect stood at the start that motion has not turned
+                                       over, [N] V, N·m; with start_share only */
   double* part; /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
   /* [N] N·m, with contact.drift only: u, p, s, what the bias has learned since the start, d */
   double *drift_of_late, *drift_quick, *drift_slow, *learned, *drift;
@@ -269,7 +266,6 @@ typedef struct finger_scratch {
   double* slack;      /* [M] */
   double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
-  double *edge_kept, *pulley_kept;   /* [n × M + N] −κ·e of an effect that leaves rest; with entry_load only */
   double *edge_stuck, *pulley_stuck; /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
   double *edge_turned, *pulley_turned, *start_left; /* [n × M + N] |F| whose start this sample turns over, what is left
                                                        of the start after it; with start_share only */
@@ -299,7 +295,6 @@ typedef struct finger_scratch {
                                       * the next with a memory only */
   double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
   effect_sample sample;                              /* as the extensions see it */
-  double start_above[2], stop_below[2]; /* speeds of tendons, joints at which an effect begins to move, comes to rest */
 } finger_scratch;
 
 typedef struct step_kernel step_kernel;

@@ -36,7 +36,6 @@ typedef enum model_item_kind {
   ITEM_START_SHARE, /* bias.start_share */
   ITEM_CONTACT_THRESHOLD, /* contact.threshold[j] */
   ITEM_CONTACT_PER_FORCE, /* contact.threshold_per_force[j] */
-  ITEM_HYSTERESIS, /* velocity_threshold.hysteresis */
   ITEM_INNOVATION_TIME, /* contact.innovation.time */
   ITEM_INNOVATION_THRESHOLD, /* contact.innovation.threshold[j] */
   ITEM_INNOVATION_PER_FORCE, /* contact.innovation.threshold_per_force[j] */

@@ -13,7 +13,7 @@ enum { NO_LAW = 0xffffffffu, LAWS_OF_PLACE = 2, SIDES_OF_JUMP = 2 };
  */
 
 typedef struct sizes {
-  size_t records, rows, joints, places, entries, friction, bias, plain;
+  size_t records, rows, joints, places, friction, bias, plain;
 } sizes;
 
 static sizes sizes_of(const tendonfmu_finger* f) {
@@ -22,23 +22,16 @@ static sizes sizes_of(const tendonfmu_finger* f) {
                  .rows = f->joints * f->tendon_lanes,
                  .joints = f->joint_lanes,
                  .places = places,
-                 .entries = f->shape.options & MODEL_REMEMBERS_ENTRY_LOAD ? places : 0,
                  .friction = places * LAWS_OF_PLACE,
                  .bias = places * LAWS_OF_PLACE * SIDES_OF_JUMP,
                  .plain = 2 * f->joints};
-}
-
-/* numbers a place of entry_load */
-static size_t entry_row(const tendonfmu_finger* f) {
-  return 3 + 3 * f->joints;
 }
 
 size_t parameter_derivative_size(const tendonfmu_finger* finger) {
   const sizes s = sizes_of(finger);
   const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
   return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
-         s.plain * sizeof(plain_term) +
-         (3 * s.places * finger->joints + 4 * finger->joints + s.entries * entry_row(finger)) * sizeof(double);
+         s.plain * sizeof(plain_term) + (3 * s.places * finger->joints + 4 * finger->joints) * sizeof(double);
 }
 
 typedef struct law_search {
@@ -109,11 +102,6 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
   derivative->bias_factor = take(&from, matrix);
   derivative->moved = take(&from, 2 * n * sizeof(double));
   derivative->jumped = take(&from, 2 * n * sizeof(double));
-  derivative->stop_jump = take(&from, s.entries * sizeof(double));
-  derivative->left_share = take(&from, s.entries * sizeof(double));
-  derivative->acting = take(&from, s.entries * sizeof(double));
-  derivative->acting_factor = take(&from, 2 * n * s.entries * sizeof(double));
-  derivative->load_factor = take(&from, n * s.entries * sizeof(double));
   derivative->friction = take(&from, s.friction * sizeof(law_term));
   derivative->bias = take(&from, s.bias * sizeof(law_term));
   derivative->plain = take(&from, s.plain * sizeof(plain_term));
@@ -144,7 +132,6 @@ typedef struct place_laws {
   const double *below, *above; /* packed laws; above NULL: no working points */
   const uint32_t *below_side[2], *above_side[2];
   double weight; /* of the working point above */
-  double acting; /* what multiplies F and b there now */
 } place_laws;
 
 static void add_side(law_term* to, size_t* count, uint32_t place, uint32_t side, double speed, const law_slopes* s,
@@ -187,15 +174,13 @@ static double read_stop(const place_laws* p, double side, double grip, parameter
   return side * add_magnitude(p, side < 0.0, p->threshold, grip * side, d->bias, &d->bias_count);
 }
 
-/* b of fig. 5 where it leaves rest; what entry_load remembers apart is not in it */
+/* b of fig. 5 where it leaves rest */
 static double read_start(const tendonfmu_finger* f, const place_laws* p, double before, double now, double grip,
                          parameter_derivative* d) {
   const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(f, p->slot));
   const double factor = -(1.0 - kept) * now;
   double jump = factor * add_magnitude(p, now < 0.0, p->threshold, grip * factor, d->bias, &d->bias_count);
-  if (f->derived.settings.remembers_entry_load) {
-    d->left_share[p->place] = kept;
-  } else if (kept != 0.0) {
+  if (kept != 0.0) {
     const double back = -kept * before;
     jump += back * add_magnitude(p, before < 0.0, p->threshold, grip * back, d->bias, &d->bias_count);
   }
@@ -206,18 +191,10 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
   const finger_state* s = &f->remembered;
   const double before = s->side_before[p->slot], now = s->side[p->slot], event = s->event[p->slot];
   const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
-  const int keeps_entry = f->derived.settings.remembers_entry_load;
-  if (keeps_entry) {
-    d->stop_jump[p->place] = d->left_share[p->place] = 0.0;
-    d->acting[p->place] = p->acting;
-  }
   if (event == 0.0 || grip == 0.0 || (event > 0.0 && before == 0.0)) {
     return 0.0;
   }
   const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, d);
-  if (keeps_entry && event > 0.0) {
-    d->stop_jump[p->place] = grip * jump;
-  }
   return grip * jump;
 }
 
@@ -231,8 +208,7 @@ static place_laws edge_at(const tendonfmu_finger* f, const parameter_derivative*
                   .threshold = f->derived.settings.tendon_threshold,
                   .below = f->derived.edge_law + record * LAW_NUMBERS,
                   .above = segment[1] != 0.0 ? f->derived.edge_law + (record + 1) * LAW_NUMBERS : NULL,
-                  .weight = (angle - segment[0]) * segment[1],
-                  .acting = f->scratch.force_at[slot]};
+                  .weight = (angle - segment[0]) * segment[1]};
   for (int negative = 0; negative < 2; ++negative) {
     p.below_side[negative] = d->edge_side[negative] + record;
     p.above_side[negative] = d->edge_side[negative] + record + (p.above != NULL);
@@ -278,7 +254,7 @@ static void follow_change(const tendonfmu_finger* f, parameter_derivative* d, si
                           const tendon_forces* t) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, row = (i * 2 * n + k) * n;
-  const int jumps = d->has_jump, keeps_entry = jumps && f->derived.settings.remembers_entry_load;
+  const int jumps = d->has_jump;
   double force = -t->acting[k], lost = t->acting[k], jumped = 0.0;
   for (size_t j = 0; j <= k / 2; ++j) {
     d->torque_factor[row + j] = d->jump_factor[row + j] = d->bias_factor[row + j] = 0.0;
@@ -297,16 +273,10 @@ static void follow_change(const tendonfmu_finger* f, parameter_derivative* d, si
       break;
     }
     const double acting = t->by_force[next] * force;
-    if (keeps_entry) {
-      d->acting_factor[(2 * n * i + next) * 2 * n + k] = acting;
-    }
     if (next % 2 == 1) { /* f_B of joint j, just past its edge */
       const size_t j = next / 2;
       d->torque_factor[row + j] = s->load_friction[j] * acting;
       d->jump_factor[row + j] = jumps ? s->load_bias[j] * acting : 0.0;
-      if (keeps_entry) {
-        d->load_factor[row + j] = acting;
-      }
     }
     jumped += acting * d->jumped[next];
     lost += acting * d->moved[next];
@@ -330,7 +300,6 @@ static void read_tendon(const tendonfmu_finger* f, parameter_derivative* d, size
     if (j + 1 < n && d->pulley_side[0][behind] != NO_LAW) {
       place_laws pulley = single_law(edge.place + 1, behind, f->derived.settings.tendon_threshold,
                                      f->derived.pulley_law + behind * LAW_NUMBERS, d->pulley_side, behind);
-      pulley.acting = f->scratch.force_between[edge.slot];
       present[2 * j + 1] = 1;
       d->moved[2 * j + 1] = read_friction(f, &pulley, d);
       d->jumped[2 * j + 1] = read_jump(f, &pulley, d);
@@ -357,7 +326,6 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
       continue;
     }
     place_laws own = single_law(place + (uint32_t)loaded, slot, threshold, laws + j * LAW_NUMBERS, side, j);
-    own.acting = loaded ? load : 1.0;
     read_friction(f, &own, d);
     read_jump(f, &own, d);
     for (size_t other = 0; other < n; ++other) {

@@ -45,12 +45,6 @@ typedef struct parameter_derivative {
   plain_term* plain;                                 /* of T alone */
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
-  /* with entry_load, of a sample with jumps; [places] */
-  double* stop_jump;     /* b of what comes to rest */
-  double* left_share;    /* κ of what leaves rest and had moved before: −κ·e is part of Δb */
-  double* acting;        /* what multiplies F and b */
-  double* acting_factor; /* [places × 2n] its derivative by F of the places of the same tendon before it */
-  double* load_factor;   /* [places × n] ∂f_B at each joint by F of a place */
 } parameter_derivative;
 
 /* Bytes of memory that the derivative of this finger needs. */

@@ -190,11 +190,8 @@ std::size_t word_of(const json_node& node, const std::vector<std::string>& words
 
 std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
   check_lists(bias, "bias", joints);
-  const json_node entry_load = bias.member("entry_load");
   return given_options(bias, "bias") |
-         (word_of(bias.member("forgetting"), words_of("bias.forgetting")) ? unsigned{MODEL_FORGETS_BY_ABSORPTION}
-                                                                          : 0u) |
-         (!entry_load.absent() && entry_load.boolean() ? unsigned{MODEL_REMEMBERS_ENTRY_LOAD} : 0u);
+         (word_of(bias.member("forgetting"), words_of("bias.forgetting")) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u);
 }
 
 std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
@@ -303,12 +300,16 @@ void check_estimated(const json_node& estimated) {
   }
 }
 
-void check_top(const json_node& document) {
-  const json_node dropped = document.member("position_filter");
-  if (!dropped.absent()) {
-    throw description_error(dropped.path() +
-                            ": no longer a key, presliding needs none; leave it out, or calibrate again");
+void refuse_dropped(const json_node& document) {
+  for (const char* key : {"position_filter", "bias.entry_load", "velocity_threshold.hysteresis"}) {
+    if (!document.find(key).absent()) {
+      throw description_error(std::string(key) + ": no longer a key; leave it out, or calibrate again");
+    }
   }
+}
+
+void check_top(const json_node& document) {
+  refuse_dropped(document);
   document.expect_keys(keys_of(""));
   const json_node format = document.member("format");
   if (format.absent() || format.value() != format_name) {

@@ -52,8 +52,7 @@ class pass_worker {
     for (joint_sum& joint : joints_) {
       joint.begin_segment();
     }
-    finger_.resume(states[segment].finger, numbers_);
-    rows_.resume(states[segment].entries);
+    finger_.resume(states[segment], numbers_);
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
@@ -86,11 +85,6 @@ class pass_worker {
     }
     for (const sensitivity_term& term : rows_.terms()) {
       add_term(term, looked_at);
-    }
-    for (const plain_slope& term : rows_.plain_terms()) {
-      if (term.jump != 0.0) {
-        joints_[term.joint].rows.jump(columns_.unknown[static_cast<std::size_t>(term.column)], -term.jump);
-      }
     }
     if (!looked_at) {
       return;
@@ -216,9 +210,8 @@ class data_pass {
     }
     if (remembers_numbers(problem.finger.get())) {
       free_finger finger(problem.image.data(), problem.image.size());
-      sample_rows rows(problem.unknowns, finger.get());
       for (const recording_track& recording : problem.recordings) {
-        states_.push_back(states_with(recording, &finger, &rows, numbers_));
+        states_.push_back(states_with(recording, &finger, numbers_));
       }
     }
     waiting_.resize(tasks_.size());

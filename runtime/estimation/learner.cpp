@@ -125,7 +125,6 @@ void finger_learner::initialise(const learner_sample& first, int kinematics_sour
     throw refused(tendonfmu_last_error(finger_.get()));
   }
   initialised_ = written_ = true;
-  rows_.forget();
   bias_started_ = false;
   rows_.read();
   if (first.use || finger_.get()->derived.settings.has_initial_torque) {

@@ -80,7 +80,7 @@ std::vector<unsigned char> free_finger::save() const {
 }
 
 bool remembers_numbers(const tendonfmu_finger* finger) {
-  return finger->extensions.signals + finger->extensions.friction > 0 || finger->derived.settings.remembers_entry_load;
+  return finger->extensions.signals + finger->extensions.friction > 0;
 }
 
 /* --- recordings -----------------------------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
   finger->begin(start, source_);
   for (std::size_t k = 0; k < a.samples; ++k) {
     if (k % segment_length_ == 0) {
-      states_.push_back({finger->save(), {}});
+      states_.push_back(finger->save());
     }
     finger->step(k, time_[k], inputs(k));
     if (k > 0 && time_[k] == time_[k - 1]) {

@@ -36,17 +36,12 @@ class free_finger {
   std::vector<double> free_; /* numbers with thresholds that nothing reaches */
 };
 
-/* Whether what a finger remembers depends on numbers that may be estimated: those of extensions that act on signals or
- * on friction, and the loads of entry_load. The states kept with a recording, which are those of the start, are then
- * found anew. */
+/* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction. The
+ * states kept with a recording, which are those of the start, are then found anew. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
-/* The beginning of a segment of a recording: the finger's state, and the sample_rows.h entries. */
-struct segment_state {
-  std::vector<unsigned char> finger;
-  std::vector<double> entries;
-};
-using segment_states = std::vector<segment_state>;
+/* The finger's state at the beginning of each segment of a recording. */
+using segment_states = std::vector<std::vector<unsigned char>>;
 
 /* Arrays of the caller, row-major. */
 struct recording_arrays {

@@ -27,7 +27,7 @@ struct sensitivity_term {
 struct plain_slope {
   std::int32_t column;
   std::size_t joint;
-  double slope, jump;
+  double slope;
 };
 
 class sample_rows {
@@ -35,20 +35,9 @@ class sample_rows {
   /* both must outlive the rows */
   sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger);
 
-  /* the sample that the finger last took, by a step; with entry_load none that sees_event() may be left out */
+  /* the sample that the finger last took, by a step */
   void read();
   bool sees_event() const;
-
-  /* What entry_load's rests began with, by the unknowns; empty without it. */
-  const std::vector<double>& entries() const { return entries_; }
-  void resume(const std::vector<double>& entries) { entries_ = entries; }
-  void forget() { std::fill(entries_.begin(), entries_.end(), 0.0); }
-  /* a sample without a derivative: read only where it is remembered */
-  void follow() {
-    if (!entries_.empty() && sees_event()) {
-      read();
-    }
-  }
 
   std::size_t joints() const { return derivative_.joints; }
   double torque(std::size_t joint) const { return finger_->scratch.friction[joint]; }    /* T_j of eq. (10), N·m */
@@ -63,10 +52,6 @@ class sample_rows {
 
  private:
   void add(const law_term& from, bool is_jump);
-  void leave_rest();
-  void come_to_rest();
-  void add_slopes(std::size_t place, bool is_jump, double factor, double* entry) const;
-  double* entry(std::size_t place) { return entries_.data() + place * unknowns_.count(); }
 
   const unknown_list& unknowns_;
   const tendonfmu_finger* finger_;
@@ -74,12 +59,9 @@ class sample_rows {
   parameter_derivative derivative_;
   std::vector<sensitivity_term> terms_;
   std::vector<plain_slope> plain_;
-  std::vector<double> entries_; /* [places × unknowns] of e of every place, as it came to rest */
 };
 
-/* The beginnings of a recording's segments with other numbers of the description than those it was added with; rows: of
- * that finger. */
-segment_states states_with(const recording_track& recording, free_finger* finger, sample_rows* rows,
-                           const std::vector<double>& numbers);
+/* The beginnings of a recording's segments with other numbers of the description than those it was added with. */
+segment_states states_with(const recording_track& recording, free_finger* finger, const std::vector<double>& numbers);
 
 }  // namespace tendonfmu::estimation

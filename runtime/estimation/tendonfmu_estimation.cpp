@@ -47,7 +47,7 @@ std::vector<double> checked(const fit_problem& problem, const double* z) {
 }
 
 const segment_states& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
-                                const std::vector<double>& numbers, free_finger* finger, sample_rows* rows) {
+                                const std::vector<double>& numbers, free_finger* finger) {
   const recording_track& r = estimator->problem.recordings[recording];
   if (!remembers_numbers(finger->get())) {
     return r.states();
@@ -57,7 +57,7 @@ const segment_states& states_at(tendonfmu_estimator* estimator, std::size_t reco
     last.states.clear(); /* nothing, should anything fail from here on */
     last.z = z;
     last.recording = recording;
-    last.states = states_with(r, finger, rows, numbers);
+    last.states = states_with(r, finger, numbers);
   }
   return last.states;
 }
@@ -87,7 +87,7 @@ Eigen::MatrixXd checked_information(const double* information, Eigen::Index u) {
 /* the finger over the samples of a recording from `first` on, with a call after each */
 template <typename Body>
 void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z, std::size_t first,
-            std::size_t count, free_finger* finger, sample_rows* rows, const Body& body) {
+            std::size_t count, free_finger* finger, const Body& body) {
   const fit_problem& problem = estimator->problem;
   known_recording(problem, recording);
   const recording_track& r = problem.recordings[recording];
@@ -100,15 +100,11 @@ void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::ve
   }
   const std::size_t segment = first / r.segment_length();
   const std::vector<double> numbers = problem.unknowns.write(z.data());
-  const segment_state& state = states_at(estimator, recording, z, numbers, finger, rows)[segment];
-  finger->resume(state.finger, numbers);
-  rows->resume(state.entries);
+  finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
   for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
     finger->step(k, r.time(k), r.inputs(k));
     if (k >= first) {
       body(r, k);
-    } else {
-      rows->follow();
     }
   }
 }
@@ -264,7 +260,7 @@ tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, si
     free_finger finger(problem.image.data(), problem.image.size());
     sample_rows rows(problem.unknowns, finger.get());
     std::vector<double> by_torque(row), by_jump(row);
-    replay(estimator, recording, checked(problem, z), first, count, &finger, &rows,
+    replay(estimator, recording, checked(problem, z), first, count, &finger,
            [&](const recording_track&, std::size_t k) {
              rows.read();
              rows.dense(by_torque.data(), by_jump.data());
@@ -307,7 +303,7 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
       filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
     }
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    replay(estimator, recording, unknowns, 0, samples, &finger, &rows, [&](const recording_track& r, std::size_t k) {
+    replay(estimator, recording, unknowns, 0, samples, &finger, [&](const recording_track& r, std::size_t k) {
       const finger_scratch& s = finger.get()->scratch;
       const bool starts = gain[k] == 1.0 && weight[k] == 0.0;
       for (std::size_t j = 0; j < n; ++j) {

@@ -167,13 +167,13 @@ TEST(Derivative, IsOfTheSignalsAsTheyWereTaken) {
   EXPECT_EQ(derivative(finger, direction), before);
 }
 
-// Between the thresholds of a hysteresis, past a reversal: the law is that of the side before, in derivatives too.
+// Below the threshold, past a reversal: the law is that of the side before, in derivatives too.
 TEST(Derivative, OfWhatNeverSticksIsThatOfItsLaw) {
   Finger finger(test_finger::image(R"({"format": "tendonfmu-finger-1", "name": "one",
     "joints": [{"friction": {"positive": {"static": 0.02, "coulomb": 0.02, "stribeck_velocity": 0.1, "viscous": 0.3},
                              "negative": {"static": 0.5, "coulomb": 0.4, "stribeck_velocity": 0.1, "viscous": 0.1}}}],
     "tendons": [{"stiffness": 4000, "moment_arms": [0.01]}],
-    "velocity_threshold": {"tendon": 0, "joint": 0.1, "hysteresis": 0.5},
+    "velocity_threshold": {"tendon": 0, "joint": 0.1},
     "bias": {"noise_std": 0.1}, "contact": {"threshold": [1e6]},
     "extensions": [{"effect": "presliding", "joint": 1, "displacement": 0.01}]})"));
   tendonfmu_set_kinematics_source(finger, TENDONFMU_JOINT_VELOCITIES);

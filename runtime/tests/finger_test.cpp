@@ -446,7 +446,6 @@ TEST(SavedState, WithANumberThatCannotBeIsRefused) {
                           {"negative V", s.unlearned, -1e-3},
                           {"more of the start than all", s.start_left, 1.5},
                           {"drift that overflows", s.drift, 1e200},
-                          {"not a number", s.entry_pulley, nan},
                           {"infinite part", s.part, inf}});
 }
 
@@ -488,7 +487,7 @@ TEST(Options, ThatDoNotGoTogetherAreRefused) {
   EXPECT_TRUE(refused_with(options | (MODEL_OPTION_BITS + 1u)));
   // every bit: refused where the numbers do not fit, or a finger that takes samples
   for (unsigned bit = 0; bit < 32; ++bit) {
-    const bool only_a_word = bit == 4 || bit == 5 || bit == 22; /* forgetting, entry_load, stuck_presliding */
+    const bool only_a_word = bit == 4 || bit == 5; /* forgetting, stuck_presliding */
     EXPECT_EQ(refused_with(options ^ 1u << bit), !only_a_word) << bit;
     if (only_a_word) {
       Finger(with_options(options ^ 1u << bit)).run(motion(), 0, 1500);

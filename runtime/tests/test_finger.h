@@ -48,8 +48,7 @@ inline void put(std::string& text, const std::string& after, const std::string& 
 // is not known of the friction differs between them.
 inline std::string every_key() {
   std::string text = json;
-  put(text, "\"velocity_threshold\": {", "\"hysteresis\": 0.3, ");
-  put(text, "\"bias\": {", R"("forgetting": "absorption", "entry_load": true, "start_share": 0.5, )");
+  put(text, "\"bias\": {", R"("forgetting": "absorption", "start_share": 0.5, )");
   put(text, "\"contact\": {", R"("method": "cusum",
     "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
     "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from .effects.words import NBSP, quantity
     from .experiments.discrimination import discriminating_motion
     from .extension_fit import FitSettings, with_known
-    from .gain import squared_residual
     from .history import History, Line, diagnose_history, share_of
     from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
     from .reported import reported_causes

@@ -145,10 +145,3 @@ def _delivered(data: Data, training: Sequence[FitRecording], tests: Sequence[Fit
     return ModelErrors(
         tuple(rms(np.concatenate(trained), flags)), tuple(rms(np.concatenate(tested), np.concatenate(unseen)))
     )
-
-
-def squared_residual(data: Data, recordings: Sequence[FitRecording], flags: Sequence[Flags] | None = None) -> float:
-    """Return Σ r² over all joints, (N·m)², at the flagged samples [N] of each recording; those trained on if None."""
-    chosen = [recording.train for recording in recordings] if flags is None else flags
-    left = (recording.run(data).residual[own] for recording, own in zip(recordings, chosen, strict=True))
-    return float(sum(np.nansum(residual**2) for residual in left))

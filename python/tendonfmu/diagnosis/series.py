@@ -32,7 +32,7 @@ class Series(BlockSeries):
 
 def _image(data: Mapping[str, Any]) -> Any:
     """Return the image of a description with a bias that only jumps and without contact detection."""
-    bare = without_learning(data, "entry_load")
+    bare = without_learning(data)
     return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
 
 

@@ -21,7 +21,8 @@ from tendonfmu.model import INPUTS_OF_SOURCE, native, number_of, without_learnin
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 
 RATE = 400.0  # Hz; the samples of faster recordings are averaged, but not below this rate
-SETTLED = 1.0, 0.05  # s, and share of a stretch: until then what friction remembers is still unknown
+SETTLED = 1.0, 0.05  # s, and share of a stretch: until then what friction remembers is still unknown,
+TURNED, MOST = 0.1, 0.3  # and until every joint that turns has turned so far (rad), at most this share of the stretch
 STEP = 1e-4  # of a number's size: far above rounding, far below what moves many samples across a limit
 
 
@@ -196,7 +197,7 @@ class _Instances:
 
 def _image(data: Data) -> bytes:
     """Return the image of a description whose bias neither learns nor forgets, without contact detection."""
-    bare = without_learning(data, "entry_load")
+    bare = without_learning(data)
     return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
 
 
@@ -218,9 +219,17 @@ def _stretch(recording: FitRecording, segment: Segment, rate: float) -> _Stretch
     return _Stretch(segment, thin, recording.kinematics, known)
 
 
+def _turned(recording: FitRecording, segment: Segment, step: float) -> float:
+    """Return the number of blocks until every joint that turns in a stretch has turned."""
+    angle = step * np.cumsum(segment.mean(recording.model.joint_speed[segment.part]), axis=0)
+    reach = np.maximum.accumulate(angle) - np.minimum.accumulate(angle)
+    waits = np.argmax(reach > TURNED, axis=0)[reach[-1] > TURNED] if len(reach) else np.zeros(0)
+    return float(min(waits.max(initial=0), MOST * segment.count))
+
+
 def _used(recording: FitRecording, segment: Segment, step: float) -> Flags:
     """Return [count] the blocks that may be learned from."""
     used = segment.mean(recording.train[segment.part]) == 1.0
     longest, share = SETTLED
-    used[: int(min(longest / step, share * segment.count))] = False
+    used[: int(max(min(longest / step, share * segment.count), _turned(recording, segment, step)))] = False
     return np.asarray(used)

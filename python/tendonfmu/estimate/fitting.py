@@ -30,7 +30,6 @@ from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sen
 from tendonfmu.estimate.given_numbers import is_worse, movement, unseen_square
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
-from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.remembered import Remembered, learn_remembered
@@ -211,7 +210,7 @@ class FrictionFit(Configured):
         start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         self.remembered_: Remembered | None = None
         try:
-            if options.method == "batch" and has_memory(self.start_.data):
+            if options.method == "batch" and self.structure_.needs_runs:
                 self.remembered_ = learn_remembered(
                     self.structure_, self._choice, self.recordings_, watch, settings, start
                 )

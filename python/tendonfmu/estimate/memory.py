@@ -71,7 +71,8 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
         start |= {path: factor * given[path] for path in lengths}
         start |= {} if time is None else dict.fromkeys(times, time)
         start |= {} if cord is None else dict.fromkeys(cords, cord)
-        yield start
+        if start != given:
+            yield start
 
 
 def memory_values(data: Data) -> dict[str, float]:

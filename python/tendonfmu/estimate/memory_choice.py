@@ -120,7 +120,7 @@ class _Search:
         found = minimise(problem, end, STEPS, TOLERANCE)
         if self._variance is None:
             self._variance = problem.variance(found.state.residual)
-        fitted = with_values(structure, estimator.values(problem.scale.unknowns(found.state.u)))
+        fitted = with_values(structure, estimator.values(problem.unknowns_at(found.state)))
         memory = tuple(dict(row) for _, row in memory_rows(fitted.data))
         form = Form(name, memory, fitted.data, held_out_errors(problem, found, self._variance), len(found.state.u))
         self.tried.append(form)
@@ -133,7 +133,7 @@ class _Search:
         problem = full_problem(structure, estimator, self._recordings, self._grid, self._threads)
         problem.mean, problem.known = guess_prior(problem)
         found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE)
-        return with_values(structure, estimator.values(problem.scale.unknowns(found.state.u)))
+        return with_values(structure, estimator.values(problem.unknowns_at(found.state)))
 
     def simpler(self, first: Form, second: Form) -> Form:
         """Return the second form if it is clearly better than the first, else the first."""

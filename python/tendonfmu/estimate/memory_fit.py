@@ -31,7 +31,7 @@ LEAST_SPREAD = 0.04  # of the mean variance over the joints
 WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
 RIGID = 1e12  # N/m
 LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
-LEAST_FALL = 3e-4  # of the cost, for each joint and effective block
+LEAST_FALL = 3e-4  # of the cost, for each joint and effective block, in rough fits
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -84,6 +84,8 @@ class MemoryProblem:
         unknowns, of_row = estimator.unknowns, {row: path for path, row in structure.index.items()}
         self.shared = [[of_row[row] for row in unknown.parameters] for unknown in unknowns]  # paths of each unknown
         log = np.array([unknown.path in remembered for unknown in unknowns])
+        initial = {k: each.path for k, each in enumerate(unknowns) if each.path.startswith("bias.initial_torque[")}
+        self._constants = {k: int(path.rpartition("[")[2][:-1]) - 1 for k, path in initial.items()}  # joints from 0
         self.scale = Scale(log, estimator.scale)
         ends = (np.array([getattr(unknown, end) for unknown in unknowns]) for end in ("lower", "upper"))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,6 +114,15 @@ class MemoryProblem:
         residual = self.drift.without(self.runs.residual(self._of_description(self.values(u))))
         return State(u, residual, self.cost(residual, u))
 
+    def unknowns_at(self, state: State) -> Numbers:
+        """Return the unknowns z [u] of a state; `bias.initial_torque` is the constant that the residual leaves."""
+        z = self.scale.unknowns(state.u)
+        if self._constants:
+            left = self.runs.residual(self._of_description(self.values(state.u)))[self.drift.used].mean(axis=0)
+            for k, joint in self._constants.items():
+                z[k] = left[joint]
+        return z
+
     def cost(self, residual: Numbers, u: Numbers) -> float:
         """Return the negative log likelihood with the prior."""
         away = u - self.mean
@@ -135,6 +146,8 @@ class MemoryProblem:
         for j, share in enumerate(self._weight(state.residual)):
             information += share * columns[:, j].T @ columns[:, j]
             gradient += share * columns[:, j].T @ state.residual[:, j]
+        for k, joint in self._constants.items() if columns.shape[2] == len(self.scale.log) else ():
+            information[k, k] += self.blocks[joint] / self.variance(state.residual)[joint] * self.scale.size[k] ** 2
         return Linearised(columns, information, gradient)
 
     def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
@@ -226,6 +239,7 @@ def minimise(
     rough end has updated ones.
     """
     state, damping, number, converged, span = begin, DAMPING[0], 0, False, problem.span
+    least = LEAST_FALL * float(problem.blocks.sum()) if rough else 0.5 * tolerance**2
     linearised, is_fresh = problem.linearised(state), True
     while number < most:
         number += 1
@@ -236,7 +250,7 @@ def minimise(
         tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
         expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < LEAST_FALL * float(problem.blocks.sum())
+        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < least
         if fall > 0.0:
             linearised = problem.moved_on(linearised, state, step, tried)
             state, damping = tried, max(damping / 5.0, DAMPING[1])
@@ -252,9 +266,7 @@ def minimise(
             is_fresh = False
         elif not is_fresh or fall > 0.0:
             linearised, is_fresh = problem.linearised(state), True
-    if not (rough or is_fresh):
-        linearised = problem.linearised(state)
-    return Minimum(state, linearised, number, converged)
+    return Minimum(state, linearised if rough else problem.linearised(state), number, converged)
 
 
 def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]:

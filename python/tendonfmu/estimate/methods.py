@@ -104,7 +104,7 @@ def learn_batch(
     # start: [u]
     estimator = _estimator(structure)
     begin = _starting_point(estimator, start)
-    if has_memory(structure.start.data):
+    if structure.needs_runs:
         return learn_with_memory(structure, estimator, recordings, watch, settings, begin)
     added = _add_recordings(estimator, recordings)
     prior = Prior.of(estimator, settings)
@@ -149,7 +149,7 @@ def learn_batch(
 def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Learned:
     """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
     estimator, settings = _estimator(structure), Settings(FrictionFitOptions(), passes=1)
-    if has_memory(structure.start.data):
+    if structure.needs_runs:
         return learned_with_memory_at(structure, estimator, recordings, settings)
     added = _add_recordings(estimator, recordings)
     weights = _measured_weights(estimator, estimator.start, recordings, added, settings)
@@ -215,10 +215,11 @@ def learn_ekf(
     structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
     """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
-    if has_memory(structure.start.data):
+    if structure.needs_runs:
+        what = "presliding" if has_memory(structure.start.data) else "a number of an extension"
         raise InputError(
-            f"{structure.start.path}: presliding: the Kalman filter does not know friction that remembers; "
-            "expected --method batch, or a description without presliding"
+            f"{structure.start.path}: {what}: the Kalman filter has no derivatives of it; expected --method batch, or "
+            f"{'a description without presliding' if has_memory(structure.start.data) else '--fix extensions*'}"
         )
     estimator = _estimator(structure)
     learner = _learner(structure, estimator, settings, start)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
+from tendonfmu.estimate.memory import has_memory
 from tendonfmu.model import LEFT_OUT, Finger, effects, finger_from_data, law_path, native, sides, steps_of
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
@@ -38,6 +39,11 @@ class Structure:
     index: Mapping[str, int]  # path -> index among the p parameters
     # `sensor_fault` and `estimated` of the description, which `start` lacks
     beside: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def needs_runs(self) -> bool:
+        """Whether the estimator lacks its derivatives: friction remembers, or numbers of extensions are estimated."""
+        return has_memory(self.start.data) or any(number.extension for number in self.numbers)
 
 
 @dataclass(frozen=True)

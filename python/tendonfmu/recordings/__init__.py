@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles
-    from .grid import Grid, Segment, make_grid, sample_blocks
+    from .grid import Grid, Segment, make_grid
     from .match import UNFIT_FOR_SEARCH, admit, belongs
     from .match_text import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .prepared import (
@@ -62,6 +62,6 @@ if TYPE_CHECKING:
         smooth_speeds,
     )
     from .signal_noise import FEWEST, joint_position_noise
-    from .smoothing import Signals, smoothing_of, zero_phase
+    from .smoothing import zero_phase
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

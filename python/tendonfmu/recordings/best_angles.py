@@ -18,6 +18,7 @@ from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.recordings.signal_noise import joint_position_noise
 
 ALL = 0.99  # a share above counts as all
+CHANCE = 4.0  # standard errors of a covariance of white noise
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,16 @@ def _best(data: Data, recording: FitRecording) -> tuple[FitRecording, Numbers]:
     apart = by_tendons - by_encoders
     apart = apart - apart[recording.train].mean(axis=0)
     noise = [joint_position_noise(data, recording.recording, source) ** 2 for source in (1, 2)]
-    error = np.maximum(apart[recording.train].var(axis=0) - noise[1], noise[0])
+    error = noise[0] + _lasting(apart[recording.train])
     weight = error / (error + noise[1])
     weight = np.where(weight > ALL, 1.0, np.where(weight < 1.0 - ALL, 0.0, weight))
     return with_angles(recording, by_encoders + (1.0 - weight) * apart), weight
+
+
+def _lasting(values: Numbers) -> Numbers:
+    """Return [n] the variance of values [N, n] beside white noise: the covariance of neighbours, if it is certain."""
+    covariance = np.mean(values[1:] * values[:-1], axis=0)
+    return np.where(covariance > CHANCE * values.var(axis=0) / np.sqrt(len(values)), covariance, 0.0)
 
 
 def with_angles(recording: FitRecording, angle: Numbers) -> FitRecording:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tendonfmu.arrays import Array, Numbers
 from tendonfmu.recordings.prepared import FitRecording
-from tendonfmu.statistics import SampleBlocks
 
 SHORTEST_STEP = 0.01  # s; shortest block
 MOST_BLOCKS = 12_000
@@ -68,15 +67,3 @@ def make_grid(recordings: Sequence[FitRecording], shortest: float = SHORTEST_STE
                 segments.append(Segment(number, part, first, count, samples))
                 first += count
     return Grid(tuple(segments), step)
-
-
-def sample_blocks(
-    grid: Grid, recordings: Sequence[FitRecording], chosen: Collection[int] | None = None
-) -> SampleBlocks:
-    """Return the grid's block of each sample, −1 for none; only in some of the recordings if `chosen` is given."""
-    numbers_of = [np.full(len(recording.time), -1, dtype=np.int64) for recording in recordings]
-    for segment in grid.segments:
-        if chosen is None or segment.recording in chosen:
-            numbers = np.repeat(np.arange(segment.first, segment.first + segment.count), segment.samples)
-            numbers_of[segment.recording][segment.part.start : segment.part.start + len(numbers)] = numbers
-    return SampleBlocks(tuple(numbers_of), grid.blocks)

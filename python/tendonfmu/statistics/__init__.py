@@ -16,11 +16,8 @@ if TYPE_CHECKING:
         FEWEST_STRETCHES,
         STRETCH,
         BlockSeries,
-        BlockSums,
         Folds,
-        SampleBlocks,
         make_folds,
-        regular_blocks,
     )
     from .intervals import Interval
     from .noisy_regression import Estimate, noisy_regression
@@ -33,8 +30,6 @@ if TYPE_CHECKING:
         Span,
         Splines,
         basis,
-        bias_splines,
-        constant_bias,
         residual_of,
         spline_basis,
         without,

@@ -22,28 +22,12 @@ _LOST = 1e-9  # of a column's square; if the projection leaves less, it is round
 _RANK = 1e-10  # of the largest power of columns of length 1; derivatives are exact, rounding is far below
 
 
-def bias_splines(series: BlockSeries, knots: float = KNOTS) -> Splines:
-    """Make splines of a slow bias."""
-    # knots: (s); returns [B, s]
-    blocks = []
-    for number in np.unique(series.segment):
-        time = series.time[series.segment == number]
-        blocks.append(spline_basis(time, max(float(time[-1] - time[0]), series.step), knots))
-    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
-
-
 def spline_basis(time: Numbers, span: float, knots: float = KNOTS) -> Splines:
     """Make cubic splines of one stretch without a gap, from its first sample on."""
     # time: [B] (s); span, knots: (s); returns [B, s]
     inner = np.linspace(time[0] - 1e-9, time[0] + span + 1e-9, max(1, round(span / knots)) + 1)
     outer = (inner[1] - inner[0]) * np.arange(1, 4)
     return BSpline.design_matrix(time, np.concatenate([inner[0] - outer[::-1], inner, inner[-1] + outer]), 3)
-
-
-def constant_bias(series: BlockSeries) -> Splines:
-    """Make a constant bias for every stretch without a gap."""
-    # returns [B, s], ones and zeros
-    return sparse.csr_array((series.segment[:, None] == np.unique(series.segment)).astype(np.float64))
 
 
 class Span:

@@ -127,11 +127,6 @@ def _autoregression(values: Numbers, valid: Flags, most: int) -> Numbers:
 # lags adds nothing.
 
 
-def correlation_time(values: Numbers) -> float:
-    """Return τ of a series in samples, at least 1."""
-    return _correlation(values)[0]
-
-
 def _correlation(values: Numbers) -> tuple[float, Numbers, float]:
     """Return τ in samples, ρ_k for k = 1 .. [K], and the size of a ρ_k that chance makes of noise with this τ."""
     known = ~np.isnan(values)

@@ -18,7 +18,10 @@ typedef struct transition {
 
 /* before remember_transitions(), which overwrites what moved at the sample before */
 HOT_INLINE quad_mask moving_now(const tendonfmu_finger* f, size_t slot) {
-  return moves_at(f, slot, slot >= f->joints * f->tendon_lanes, quad_abs(quad_load(f->scratch.velocity + slot)));
+  const finger_settings* settings = &f->derived.settings;
+  const int own = slot >= f->joints * f->tendon_lanes;
+  return moves_at(quad_abs(quad_load(f->scratch.velocity + slot)),
+                  own ? settings->joint_threshold : settings->tendon_threshold);
 }
 
 /* the exponent of forgetting: what time or the filter has taken from a slot's torque since it came to rest */
@@ -60,34 +63,6 @@ HOT_INLINE quad bias_jump(const transition* t, quad magnitude_before, quad magni
   return quad_select(t->stops, before, quad_keep(t->starts, starting));
 }
 
-/* the same with entry_load: what stiction was entered with is kept apart, so b has only the part by the present load */
-HOT_INLINE quad present_jump(const transition* t, quad magnitude_before, quad magnitude_now) {
-  const quad before = quad_mul(t->side_before, magnitude_before);
-  const quad now = quad_mul(t->side_now, magnitude_now);
-  const quad renewed = quad_sub(quad_set(1.0), quad_keep(has_moved(t), t->kept));
-  const quad starting = quad_mul(quad_sub(quad_set(0.0), now), renewed);
-  return quad_select(t->stops, before, quad_keep(t->starts, starting));
-}
-
-/* −κ·e where an effect leaves rest that has moved before */
-HOT_INLINE quad kept_entry(const transition* t, const double* entry) {
-  const quad kept = quad_mul(t->kept, quad_load(entry));
-  return quad_keep(quad_both(t->starts, has_moved(t)), quad_sub(quad_set(0.0), kept));
-}
-
-HOT_INLINE quad jump_of(const tendonfmu_finger* f, const transition* t, quad magnitude_before, quad magnitude_now) {
-  return f->derived.settings.remembers_entry_load ? present_jump(t, magnitude_before, magnitude_now)
-                                                  : bias_jump(t, magnitude_before, magnitude_now);
-}
-
-/* −κ·e of both effects at four slots; zero where entry_load is off */
-HOT_INLINE void keep_entries(tendonfmu_finger* f, size_t slot, const transition* t) {
-  if (f->derived.settings.remembers_entry_load) {
-    quad_store(f->scratch.edge_kept + slot, kept_entry(t, f->remembered.entry_edge + slot));
-    quad_store(f->scratch.pulley_kept + slot, kept_entry(t, f->remembered.entry_pulley + slot));
-  }
-}
-
 /* b of the two effects at each of four slots, in the rows where F stands for them */
 COLD_STATIC void jump_tendons(tendonfmu_finger* f, size_t slot, double angle, quad threshold) {
   const finger_scratch* s = &f->scratch;
@@ -97,11 +72,10 @@ COLD_STATIC void jump_tendons(tendonfmu_finger* f, size_t slot, double angle, qu
     const slot_view* now = s->view + slot / 4;
     _Alignas(32) slot_view before;
     slot_view_fill(f, slot, angle, t.negative_before, &before);
-    edge = jump_of(f, &t, edges_magnitude(&before, quad_set(angle), threshold),
-                   edges_magnitude(now, quad_set(angle), threshold));
-    pulley = jump_of(f, &t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold));
+    edge = bias_jump(&t, edges_magnitude(&before, quad_set(angle), threshold),
+                     edges_magnitude(now, quad_set(angle), threshold));
+    pulley = bias_jump(&t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold));
   }
-  keep_entries(f, slot, &t);
   quad_store(s->edge_bias + slot, edge);
   quad_store(s->pulley_bias + slot, pulley);
 }
@@ -114,10 +88,9 @@ COLD_STATIC void jump_joints(tendonfmu_finger* f, size_t joint, quad threshold) 
   _Alignas(32) slot_view before;
   slot_view_fill(f, slot, 0.0, t.negative_before, &before);
   quad_store(s->joint_bias + joint,
-             jump_of(f, &t, laws_magnitude(before.below, threshold), laws_magnitude(now->below, threshold)));
+             bias_jump(&t, laws_magnitude(before.below, threshold), laws_magnitude(now->below, threshold)));
   quad_store(s->load_bias + joint,
-             jump_of(f, &t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold)));
-  keep_entries(f, slot, &t);
+             bias_jump(&t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold)));
 }
 
 /* Δb_j: eq. (10) with the b in place of the F, at the forces already propagated */
@@ -133,41 +106,14 @@ COLD_STATIC void sum_bias_jumps(tendonfmu_finger* f) {
     for (size_t j = 0; j < n; ++j) {
       const size_t at = j * lanes + i;
       sum = quad_add(sum, quad_mul(quad_load(s->force_at + at), quad_load(s->edge_bias + at)));
-      sum = quad_add(sum, quad_load(s->edge_kept + at));
       if (j + 1 < n) {
         sum = quad_add(sum, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley_bias + at + lanes)));
-        sum = quad_add(sum, quad_load(s->pulley_kept + at + lanes));
       }
       step[j] = quad_add(step[j], quad_mul(quad_load(f->derived.moment_arm + at), sum));
     }
   }
-  const double *edge_kept = s->edge_kept + n * lanes, *pulley_kept = s->pulley_kept + n * lanes;
   for (size_t j = 0; j < n; ++j) {
-    s->bias_step[j] =
-        quad_sum(step[j]) + (s->joint_bias[j] + s->load_bias[j] * s->load[j]) + (edge_kept[j] + pulley_kept[j]);
-  }
-}
-
-/* e of the effects that come to rest, at the forces of this sample */
-COLD_STATIC void remember_entries(tendonfmu_finger* f) {
-  const finger_state* s = &f->remembered;
-  const finger_scratch* now = &f->scratch;
-  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  for (size_t at = 0; at < joint_row; at += 4) {
-    const quad_mask stops = quad_only_first(moved_before(f, at), moving_now(f, at));
-    const quad edge = quad_mul(quad_load(now->force_at + at), quad_load(now->edge_bias + at));
-    quad_store(s->entry_edge + at, quad_select(stops, edge, quad_load(s->entry_edge + at)));
-    if (at >= lanes) { /* the pulley of the joint before */
-      const quad pulley = quad_mul(quad_load(now->force_between + at - lanes), quad_load(now->pulley_bias + at));
-      quad_store(s->entry_pulley + at, quad_select(stops, pulley, quad_load(s->entry_pulley + at)));
-    }
-  }
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    const size_t at = joint_row + j;
-    const quad_mask stops = quad_only_first(moved_before(f, at), moving_now(f, at));
-    const quad load = quad_mul(quad_load(now->load + j), quad_load(now->load_bias + j));
-    quad_store(s->entry_edge + at, quad_select(stops, quad_load(now->joint_bias + j), quad_load(s->entry_edge + at)));
-    quad_store(s->entry_pulley + at, quad_select(stops, load, quad_load(s->entry_pulley + at)));
+    s->bias_step[j] = quad_sum(step[j]) + (s->joint_bias[j] + s->load_bias[j] * s->load[j]);
   }
 }
 
@@ -204,9 +150,6 @@ COLD_STATIC void remember_transitions(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0);
   const double clock = f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] : time;
-  if (f->derived.settings.remembers_entry_load) {
-    remember_entries(f);
-  }
   for (size_t slot = 0; slot < f->slots; slot += 4) {
     const quad_mask now = moving_now(f, slot), before = moved_before(f, slot);
     const quad_mask stops = quad_only_first(before, now), starts = quad_only_first(now, before);

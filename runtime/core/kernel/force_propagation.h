@@ -5,25 +5,14 @@
 #include "friction_elements.h"
 #include "slot_view.h"
 
-/* the speeds at which effects begin to move and come to rest: v_min, apart by the hysteresis after the first sample */
-HOT_INLINE void speed_thresholds(tendonfmu_finger* f, int first) {
-  const finger_settings* settings = &f->derived.settings;
-  const double width = first ? 0.0 : settings->hysteresis;
-  f->scratch.start_above[0] = (1.0 + width) * settings->tendon_threshold;
-  f->scratch.stop_below[0] = (1.0 - width) * settings->tendon_threshold;
-  f->scratch.start_above[1] = (1.0 + width) * settings->joint_threshold;
-  f->scratch.stop_below[1] = (1.0 - width) * settings->joint_threshold;
-}
-
 /* lanes that moved at the last sample */
 HOT_INLINE quad_mask moved_before(const tendonfmu_finger* f, size_t slot) {
   return quad_greater(quad_load(f->remembered.moving + slot), quad_set(0.5));
 }
 
-/* lanes that move at this one; kind 0: tendons, 1: joints */
-HOT_INLINE quad_mask moves_at(const tendonfmu_finger* f, size_t slot, int kind, quad speed) {
-  const quad start = quad_set(f->scratch.start_above[kind]), stop = quad_set(f->scratch.stop_below[kind]);
-  return quad_greater(speed, quad_select(moved_before(f, slot), stop, start));
+/* lanes that move at this one */
+HOT_INLINE quad_mask moves_at(quad speed, double threshold) {
+  return quad_greater(speed, quad_set(threshold));
 }
 
 /* one bit a lane: it comes to rest or begins to move */
@@ -72,16 +61,6 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad veloc
     slot_view_fill(f, slot, angle, negative, view);
   }
   return view;
-}
-
-/* lanes whose law is that of the sign of v; places with a memory have no hysteresis */
-HOT_INLINE quad_mask takes_side(const tendonfmu_finger* f, size_t slot, quad_mask moving, quad speed,
-                                double threshold) {
-  if (!f->extensions.gripped) {
-    return moving;
-  }
-  const quad_mask fast = quad_greater(speed, quad_set(threshold)), slides = slides_at(f, slot);
-  return quad_either(quad_both(slides, fast), quad_only_first(moving, slides));
 }
 
 /* F(v) with the sign of v where |v| > v_min, 0 where the effect sticks (fig. 2b) */
@@ -138,14 +117,13 @@ HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
   const finger_scratch* s = &f->scratch;
   const double before = angle_before(s->angle, j);
   const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
-  const quad_mask moving = moves_at(f, at, 0, speed);
+  const quad_mask moving = moves_at(speed, f->derived.settings.tendon_threshold);
   if (nothing_acts(f, at, moving)) {
     quad_store(s->edge + at, quad_set(0.0));
     quad_store(s->pulley + at, quad_set(0.0));
     return 0;
   }
-  const quad_mask decided = takes_side(f, at, moving, speed, f->derived.settings.tendon_threshold);
-  const slot_view* view = view_at(f, at, v, decided, before);
+  const slot_view* view = view_at(f, at, v, moving, before);
   const quad edge = edges_magnitude(view, quad_set(before), speed);
   quad_store(s->edge + at, acting_friction(f, at, moving, edge, v));
   keep_magnitude(f, s->edge_stuck, s->whole_edge, at, moving, edge);
@@ -162,9 +140,8 @@ HOT_INLINE int friction_of_joints(tendonfmu_finger* f, size_t j) {
   const finger_scratch* s = &f->scratch;
   const size_t at = f->joints * f->tendon_lanes + j;
   const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
-  const quad_mask moving = moves_at(f, at, 1, speed);
-  const quad_mask decided = takes_side(f, at, moving, speed, f->derived.settings.joint_threshold);
-  const slot_view* view = view_at(f, at, v, decided, 0.0);
+  const quad_mask moving = moves_at(speed, f->derived.settings.joint_threshold);
+  const slot_view* view = view_at(f, at, v, moving, 0.0);
   const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
   quad_store(s->joint_friction + j, acting_friction(f, at, moving, own, v));
   quad_store(s->load_friction + j, acting_friction(f, at, moving, load, v));

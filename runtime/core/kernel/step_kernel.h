@@ -368,7 +368,6 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
     advance_extensions(f, time, step);
   }
   find_grips(f);
-  speed_thresholds(f, first);
   const int transitions = friction_values(f);
   total_friction(f);
   add_extension_torques(f);

@@ -107,31 +107,6 @@ def law_columns(data: Data, path: str, numbers: Iterable[str]) -> Iterator[tuple
                 yield f"{at}{side}.{number}", number
 
 
-def finer_paths(data: Data, path: str) -> list[str]:
-    """Return the numbers of an edited description that make up a number of the one before."""
-    place = law_path(path)
-    if place is None or place.number is None:
-        return [path]
-    entry = get_number(data, place.effect)
-    laws = entry.get("laws")
-    numbers = [place.point] if place.point else [None] if laws is None else range(1, len(laws) + 1)
-    paths = []
-    for k in numbers:
-        at = place.effect if k is None else f"{place.effect}.laws[{k}]"
-        law = entry if k is None else laws[k - 1]
-        sides = [place.side]
-        if law.get("positive") is not None and place.side is None:
-            sides = ["positive", "negative"]
-        paths += [f"{at}.{place.number}" if side is None else f"{at}.{side}.{place.number}" for side in sides]
-    return paths
-
-
-def is_law_number(path: str) -> bool:
-    """Return whether a path is that of a number of a friction law."""
-    place = law_path(path)
-    return place is not None and place.number is not None
-
-
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,1 @@
+"""Fingers by seed that share no code and no friction law with the product: they judge it."""

@@ -1,0 +1,191 @@
+"""Friction that remembers: its hidden numbers are found, what is not there is left out, and the form is chosen."""
+
+from __future__ import annotations
+
+import copy
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fit_cases import small_finger
+from fit_data import make_recording, wavy_forces, wavy_motion
+from fit_finger import moved_start
+from tendonfmu.errors import InputError
+from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.estimate.memory_choice import choose_memory
+from tendonfmu.estimate.structure import Choice, get_number
+from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
+
+Rows = tuple[dict[str, Any], ...]
+RELATIVE = {"effect": "presliding", "displacement": 0.3}  # s: 0.15 mm at tendons, 3 mrad at joints
+ABSOLUTE = {"effect": "presliding", "stiffness": 3000.0}
+
+
+def finger(*extensions: dict[str, Any], start: bool = False) -> dict[str, Any]:
+    """The small finger, or with numbers that are off."""
+    data = moved_start() if start else copy.deepcopy(small_finger())
+    data["bias"] |= {"drift_variance": 0.0, "noise_std": 5e-4}
+    return data | {"extensions": list(extensions)}
+
+
+@lru_cache
+def _made(rows: str, seed: int, duration: float) -> Recording:
+    motion = wavy_motion(seed, duration, 200.0, 2)
+    forces = wavy_forces(seed, motion["time"], 4)
+    made = make_recording(finger(*eval(rows)), motion, forces, seed, settled=1e-9)
+    groups = dict(made.recording)
+    return Recording(Path(f"made_{seed}.parquet"), groups.pop("time"), groups)
+
+
+def recording(*rows: dict[str, Any], seed: int = 1, duration: float = 40.0) -> Recording:
+    return _made(repr(rows), seed, duration)
+
+
+def fitted(given: Rows, truth: Rows, seed: int = 1, **options: Any) -> FrictionFit:
+    settings = {"share": ["tendons"], "kinematics": 3, "uncertainty": False} | options
+    return FrictionFit(finger(*given, start=True), **settings).fit(recording(*truth, seed=seed))
+
+
+@pytest.mark.parametrize(
+    ("truth", "given"),
+    [
+        ((RELATIVE,), ({**RELATIVE, "displacement": 4.0},)),
+        (({**RELATIVE, "relaxation_time": 0.8},), ({**RELATIVE, "displacement": 2.0, "relaxation_time": 0.05},)),
+        (
+            ({**ABSOLUTE, "relaxation_time": 0.8}, {"effect": "cord_stretch", "stiffness": 2e4}),
+            (
+                {**ABSOLUTE, "stiffness": 3e4, "relaxation_time": 0.05},
+                {"effect": "cord_stretch", "stiffness": 2e5},
+            ),
+        ),
+    ],
+)
+def test_hidden_numbers_are_found_from_far_away(truth: Rows, given: Rows) -> None:
+    fit = fitted(given, truth)
+    rows = fit.description_.data["extensions"]
+    for row, true in zip(rows, truth, strict=True):
+        assert set(row) == set(true)
+        for key in set(true) - {"effect"}:
+            assert row[key] == pytest.approx(true[key], rel=0.1), key
+    residual = fit.report_["residual"]["train"]
+    assert np.max(residual["model_only_rms"]) < 7e-4  # N·m; noise_std is 0.5 mN·m, friction some 40
+    assert fit.report_["memory"]["left_out"] == []
+
+
+def test_what_the_motion_does_not_show_is_left_out() -> None:
+    cords = {"effect": "cord_stretch", "stiffness": 5e4}
+    fit = fitted(({**RELATIVE, "relaxation_time": 0.1}, cords), (RELATIVE,))
+    (row,) = fit.description_.data["extensions"]
+    assert set(row) == {"effect", "displacement"}
+    assert row["displacement"] == pytest.approx(0.3, rel=0.05)
+    assert set(fit.report_["memory"]["left_out"]) == {"extensions[1].relaxation_time", "extensions[2].stiffness"}
+    assert any("relaxation_time is left out" in sentence for sentence in fit.warnings_)
+
+
+def test_a_number_of_another_extension_is_found_beside_it() -> None:
+    gravity = {"effect": "gravity", "joint": 1, "sine": 0.05, "cosine": 0.0}
+    fit = fitted(({**gravity, "sine": 0.0}, RELATIVE), (gravity, RELATIVE), fix=["joints[1].cover"])  # looks alike
+    assert fit.parameters_["extensions[1].sine"] == pytest.approx(0.05, rel=0.05)
+
+
+def test_the_kalman_filter_refuses_by_name() -> None:
+    with pytest.raises(InputError, match=r"presliding: .* expected --method batch, or .* without presliding"):
+        fitted((RELATIVE,), (RELATIVE,), method="ekf")
+
+
+def test_never_worse_on_unseen_motion_than_the_given_numbers() -> None:
+    truth = ({**RELATIVE, "relaxation_time": 0.8},)
+    fit = FrictionFit(finger(*truth), kinematics=3, holdout=0.3, holdout_block=5.0, uncertainty=False)
+    fit.fit(recording(*truth))
+    held = fit.report_["residual"]["held_out"]
+    assert fit.report_["given_numbers"]["kept"] or np.mean(held["rms"]) <= 1.02 * np.mean(held["start_rms"])
+
+
+def _laws(data: dict[str, Any]) -> list[dict[str, float]]:
+    """All laws of the small finger, once each."""
+    found = [joint[kind] for joint in data["joints"] for kind in ("friction", "load_friction") if kind in joint]
+    for tendon in data["tendons"]:
+        first, points = tendon["edge_friction"]
+        found += [tendon["pulley_friction"][0], first, *points["laws"]]
+    return list({id(law): law for law in found}.values())
+
+
+def test_intervals_hold_the_truth() -> None:
+    """95 % intervals of what is identified, on several recordings."""
+    truth, inside = {**RELATIVE, "relaxation_time": 0.8}, []
+    start = finger({**truth, "displacement": 0.4})
+    for law in _laws(start):
+        law.update({key: 1.25 * value for key, value in law.items()})
+    for seed in range(2, 7):
+        fit = FrictionFit(start, share=["tendons"], kinematics=3, uncertainty=False).fit(recording(truth, seed=seed))
+        known = [each["path"] for each in fit.report_["parameters"] if each["identified"]]
+        errors = [
+            (fit.parameters_[path] - get_number(finger(truth), path)) / fit.standard_errors_[path] for path in known
+        ]
+        inside.append(np.mean(np.abs(errors) < 1.96))
+    assert np.mean(inside) >= 0.88
+
+
+# --- the form ---------------------------------------------------------------------------------------------------------
+
+
+def prepared(*rows: dict[str, Any], seed: int = 1) -> FitRecording:
+    data = finger_from_data(finger(start=True), Path("small.json"))
+    return prepare(data, recording(*rows, seed=seed), 3, Held())
+
+
+@pytest.mark.parametrize(
+    ("truth", "name"),
+    [
+        ((), "none"),
+        ((RELATIVE,), "relative"),
+        (({**ABSOLUTE, "relaxation_time": 0.8},), "absolute"),
+    ],
+)
+def test_the_form_is_chosen_by_what_is_left_out(truth: Rows, name: str) -> None:
+    given = finger_from_data(finger(start=True), Path("small.json"))
+    choice = choose_memory(given, [prepared(*truth)], Choice(share=["tendons"]))
+    rows = [row for row in choice.finger.data["extensions"] if row["effect"] == "presliding"]
+    assert choice.form.name.split(",")[0] == name
+    assert len(rows) == len(truth)
+    for row, true in zip(rows, truth, strict=True):
+        assert set(row) == set(true)
+        assert all(row[key] == pytest.approx(true[key], rel=0.15) for key in set(true) - {"effect"})
+    errors = {form.name: form.errors.sum() for form in choice.tried}
+    assert errors[choice.form.name] <= errors["none"]
+
+
+# --- the best angles --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("noise", "stretch", "source"),
+    [
+        (1e-6, 0.0, "joint encoders"),
+        (3e-2, 0.0, "tendon positions"),
+        (1e-4, 3e-2, "joint encoders"),
+        (2e-4, 0.0, "joint encoders and tendon positions"),
+    ],
+)
+def test_the_angles_known_best(noise: float, stretch: float, source: str) -> None:
+    made = recording(RELATIVE)
+    rng = np.random.default_rng(1)
+    angle = made.groups["joint_position"]
+    groups = dict(made.groups)
+    groups["joint_position"] = angle + noise * rng.standard_normal(angle.shape)
+    slow = np.sin(made.time / 3.0)[:, None] * moment_arms(finger()).sum(axis=1)
+    white = 2e-6 * rng.standard_normal(groups["tendon_position"].shape)  # m: about 0.1 to 0.2 mrad
+    groups["tendon_position"] = groups["tendon_position"] + stretch * slow + white
+    given = finger_from_data(finger(), Path("small.json"))
+    found = best_angles(given.data, [prepare(given, Recording(made.path, made.time, groups), 1, Held())])
+    assert found.source == source
+    best = found.recordings[0].recording.groups["joint_position"]
+    away = best - angle
+    assert (away - away.mean(axis=0)).std() < 1.1 * min(noise, 1e-2)
+    assert found.recordings[0].kinematics == 2
