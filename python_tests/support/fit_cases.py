@@ -123,7 +123,7 @@ def jam(description: Description) -> None:
 
 
 def random_fit_case(seed: int, samples: int) -> tuple[Description, Recording, int]:
-    """A random finger, at times with hardening covers or jammed tendons; its recording and kinematics source."""
+    """A random finger, at times with jammed tendons; its recording and kinematics source."""
     description, recording = random_case(seed, samples)
     description = copy.deepcopy(description)
     if seed % 8 == 3:
@@ -132,11 +132,6 @@ def random_fit_case(seed: int, samples: int) -> tuple[Description, Recording, in
     rng = np.random.default_rng([seed, 10])
     noise = {"drift_variance": 10.0 ** rng.uniform(-6, -3), "noise_std": 10.0 ** rng.uniform(-3, -1.5)}
     description["bias"] = dict(description.get("bias") or {}) | noise
-    if seed % 4 == 0:
-        joints = len(description["joints"])
-        description["extensions"] = [
-            {"effect": "cover_hardening", "joint": j, "stiffness": 0.02 * j} for j in (1, joints)[: min(joints, 2)]
-        ]
     return description, recording, 1 + seed % 3
 
 

@@ -26,7 +26,8 @@ from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 from tendonfmu.statistics import sample_weights
 
-STEP, RATE = 0.02, 200.0  # s and Hz of a fit: elements take any step, and friction changes in tens of milliseconds
+STEP = 0.02  # s, blocks of a fit: friction changes in tens of milliseconds
+COARSE_RATE = 200.0  # Hz: averaged samples leave 0.1 to 0.4 mN·m (elements with relaxation within 2 ms) more
 COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell starts apart
 ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
 SAME = 0.3  # of a logarithm
@@ -65,7 +66,7 @@ def coarse_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over few windows at a low rate, with the prior of guesses."""
-    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=RATE, threads=threads)
+    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
     problem = MemoryProblem(structure, estimator, runs, SlowDrift(runs.time, runs.stretch, runs.used))
     problem.mean, problem.known = guess_prior(problem)
     return problem
@@ -131,7 +132,7 @@ def full_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over all samples, whose drift is the slowest that the rests demand."""
-    runs = CoreRuns(structure.start.data, recordings, grid, rate=RATE, threads=threads)
+    runs = CoreRuns(structure.start.data, recordings, grid, threads=threads)
     drift = slowest_drift(runs.residual(), runs.time, runs.stretch, runs.used, runs.still)
     return MemoryProblem(structure, estimator, runs, drift)
 
