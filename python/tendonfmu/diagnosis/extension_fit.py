@@ -242,7 +242,13 @@ def fit_extended(
 
 def carried(data: Data, known: Data) -> Mapping[str, Any]:
     """Return a description with the numbers that another one has, too."""
-    theirs = {key_of(known, number.path): number.path for number in unknowns(known)}
+    # a number that goes with another one there may be free here: `static` of a law that had no drop
+    theirs = {
+        key_of(known, path): path
+        for number in unknowns(known)
+        for path in (number.path, number.with_path)
+        if path is not None
+    }
     result = own_copy(data)
     for number in unknowns(data):
         path = theirs.get(key_of(data, number.path))
