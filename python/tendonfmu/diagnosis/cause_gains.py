@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.base import refitted
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, SCALING, Term
+from tendonfmu.diagnosis.effects.memory import PRESLIDING
 from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, with_known
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.samples import Samples
@@ -16,6 +19,11 @@ from tendonfmu.diagnosis.search import Search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed, names_with, step_p_value
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
+
+# Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
+# loads as friction, or scales the torque, resembles that.
+FORM = 0.07
+LIKE_A_LAW = {*OF_LAW, *SCALING}
 
 
 @dataclass(frozen=True)
@@ -39,13 +47,14 @@ def verify(
     def judge(causes: list[Cause]) -> tuple[list[Cause], list[int]]:
         fit, without = bench.fit(causes), bench.each_without(causes)
         gains = [bench.gain(model, fit) for model in without]
-        needed = _needed(causes, gains)
+        needed, shares = _needed(causes, gains), bench.shares_of_memory(causes, fit, without)
         weak = [
             k
             for k, (cause, gain) in enumerate(zip(causes, gains, strict=True))
             if not (
                 gain.low > 0.0
                 and gain.value >= least_gain * needed[k]
+                and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
                 and result.base.least.shows_all(cause.effect, cause.terms, fit.data)
             )
         ]
@@ -146,6 +155,15 @@ class _Bench:
     def each_without(self, causes: Sequence[Cause]) -> list[FittedModel]:
         """Return, for each cause, the fit that lacks it."""
         return [self.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
+
+    def shares_of_memory(
+        self, causes: Sequence[Cause], fit: FittedModel, without: Sequence[FittedModel]
+    ) -> list[float]:
+        """Return the rms that each cause explains over that which the memory of friction explains; inf without one."""
+        after = float(self._unseen.squares(fit.data).sum())
+        explained = [max(float(self._unseen.squares(model.data).sum()) - after, 0.0) for model in without]
+        of_memory = sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
+        return [float(np.sqrt(own / of_memory)) if of_memory else np.inf for own in explained]
 
     def gain(self, without: FittedModel, model: FittedModel) -> Interval:
         return self._unseen.gain(without.data, model.data, self._seed)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects.description_edit import sides_at
 from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
 from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.diagnosis.samples import Samples
@@ -43,6 +44,7 @@ MOST_STEPS = 20
 LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 STEP = 1e-3  # of a coordinate, for derivatives
 FARTHEST = 10.0  # times its expected magnitude, that a step moves a number
+TINY = 1e-9  # expected magnitude of a number that is 0, which stays there
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -185,10 +187,15 @@ def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
     """Return the derivatives of a torque by the numbers that a fit estimates [B, n, u], and the scale of these [u]."""
     if not unknowns(data):
         return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
-    problem = _Problem(build_structure(finger_from_data(data, Path("finger")), Choice()), samples)
+    problem = _Problem(structure_of(data), samples)
     fit = problem.fit
     chosen = [k for k, unknown in enumerate(fit.estimator.unknowns) if not unknown.path.startswith("bias.")]
     return fit.slopes(fit.state(fit.mean), fit.runs)[:, :, chosen], fit.scale.size[chosen]
+
+
+def structure_of(data: Data) -> Structure:
+    """Return the numbers of a description that a fit estimates, with their expected magnitudes."""
+    return _with_scale(build_structure(finger_from_data(data, Path("finger")), Choice()), data)
 
 
 def key_of(data: Data, name: str) -> str:
@@ -235,13 +242,22 @@ def fit_extended(
 
 def carried(data: Data, known: Data) -> Mapping[str, Any]:
     """Return a description with the numbers that another one has, too."""
-    theirs = {key_of(known, number.path): number.path for number in unknowns(known)}
+    # a number that goes with another one there may be free here: `static` of a law that had no drop
+    theirs = {
+        key_of(known, path): path
+        for number in unknowns(known)
+        for path in (number.path, number.with_path)
+        if path is not None
+    }
     result = own_copy(data)
     for number in unknowns(data):
         path = theirs.get(key_of(data, number.path))
         for own in (number.path, number.with_path):
             if own is not None and path is not None:
                 set_number(result, own, float(get_number(known, path)))
+    for effect in effects(result):  # a drop that only this one has stays above what came of the other
+        for side in sides_at(result, effect.path):
+            side["static"] = max(side["static"], side["coulomb"])
     return result
 
 
@@ -317,7 +333,7 @@ def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
                     break
             else:
                 begin = _number_or_none(structure.start.data, path)
-                scale[structure.index[path]] = NEW * abs(begin) if begin else np.nan
+                scale[structure.index[path]] = NEW * abs(begin) if begin else TINY
     return replace(structure, scale=scale)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,14 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction, Where
 from tendonfmu.diagnosis.effects import BY_NAME, SCALING, SHARED, Place, Term, Variant
-from tendonfmu.estimate import Choice, Estimator, Unknown, build_structure, own_copy, set_number
-from tendonfmu.model import finger_from_data, law_path, native, steps_of
+from tendonfmu.diagnosis.extension_fit import structure_of
+from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
+from tendonfmu.model import law_path, native, steps_of
 
 LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
 LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
 LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
+LARGEST = 1e3  # times an ordinary size: a column of next to nothing would ask for any
 LARGEST_SECANT = 3.0  # times the step that its column was computed with; the column is not valid beyond
 
 _OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
@@ -92,7 +93,8 @@ def _cause(where: Where, direction: Direction, terms: tuple[Term, ...]) -> Cause
 def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
     """Return the bounds of the magnitudes [d]."""
     signs = np.array(variant.signs)
-    low, high = np.where(signs > 0, 0.0, -np.inf), np.where(signs < 0, 0.0, np.inf)
+    most = LARGEST * np.array(variant.expected)
+    low, high = np.where(signs > 0, 0.0, -most), np.where(signs < 0, 0.0, most)
     return low, np.minimum(high, LARGEST_SECANT) if variant.full is not None else high
 
 
@@ -153,7 +155,7 @@ def numbers_of(data: Data) -> list[Number]:
 
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
     """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
-    structure = build_structure(finger_from_data(data, Path("finger")), Choice())
+    structure = structure_of(data)
     paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
     return Estimator(structure.start.image, structure.group, structure.scale), paths
 

@@ -317,7 +317,7 @@ def _of_memory(series: Series, states: _States) -> _Made:
 
 def _of_states(series: Series, states: _States) -> _Made:
     for who, values in states_of(series, run_starts(series.segment)):
-        yield "elastic", who, values
+        yield "memory of angle" if who.startswith("joint") else "elastic", who, values
 
 
 def _of_slides(series: Series, states: _States) -> _Made:
