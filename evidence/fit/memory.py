@@ -107,7 +107,9 @@ def chosen(nominal: Mapping[str, Any], recordings: Sequence[pd.DataFrame], kinem
 
 def residual(fitted: Finger, recording: pd.DataFrame, kinematics: int) -> Numbers:
     """[B, n] N·m, what the finger leaves of a recording, without what a bias would learn."""
-    silent = finger_from_data(without_learning(fitted.data))
+    bare = without_learning(fitted.data)
+    # nothing is forgotten: a place that sticks keeps what it held
+    silent = finger_from_data({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}})
     out = run(silent, recording, kinematics=kinematics).frame
     joints = len(silent.data["joints"])
     left = out[[f"compensated_torque[{j + 1}]" for j in range(joints)]].to_numpy()
