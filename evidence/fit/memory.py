@@ -19,7 +19,7 @@ from evidence.families import cases, elastic, finger
 from evidence.families.finger import NONE, Hidden
 from evidence.families.motion import random_motion
 from evidence.part import Figures
-from evidence.table import Row, table, where
+from evidence.table import Row, number, table, where
 from tendonfmu import run
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate import FitWarning
@@ -139,8 +139,8 @@ def forms_table(figures: Figures) -> str:
     for form in (*FORMS, CHOSEN):
         for kinematics, angles in ((ENCODERS, "encoders"), (TENDONS, "tendons")):
             values = [typical(rows, family, form, kinematics) for family in cases.FAMILIES]
-            if values[0] is not None:
-                lines.append([form, angles, *(f"{value:.2f}" for value in values if value is not None)])
+            if any(value is not None for value in values):
+                lines.append([form, angles, *(number(value) for value in values)])
     return table(["friction remembers", "angles from", *cases.FAMILIES], lines, 2)
 
 
