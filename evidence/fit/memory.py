@@ -74,9 +74,9 @@ def left_at_pretensions(seed: int) -> Row:
     made = finger.finger(elastic.JOINTS, rng)
     nominal = finger.describe(made, Hidden(), rng)
     recordings = {}
-    for number, (pretension, seconds) in enumerate((p, s) for p in PRETENSIONS for s in (cases.TRAIN, cases.TEST)):
+    for k, (pretension, seconds) in enumerate((p, s) for p in PRETENSIONS for s in (cases.TRAIN, cases.TEST)):
         trace = elastic.simulate(made, Hidden(), random_motion(elastic.JOINTS, pretension, rng), seconds)
-        recordings[pretension, seconds] = finger.record(trace, Hidden(), np.random.default_rng((seed, number)))
+        recordings[pretension, seconds] = finger.record(trace, Hidden(), np.random.default_rng((seed, k)))
     row: Row = {"seed": seed}
     for name, pretensions in (("one", PRETENSIONS[:1]), ("both", PRETENSIONS)):
         fitted = learned(nominal, [recordings[p, cases.TRAIN] for p in pretensions], CHOSEN, ENCODERS)
