@@ -19,7 +19,7 @@ from evidence.families import cases, elastic, finger
 from evidence.families.finger import NONE, Hidden
 from evidence.families.motion import random_motion
 from evidence.part import Figures
-from evidence.table import Row, table, where
+from evidence.table import Row, number, table, where
 from tendonfmu import run
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate import FitWarning
@@ -74,9 +74,9 @@ def left_at_pretensions(seed: int) -> Row:
     made = finger.finger(elastic.JOINTS, rng)
     nominal = finger.describe(made, Hidden(), rng)
     recordings = {}
-    for number, (pretension, seconds) in enumerate((p, s) for p in PRETENSIONS for s in (cases.TRAIN, cases.TEST)):
+    for k, (pretension, seconds) in enumerate((p, s) for p in PRETENSIONS for s in (cases.TRAIN, cases.TEST)):
         trace = elastic.simulate(made, Hidden(), random_motion(elastic.JOINTS, pretension, rng), seconds)
-        recordings[pretension, seconds] = finger.record(trace, Hidden(), np.random.default_rng((seed, number)))
+        recordings[pretension, seconds] = finger.record(trace, Hidden(), np.random.default_rng((seed, k)))
     row: Row = {"seed": seed}
     for name, pretensions in (("one", PRETENSIONS[:1]), ("both", PRETENSIONS)):
         fitted = learned(nominal, [recordings[p, cases.TRAIN] for p in pretensions], CHOSEN, ENCODERS)
@@ -139,8 +139,8 @@ def forms_table(figures: Figures) -> str:
     for form in (*FORMS, CHOSEN):
         for kinematics, angles in ((ENCODERS, "encoders"), (TENDONS, "tendons")):
             values = [typical(rows, family, form, kinematics) for family in cases.FAMILIES]
-            if values[0] is not None:
-                lines.append([form, angles, *(f"{value:.2f}" for value in values if value is not None)])
+            if any(value is not None for value in values):
+                lines.append([form, angles, *(number(value) for value in values)])
     return table(["friction remembers", "angles from", *cases.FAMILIES], lines, 2)
 
 
