@@ -159,7 +159,6 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     assert 1 - last / first == pytest.approx(result.value.value)
     assert result.steps[1] == pytest.approx(last, rel=0.05)
     assert all(a < b for a, b in zip(result.extended.test_rms, result.bias_only_rms, strict=True))
-    assert all(a <= b for a, b in zip(result.delivered[1].test_rms, result.delivered[0].test_rms, strict=True))
     blocks = measure_gain(before.data, found.data, [prepared(truth, 1, holdout=0.3)])
     assert blocks.held_out and blocks.value.low > 0
 

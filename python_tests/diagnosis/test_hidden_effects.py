@@ -63,7 +63,8 @@ unnamed = pytest.mark.xfail(reason="is in too_small", strict=True)
 )
 def test_one_hidden_effect_is_in_the_reported_set(effect: str) -> None:
     strength, presliding = EFFECTS[effect]
-    case = makers.single(1, replace(SHORT, presliding=presliding), effect, strength)
+    # the torque of nothing drifts: without a learning bias, a wandering one is an error like any other
+    case = makers.single(1, replace(SHORT, presliding=presliding, wander=0.0), effect, strength)
     assert case.facts["surviving_share"] >= makers.VISIBLE
     diagnosis = case.diagnosed()
     assert any(effect in names for names in sets_of(diagnosis))

@@ -30,7 +30,7 @@ ABSOLUTE = {"effect": "presliding", "stiffness": 3000.0}
 def finger(*extensions: dict[str, Any], start: bool = False) -> dict[str, Any]:
     """The small finger, or with numbers that are off."""
     data = moved_start() if start else copy.deepcopy(small_finger())
-    data["bias"] |= {"drift_variance": 0.0, "noise_std": 5e-4}
+    data["bias"] |= {"drift_variance": 0.0, "noise_std": 5e-4, "forget_rate": 0.0}  # friction at rest is held
     return data | {"extensions": list(extensions)}
 
 

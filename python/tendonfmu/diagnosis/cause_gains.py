@@ -10,7 +10,7 @@ import numpy as np
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.base import refitted
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, SCALING, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, SCALING, Term
 from tendonfmu.diagnosis.effects.memory import PRESLIDING
 from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, with_known
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
@@ -23,7 +23,7 @@ from tendonfmu.statistics import Interval
 # Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
 # loads as friction, or scales the torque, resembles that.
 FORM = 0.07
-LIKE_A_LAW = {*OF_LAW, *SCALING}
+LIKE_A_LAW = {*OF_LAW, *SCALING} - {*COMMON}
 
 
 @dataclass(frozen=True)

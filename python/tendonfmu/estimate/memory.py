@@ -65,11 +65,12 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
     lengths = [path for path in given if path.endswith((".displacement", ".stiffness")) and not _is_cord(data, path)]
     times = [path for path in given if path.endswith(".relaxation_time")]
     cords = [path for path in given if _is_cord(data, path)]
-    factors = (APART**-0.5, APART**0.5)
-    for factor, time, cord in product(factors, TIMES if times else (None,), STRETCH if cords else (None,)):
+    # relaxation within milliseconds goes with a short distance: only their ratio shows
+    near_and_far = [(APART**-0.5, TIMES[1]), (APART**0.5, TIMES[0])]
+    for (factor, time), cord in product(near_and_far, STRETCH if cords else (None,)):
         start = dict(given)
         start |= {path: factor * given[path] for path in lengths}
-        start |= {} if time is None else dict.fromkeys(times, time)
+        start |= dict.fromkeys(times, time)
         start |= {} if cord is None else dict.fromkeys(cords, cord)
         if start != given:
             yield start

@@ -26,7 +26,7 @@ from tendonfmu.recordings import FitRecording, make_grid
 Rows = tuple[dict[str, Any], ...]
 
 FOLDS = 8
-MATERIAL, CERTAIN = 0.02, 1.64  # of the rms, and standard errors over the folds
+MATERIAL, CERTAIN = 0.05, 1.64  # of the rms, and standard errors over the folds
 DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it slips
 STEPS, TOLERANCE = 12, 0.3
 TIME = 0.1  # s, between the starts of `memory`
