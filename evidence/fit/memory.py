@@ -19,7 +19,7 @@ from evidence.families import cases, elastic, finger
 from evidence.families.finger import NONE, Hidden
 from evidence.families.motion import random_motion
 from evidence.part import Figures
-from evidence.table import Row, number, table, where
+from evidence.table import NOTHING, Row, number, table, where
 from tendonfmu import run
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate import FitWarning
@@ -148,7 +148,8 @@ def pretensions_table(figures: Figures) -> str:
     lines = []
     for learnt in ("one", "both"):
         for judged in PRETENSIONS:
-            left = np.median([row[f"{learnt}, {judged:g} N"] for row in figures["pretensions"]], axis=0)
+            rows = [row[f"{learnt}, {judged:g} N"] for row in figures["pretensions"]]
             at = "12 N" if learnt == "one" else "12 and 24 N"
-            lines.append([at, f"{judged:g} N", " ".join(f"{1e3 * value:.1f}" for value in left)])
+            left = " ".join(f"{1e3 * value:.1f}" for value in np.median(rows, axis=0)) if rows else NOTHING
+            lines.append([at, f"{judged:g} N", left])
     return table(["learned at", "judged at", "mN·m rms by joint, median of the fingers"], lines, 2)
