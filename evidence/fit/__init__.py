@@ -69,7 +69,7 @@ PARTS = {
     "memory": Part(
         memory.measure,
         needs=("mujoco",),
-        headlines={"chosen.elastic": (0.0, 1.3), "chosen.dahl": (0.0, 2.0)},
+        headlines={"chosen.elastic": (0.0, 1.3), "chosen.dahl": (0.0, 2.0), "chosen.maxwell": (0.0, 2.0)},
         tables={"forms": memory.forms_table, "pretensions": memory.pretensions_table},
     ),
     "paper": Part(
