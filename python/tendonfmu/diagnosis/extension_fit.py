@@ -7,6 +7,7 @@ enough (Broyden, Math. Comp. 19, 1965), and a fit begins with those of a similar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -36,10 +37,11 @@ from tendonfmu.estimate import (
     with_known_numbers,
     with_values,
 )
-from tendonfmu.model import effects, finger_from_data, law_path, native
+from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import MEMORY, bounded
 
+PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
 LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 STEP = 1e-3  # of a coordinate, for derivatives
@@ -277,15 +279,27 @@ def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Map
 
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Term]) -> tuple[tuple[str, ...], ...]:
-    """Return, for each cause, the paths of the numbers that it adds or replaces."""
-    added = []
+    """Return, for each cause, the paths of the numbers that it adds or replaces, in the description with all causes."""
+    added, before = [], _numbers_by_row(data)
     for cause in causes:
-        extended = cause.added_to(data)
-        before = dict(_leaves(data))
+        data = cause.added_to(data)
+        after = _numbers_by_row(data)
         # a number that is only written differently does not belong to the cause
-        added.append(tuple(path for path, value in _leaves(extended) if path not in before or before[path] != value))
-        data = extended
-    return tuple(added)
+        added.append([row for row, (_, value) in after.items() if row not in before or before[row][1] != value])
+        before = after
+    return tuple(tuple(before[row][0] for row in rows if row in before) for rows in added)
+
+
+def _numbers_by_row(data: Data) -> dict[Any, tuple[str, float]]:
+    """Return (path, value) of all numbers; those of extensions by effect and place, since rows move."""
+    rows = [tuple(row.get(key) for key in PLACE) for row in extension_rows(data)]
+    found: dict[Any, tuple[str, float]] = {}
+    for path, value in _leaves(data):
+        place = re.match(r"extensions\[(\d+)\]", path)
+        k = 0 if place is None else int(place[1])
+        key: Any = (rows[k - 1], rows[: k - 1].count(rows[k - 1]), path[place.end() :]) if place else path
+        found[key] = (path, value)
+    return found
 
 
 def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.gain import require_unseen
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_unseen
@@ -33,6 +33,7 @@ HELD = Held(0.2, 10.0)  # of the recordings, for the gain, if no tests are given
 HALF = Held(0.5, 10.0)  # for a change: its few numbers need less data, and single samples of r are mostly noise
 
 
+SHORTEST = 0.1  # s on end of free motion: a shorter stretch has no block of its own
 SHARED = 50  # consecutive samples that two recordings of a moving finger never share by chance
 
 
@@ -133,15 +134,21 @@ def _compared(finger: Finger, then: Sequence[FitRecording], now: Sequence[FitRec
     """Return warnings about recordings of the reference and of now."""
     for side, role in ((then, "reference"), (now, "recording")):
         for recording in side:
-            if not (recording.train | recording.held_out).any():
+            if _longest(recording.train | recording.held_out) * np.median(np.diff(recording.time)) < SHORTEST:
                 raise InputError(
-                    f"{recording.path}: {role} has no sample of free motion: all are labelled contact or left out; "
-                    "expected a recording of free motion"
+                    f"{recording.path}: {role} has no free motion of {SHORTEST:g} s on end: others are labelled contact "
+                    "or left out; expected a recording of free motion"
                 )
     for one in then:
         for other in now:
             _refuse_overlap(one, other)
     return list(_different_conditions(then, now))
+
+
+def _longest(free: Flags) -> int:
+    """Return the largest number of samples on end that are flagged [N]."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]])))
+    return int(np.diff(ends.reshape(-1, 2), axis=1).max(initial=0))
 
 
 def _refuse_overlap(then: FitRecording, now: FitRecording) -> None:

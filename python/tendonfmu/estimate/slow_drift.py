@@ -32,7 +32,7 @@ class SlowDrift:
     def without(self, values: Array) -> Numbers:
         """Return the used rows of values [B, n, ...] without their constant or drift, [R, n, ...]."""
         rows = values[self.used]
-        return self._span.without(rows.reshape(len(rows), -1)).reshape(rows.shape)
+        return self._span.without(rows.reshape(len(rows), -1)).reshape(rows.shape) if rows.size else rows
 
 
 def _bases(time: Numbers, stretch: Indices, knots: float) -> list[Numbers]:
