@@ -44,8 +44,8 @@ def test_every_chapter_has_its_numbers_and_files(demo_run: DemoRun) -> None:
 
 @pytest.mark.slow
 def test_what_was_hidden_is_found_and_the_readme_says_so(demo_run: DemoRun) -> None:
-    """One cause, the right one at the right place, of the right size, with an interval of its gain above 0; a torque that
-    wanders is no effect, and said to be unknown."""
+    """One cause, the right one at the right place, of the right size, with an interval of its gain above 0; a torque
+    that wanders is no effect, and said to be unknown."""
     hidden = json.loads(HIDDEN.read_text("utf-8"))
     assert not (files("tendonfmu") / "data" / HIDDEN.name).is_file()
     calibration = demo_run.folder / "calibration"

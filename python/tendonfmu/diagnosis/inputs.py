@@ -136,8 +136,8 @@ def _compared(finger: Finger, then: Sequence[FitRecording], now: Sequence[FitRec
         for recording in side:
             if _longest(recording.train | recording.held_out) * np.median(np.diff(recording.time)) < SHORTEST:
                 raise InputError(
-                    f"{recording.path}: {role} has no free motion of {SHORTEST:g} s on end: others are labelled contact "
-                    "or left out; expected a recording of free motion"
+                    f"{recording.path}: {role} has no free motion of {SHORTEST:g} s on end: others are labelled "
+                    "contact or left out; expected a recording of free motion"
                 )
     for one in then:
         for other in now:
