@@ -259,11 +259,7 @@ def _jobs() -> Any:
 
 
 def _false_alarms() -> Any:
-    return option(6.0, Number(1e-3, 3600.0), "highest rate accepted in free motion like yours", metavar="RATE")
-
-
-def _confidence() -> Any:
-    return option(0.9, Number(0.5, 0.9999), "probability that RATE is not exceeded", metavar="P")
+    return option(6.0, Number(1e-3, 3600.0), "false alarms an hour in other free motion, at most", metavar="RATE")
 
 
 # --- the commands -----------------------------------------------------------------------------------------------------
@@ -364,9 +360,6 @@ class FitOptions(Options):
     )
     tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
     drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
-    uncertainty: bool = option(
-        True, _YES, "write the uncertainty of the friction, for detection", names=("--uncertainty/--no-uncertainty",)
-    )
     resume: File | None = option(None, _PATH, "continue an interrupted fit", metavar="FITTED.unfinished.json")
 
     def __post_init__(self) -> None:
@@ -382,7 +375,6 @@ class CalibrateOptions(Options):
     """Options of `calibrate`."""
 
     false_alarms_per_hour: float = _false_alarms()
-    confidence: float = _confidence()
     kinematics: int = _kinematics()
     seed: int = _seed()
     jobs: int = _jobs()
@@ -405,23 +397,13 @@ class TuneOptions(Options):
     """Options of `tune`."""
 
     false_alarms_per_hour: float = _false_alarms()
-    confidence: float = _confidence()
     method: str = option(
-        "innovation",
-        Choice(("innovation", "cusum", "threshold")),
-        "contact.method; threshold is that of the paper",
-        metavar="innovation|cusum|threshold",
+        "bands", Choice(("bands", "paper")), "contact.method; paper is the rule of the paper", metavar="bands|paper"
     )
     bias_time: float | None = option(
         None, Number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
     )
-    release_time: float = option(
-        2.0, Number(0.0), "time in contact until the bias is tracked again; inf: never", metavar="SECONDS"
-    )
     kinematics: int = _kinematics()
-    strict: bool = option(
-        False, _YES, "write no file and exit with 1 if FREE is too short for RATE", names=("--strict",)
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,7 +15,7 @@ from tendonfmu.files import counted
 from tendonfmu.options import ScoreOptions, TuneOptions
 
 
-@command(TuneOptions, reads=("finger", "recordings"), after={"report": "release_time", "figures": "release_time"})
+@command(TuneOptions, reads=("finger", "recordings"), after={"report": "bias_time", "figures": "bias_time"})
 def tune(
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json", help="fitted finger description")],
     recordings: FreeAtPretensions,
@@ -28,11 +28,9 @@ def tune(
     """Tune contact detection on free motion for a stated rate of false alarms.
 
     Sets noise and drift of the bias, the bounds of the detection and the
-    standard deviation of the estimated torque.
-
-    With too little free motion for the rate, it tunes for the rate that the
-    motion suffices for, and reports that rate and how much more motion is
-    needed. With --strict it exits with 1 and writes no file.
+    standard deviation of the estimated torque. Reports the false alarms in
+    motion that the bounds were not learned from: record at least three
+    motions, at all pretensions that the finger will have.
     """
     from tendonfmu.detect import NotEnough, TuneWarning
     from tendonfmu.estimate import check_outputs

@@ -1,24 +1,20 @@
-"""Recordings of free motion to tune contact detection on: the check for contact, residuals, and alarms of a finger."""
+"""Recordings of free motion to tune contact detection on: the check for contact, and alarms of a finger."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tendonfmu.arrays import Array, Data, Flags, Numbers
+from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers
 from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.detect.reference_sensor import touched
 from tendonfmu.errors import InputError
-from tendonfmu.model import NEVER, Finger, native, number_of
+from tendonfmu.model import Finger, native, number_of
 from tendonfmu.options import KinematicsSource
 from tendonfmu.recordings import Held, Recording, flagged_rows, prepare
-
-Signal = NDArray[np.float32]  # saves memory for millions of samples; seven digits suffice to choose thresholds
 
 SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
 STILL = 0.01  # least share of the time with motion; less says nothing about friction
@@ -45,28 +41,16 @@ class FreePart:
         """Counted time (h)."""
         return float(self.seconds[self.counted].sum()) / 3600.0
 
-
-@dataclass(frozen=True)
-class FreeRun:
-    """Residuals of a part for a finger with contact detection switched off, all [N, n] and in N·m."""
-
-    part: FreePart  # the stretch of free motion
-    residual: Signal  # r, y and d
-    innovation: Signal
-    drift: Signal
-    stuck: Signal  # H and J
-    jump: Signal
-    known: Signal  # standard deviation that is known before any tuning: of the bias and of the model's uncertainty
-    uncertain: Signal  # u, the standard deviation of the model's uncertainty alone
-
-
-@dataclass(frozen=True)
-class Clock:
-    """Time constants of the run: innovation T, jump T_J and stuck T_H (s)."""
-
-    innovation: float
-    jump: float
-    stuck: float
+    def cut(self, rows: Indices) -> FreePart:
+        """Return a stretch of it, in which a finger starts anew."""
+        time = self.time[rows]
+        return replace(
+            self,
+            arrays={name: values[rows] for name, values in self.arrays.items()},
+            mean_force=self.mean_force[rows],
+            counted=self.counted[rows] & (time - time[0] >= SETTLING),
+            seconds=self.seconds[rows],
+        )
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
@@ -113,52 +97,6 @@ def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> N
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def run_free(data: Data, parts: Sequence[FreePart], clock: Clock) -> list[FreeRun]:
-    """Run the finger over every part with contact detection switched off."""
-    probe = _open_loop(data, clock)
-    plain = runs_of(_without_uncertainty(probe), parts) if _is_uncertain(data) else repeat((None, None))
-    runs = []
-    for (part, outputs), (_, of_bias) in zip(runs_of(probe, parts), plain, strict=False):
-        known = outputs["compensated_torque_std"]
-        uncertain = np.zeros_like(known)
-        if of_bias is not None:
-            uncertain = np.sqrt(np.maximum(known**2 - of_bias["compensated_torque_std"] ** 2, 0.0))
-        names = ("residual", "innovation", "drift", "stuck_friction", "friction_jump")
-        arrays = [*(outputs[name] for name in names), known, uncertain]
-        runs.append(FreeRun(part, *(values.astype(np.float32) for values in arrays)))
-    return runs
-
-
-def _is_uncertain(data: Data) -> bool:
-    return (data.get("contact") or {}).get("uncertainty") is not None
-
-
-def _open_loop(data: Data, clock: Clock) -> dict[str, Any]:
-    """Return the description with all signals of contact detection, and thresholds that are never exceeded."""
-    never = [NEVER] * len(data["joints"])
-    given = data["contact"].get("friction_bound") or {}
-    contact: dict[str, Any] = {
-        "method": "innovation",
-        "threshold": never,
-        "innovation": {"time": clock.innovation, "threshold": never},
-        "drift": {"threshold": never},
-        "friction_bound": {
-            **given,
-            "stuck_share": 0.0,
-            "jump_share": 0.0,
-            "jump_time": clock.jump,
-            "stuck_time": clock.stuck,
-        },
-    }
-    if _is_uncertain(data):
-        contact["uncertainty"] = data["contact"]["uncertainty"]
-    return {**data, "contact": contact, "sensor_fault": None}
-
-
-def _without_uncertainty(data: Data) -> dict[str, Any]:
-    return {**data, "contact": {key: value for key, value in data["contact"].items() if key != "uncertainty"}}
-
-
 def runs_of(data: Data, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, dict[str, Array]]]:
     """Run a finger over every part, each from its start."""
     finger = native.Instance.from_description(data, parts[0].kinematics)
@@ -171,53 +109,35 @@ def runs_of(data: Data, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, d
             raise InputError(f"{part.source}: {refused}") from None
 
 
-def closed_loop(data: Data, parts: Sequence[FreePart]) -> Iterator[Flags]:
-    """Yield [N] `contact` of the finger as it is, for every part."""
-    for _, outputs in runs_of(data, parts):
-        yield np.asarray(outputs["contact"]).ravel().astype(bool)
-
-
 @dataclass(frozen=True)
-class LoopAlarms:
-    """Alarms of one part."""
+class Alarms:
+    """False alarms of one part."""
 
-    part: int
     source: str
-    begins: list[float]
-    ends: list[float]
-    at_start: int
-    hours: float
-    seconds: float
-    alarm_seconds: float
-
-    @property
-    def alarms(self) -> int:
-        return len(self.begins)
-
-    @property
-    def longest(self) -> float:
-        """Longest alarm (s); 0 without alarms."""
-        return max((end - begin for begin, end in zip(self.begins, self.ends, strict=True)), default=0.0)
+    begins: Indices  # first sample of each
+    hours: float  # counted time
+    longest: float  # s; 0 without alarms
+    seconds: float  # in alarm, of all time (s)
+    at_start: int  # within `SETTLING`, which do not count
 
 
-def count_loop(data: Data, parts: Sequence[FreePart]) -> list[LoopAlarms]:
+def count_alarms(data: Data, parts: Sequence[FreePart]) -> list[Alarms]:
     """Run the finger over every part from its start. An alarm counts if it begins in counted time."""
-    alarms = []
-    for k, (part, contact) in enumerate(zip(parts, closed_loop(data, parts), strict=True)):
-        time = part.time - part.time[0]
+    found = []
+    for part, outputs in runs_of(data, parts):
+        contact = outputs["contact"].ravel().astype(bool)
         spans = stretches(part.time, contact)
-        settled = time[spans[:, 0]] >= SETTLING if len(spans) else np.zeros(0, dtype=bool)
-        counted = spans[part.counted[spans[:, 0]]] if len(spans) else spans
-        alarms.append(
-            LoopAlarms(
-                part=k,
+        length = part.time[spans[:, 1]] + part.seconds[spans[:, 1]] - part.time[spans[:, 0]]
+        counted = part.counted[spans[:, 0]]
+        early = part.time[spans[:, 0]] - part.time[0] < SETTLING
+        found.append(
+            Alarms(
                 source=part.source,
-                begins=[float(time[begin]) for begin, _ in counted],
-                ends=[float(time[end] + part.seconds[end]) for _, end in counted],
-                at_start=int((~settled).sum()),
+                begins=spans[counted, 0],
                 hours=part.hours,
-                seconds=float(part.seconds.sum()),
-                alarm_seconds=float(part.seconds[contact].sum()),
+                longest=float(length[counted].max(initial=0.0)),
+                seconds=float(part.seconds[contact].sum()),
+                at_start=int(early.sum()),
             )
         )
-    return alarms
+    return found

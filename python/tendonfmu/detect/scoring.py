@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,6 @@ from tendonfmu.estimate import check_given_once
 from tendonfmu.files import counted
 from tendonfmu.fmu import check_model, outputs_of, run_fmu
 from tendonfmu.model import (
-    DEFAULTS,
-    RANGES,
     Finger,
     FingerSource,
     finger_file,
@@ -46,15 +44,7 @@ from tendonfmu.recordings import (
 Progress = Callable[[int, int], None]
 
 USUAL = ScoreOptions()
-# the keys of `contact` that decide
 THRESHOLDS = ("threshold", "threshold_per_force")
-SHARES = ("stuck_share", "jump_share")
-REST_BOUNDS = (*THRESHOLDS, "creep")
-UNCERTAINTY_LEVEL = "uncertainty_level"
-LARGEST = {
-    **{key: RANGES[f"contact.friction_bound.{key}"][1] for key in SHARES},
-    UNCERTAINTY_LEVEL: RANGES[f"contact.{UNCERTAINTY_LEVEL}"][1],
-}
 
 
 @dataclass(frozen=True)
@@ -303,26 +293,15 @@ def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArr
 
 
 def scaled_detection(data: Data, factor: float) -> dict[str, Any]:
-    """Return the description with every bound that decides on contact times a factor, within the range of each key."""
-    contact = dict(data["contact"])
-    _scale(contact, THRESHOLDS, factor)
-    for part, keys in (("innovation", THRESHOLDS), ("friction_bound", SHARES), ("rest", REST_BOUNDS)):
-        if contact.get(part) is not None:
-            contact[part] = dict(contact[part])
-            _scale(contact[part], keys, factor)
-    if contact.get("uncertainty") is not None:
-        contact.setdefault(UNCERTAINTY_LEVEL, DEFAULTS[f"contact.{UNCERTAINTY_LEVEL}"])
-        _scale(contact, (UNCERTAINTY_LEVEL,), factor)
+    """Return the description with every bound that decides on contact times a factor."""
+    contact = {**data["contact"], **_scaled(data["contact"], THRESHOLDS, factor)}
+    if contact.get("bands") is not None:
+        contact["bands"] = [_scaled(band, tuple(band), factor) for band in contact["bands"]]
     return {**data, "contact": contact}
 
 
-def _scale(part: dict[str, Any], keys: Iterable[str], factor: float) -> None:
-    for key in keys:
-        value = part.get(key)
-        if isinstance(value, list | tuple):
-            part[key] = [None if each is None else factor * each for each in value]
-        elif value is not None:
-            part[key] = min(factor * value, LARGEST[key])
+def _scaled(part: Mapping[str, Any], keys: Sequence[str], factor: float) -> dict[str, Any]:
+    return {key: [factor * each for each in part[key]] for key in keys if part.get(key) is not None}
 
 
 def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:

@@ -1,81 +1,104 @@
-"""The report of a tuning, "tendonfmu-tune-1": the chosen values, the motion they rest on, and the alarms they give."""
+"""The report of a tuning, "tendonfmu-tune-2": what was learned, and what it does on motion that was kept out."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.detect.alarm_level import rate_limit
-from tendonfmu.detect.free_motion import LoopAlarms
+from tendonfmu.detect.learning import SURE, WITHIN
 from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.files import finite
+from tendonfmu.files import counted, finite
 from tendonfmu.statistics import intervals
 
-FORMAT = "tendonfmu-tune-1"
-FACTORS = np.round(np.geomspace(0.5, 2.0, 25), 6)  # on the chosen bases, for the tail of the alarms
+FORMAT = "tendonfmu-tune-2"
 
 
 def build_report(tuning: ContactTuning) -> dict[str, Any]:
     """Build the report of a tuning, in SI units with None for what is not known."""
+    names = tuning.description_.joint_names
+    force = tuning.residuals_.force
     report = {
         "format": FORMAT,
         "finger": tuning.description_.name,
-        "joints": tuning.description_.joint_names,
+        "joints": names,
         "kinematics": tuning.options.kinematics,
-        "method": tuning.method,
+        "method": tuning.options.method,
         "false_alarms_per_hour": tuning.options.false_alarms_per_hour,
-        "confidence": tuning.confidence,
-        "tuned_for_per_hour": tuning.rate_,
-        "more_minutes": tuning.more_minutes_,
-        "holds_for": _holds_for(tuning),
         "minutes": 60.0 * tuning.hours_,
-        "allowed_alarms": tuning.allowed_,
+        "more_minutes": tuning.more_minutes_,
+        "kept_out": _kept_out(tuning),
+        "pushes": {"within_s": WITHIN, "share": SURE, "torque": tuning.push_.tolist()},
+        "holds_for": {"lowest_force": float(force.min()), "highest_force": float(force.max())},
         "warnings": list(tuning.warnings_),
         "bias": {**tuning.bias_.keys(), "time_constant": tuning.bias_.time_constant, "mean_force": tuning.bias_.force},
         "contact": tuning.description_.data["contact"],
-        "levels": {name: _level(tuning, name) for name in tuning.lines_},
-        "level_raised": tuning.level_raised_,
-        "in_sample": _counted(tuning, tuning.tail(np.ones(1))[0][1]),
-        "held_out": _counted(tuning, tuning.held_out_[0]),
-        "closed_loop": _loop(tuning),
-        "rest": _rest(tuning),
+        "factor": tuning.loop_.factor,
+        "tail": _tail(tuning),
+        "pretensions": _pretensions(tuning),
         "sensor_fault": _sensors(tuning),
-        "pretensions": [_pretension(tuning, g) for g in range(len(tuning.pretensions_))],
-        "tail": [_point(tuning, *each) for each in tuning.tail(FACTORS)],
-        "tried": _tried(tuning),
         "seconds": tuning.seconds_,
     }
-    return {key: finite(value) for key, value in report.items()}
+    report = {key: finite(value) for key, value in report.items()}
+    return {**report, "sentence": sentence(report)}
 
 
-def _holds_for(tuning: ContactTuning) -> dict[str, Any]:
-    """Return the mean tendon forces (N) that the thresholds were chosen on, and the number of pretensions."""
-    low, high = tuning.forces_
-    return {"lowest_force": low, "highest_force": high, "pretensions": len(tuning.pretensions_)}
+def sentence(report: Mapping[str, Any]) -> str:
+    """Say how many false alarms were asked for and found, and which pushes are found at the least sensitive joint."""
+    found, pushes = report["kept_out"], report["pushes"]
+    minutes = found["minutes"]
+    long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.0f} min" if minutes >= 1.0 else "less than 1 min"
+    alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
+    largest = int(np.argmax(pushes["torque"]))
+    asked = counted(report["false_alarms_per_hour"], "alarm")
+    return (
+        f"At most {asked} an hour were asked for; {alarms} in {long} of motion that was kept out. Pushes of more than "
+        f"{1e3 * pushes['torque'][largest]:.2g} mN·m at {report['joints'][largest]} are found within "
+        f"{1e3 * pushes['within_s']:.0f} ms, nine of ten."
+    )
 
 
-def _counted(tuning: ContactTuning, alarms: int, hours: float | None = None) -> dict[str, Any]:
-    """Return alarms, their rate (1/h) with its two-sided 95 % interval, and its limit at the confidence asked for."""
-    span = tuning.hours_ if hours is None else hours
-    rate = intervals.rate(alarms, span)
+def _rate(alarms: int, hours: float) -> dict[str, Any]:
+    """Return alarms and their rate (1/h) with its 95 % interval."""
+    rate = intervals.rate(alarms, hours)
+    return {"alarms": alarms, "minutes": 60.0 * hours, "per_hour": rate.value, "interval": [rate.low, rate.high]}
+
+
+def _kept_out(tuning: ContactTuning) -> dict[str, Any]:
+    found = tuning.kept_out_
     return {
-        "alarms": alarms,
-        "minutes": 60.0 * span,
-        "per_hour": rate.value,
-        "interval": [rate.low, rate.high],
-        "limit": rate_limit(alarms, span, tuning.confidence),
+        **_rate(found.alarms, found.hours),
+        "longest_s": max(part.longest for part in found.parts),
+        "share_in_alarm": found.share_in_alarm,
+        "at_start": sum(part.at_start for part in found.parts),
+        "recordings": [
+            {
+                "path": source,
+                "alarms": sum(len(part.begins) for part in found.parts if part.source == source),
+                "minutes": 60.0 * sum(part.hours for part in found.parts if part.source == source),
+            }
+            for source in dict.fromkeys(part.source for part in found.parts)
+        ],
     }
 
 
-def _rest(tuning: ContactTuning) -> dict[str, Any] | None:
-    """Return the rests that contact.rest was learned from, and its alarms; None without rests."""
-    rule = tuning.rest_
-    if rule is None:
-        return None
-    counted = {"alarms": rule.alarms, "held_out": rule.held_out, "limit": rule.limit}
-    return {"rests": rule.rests, "minutes": 60.0 * rule.hours, **counted}
+def _tail(tuning: ContactTuning) -> list[dict[str, Any]]:
+    """Return the alarms in motion that was kept out, over factors on the bounds; that of the finger is 1."""
+    loop = tuning.loop_
+    return [
+        {"factor": float(factor / loop.factor), **_rate(int(alarms), tuning.hours_)}
+        for factor, alarms in zip(loop.tried, loop.alarms.sum(axis=1), strict=True)
+    ]
+
+
+def _pretensions(tuning: ContactTuning) -> list[dict[str, Any]]:
+    residuals = tuning.residuals_
+    force, rms = residuals.of_pretensions(residuals.force), residuals.rms()
+    hours = [float(residuals.hours[residuals.group == g].sum()) for g in range(len(force))]
+    return [
+        {"mean_force": float(force[g]), "minutes": 60.0 * hours[g], "free_rms": rms[g].tolist()} for g in range(len(force))
+    ]
 
 
 def _sensors(tuning: ContactTuning) -> dict[str, Any]:
@@ -83,59 +106,3 @@ def _sensors(tuning: ContactTuning) -> dict[str, Any]:
     rule = tuning.sensors_
     keys = None if rule.keys is None else dict(rule.keys)
     return {"keys": keys, "largest_difference": rule.largest, "left_out": rule.why}
-
-
-def _level(tuning: ContactTuning, name: str) -> dict[str, Any]:
-    level, line = tuning.levels_[name], tuning.lines_[name]
-    return {
-        "in_sample": level.in_sample,
-        "held_out": level.held_out,
-        "compared": {"base": line.bound.base.tolist(), "per_force": line.bound.per_force.tolist()},
-    }
-
-
-def _loop(tuning: ContactTuning) -> dict[str, Any]:
-    alarms = sum(loop.alarms for loop in tuning.loop_)
-    seconds = sum(loop.seconds for loop in tuning.loop_)
-    return {
-        **_counted(tuning, alarms),
-        "longest_s": max(loop.longest for loop in tuning.loop_),
-        "share_in_alarm": sum(loop.alarm_seconds for loop in tuning.loop_) / seconds,
-        "at_start": sum(loop.at_start for loop in tuning.loop_),
-        "parts": [_part(loop) for loop in tuning.loop_],
-    }
-
-
-def _part(loop: LoopAlarms) -> dict[str, Any]:
-    return {
-        "path": loop.source,
-        "minutes": 60.0 * loop.hours,
-        "alarms": loop.alarms,
-        "at_start": loop.at_start,
-        "longest_s": loop.longest,
-        "share_in_alarm": loop.alarm_seconds / loop.seconds,
-        "begins": loop.begins,
-        "ends": loop.ends,
-    }
-
-
-def _pretension(tuning: ContactTuning, g: int) -> dict[str, Any]:
-    pretension = tuning.pretensions_[g]
-    return {
-        "mean_force": pretension.force,
-        "free_rms": pretension.rms,
-        **_counted(tuning, pretension.alarms, pretension.hours),
-        "torque_std_mean_square": tuning.deviation_.square[g].tolist(),
-    }
-
-
-def _point(tuning: ContactTuning, factor: float, in_sample: int, held_out: int) -> dict[str, Any]:
-    return {"factor": factor, "in_sample": _counted(tuning, in_sample), "held_out": _counted(tuning, held_out)}
-
-
-def _tried(tuning: ContactTuning) -> list[dict[str, Any]]:
-    line = tuning.lines_.get("innovation")
-    if line is None:
-        return []
-    bound = line.bound
-    return [{"stuck_share": bound.stuck_share, "jump_share": bound.jump_share, "least_load": math.exp(line.mean_log)}]

@@ -32,7 +32,7 @@ class TuneResult:
     tuning: ContactTuning
 
     def __repr__(self) -> str:
-        return f"<TuneResult {self.finger.name}: tuned for {self.attained_rate:.3g} false alarms per hour>"
+        return f"<TuneResult {self.finger.name}: {self.attained_rate:.3g} false alarms per hour in motion kept out>"
 
     @property
     def finger(self) -> Finger:
@@ -41,8 +41,8 @@ class TuneResult:
 
     @property
     def attained_rate(self) -> float:
-        """Rate of false alarms that it is tuned for (1/h): the one asked for, or what the free motion supports."""
-        return self.tuning.rate_
+        """Rate of false alarms in motion that was kept out of the learning (1/h)."""
+        return self.tuning.kept_out_.alarms / self.tuning.kept_out_.hours
 
     @property
     def report(self) -> Mapping[str, Any]:
@@ -59,7 +59,7 @@ class TuneResult:
         self.finger.write(path)
 
     def plot(self) -> Any:
-        """Draw the false alarms over a factor on all bounds, as counted and on blocks that were held out.
+        """Draw the false alarms over a factor on all bounds, in motion that was kept out.
 
         Returns
         -------
@@ -69,12 +69,9 @@ class TuneResult:
         from tendonfmu.drawing import SeriesRow, series_figure  # plotly takes 0.1 s to import
 
         tail = self.report["tail"]
-        counted = {
-            "as counted": np.array([point["in_sample"]["per_hour"] for point in tail]),
-            "held out": np.array([point["held_out"]["per_hour"] for point in tail]),
-        }
-        factors = np.array([point["factor"] for point in tail])
-        return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [SeriesRow("alarms (1/h)", counted)])
+        alarms, factors = (np.array([point[name] for point in tail]) for name in ("per_hour", "factor"))
+        row = SeriesRow("alarms (1/h)", {"kept out": alarms})
+        return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [row])
 
     def _repr_html_(self) -> str:
         tables, lines = detect_text.tune_tables(self.tuning), detect_text.tune_lines(self.tuning)
@@ -86,12 +83,9 @@ def tune(
     recordings: RecordingSource | Sequence[RecordingSource],
     *,
     false_alarms_per_hour: float = 6.0,
-    confidence: float = 0.9,
-    method: str = "innovation",
+    method: str = "bands",
     bias_time: float | None = None,
-    release_time: float = 2.0,
     kinematics: int = 1,
-    strict: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> TuneResult:
     """Tune contact detection on free motion for a stated rate of false alarms.
@@ -102,19 +96,14 @@ def tune(
         A fitted finger, its description, or the file of it.
     recordings
         Free motion at several pretensions: recordings, DataFrames or files. One alone needs no list.
-    false_alarms_per_hour, confidence
-        Highest rate accepted in free motion like that of the recordings (1/h), and the probability that it is not
-        exceeded.
+    false_alarms_per_hour
+        Rate of false alarms in other free motion of the same finger (1/h).
     method
-        "innovation", "cusum" or "threshold", that of the paper.
+        "bands", or "paper" for the threshold of the paper.
     bias_time
         Time constant of the bias (s); None: unchanged.
-    release_time
-        Time in contact until the bias is tracked again (s); math.inf: never.
     kinematics
         1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
-    strict
-        Whether too little free motion for the rate is an error. Otherwise it is tuned for the rate that it supports.
     progress
         Called with steps done and steps.
 
@@ -126,7 +115,7 @@ def tune(
     Raises
     ------
     InputError
-        A recording has contact or is not sound, there is too little of it, or an option is out of range.
+        A recording is not sound, there is too little free motion, or an option is out of range.
 
     Warns
     -----

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
-from tendonfmu.detect import ContactTuning, Scored, Summary, rate_limit
-from tendonfmu.files import are, counted
-from tendonfmu.report.numbers import Row, Table
+from tendonfmu.detect import ContactTuning, Scored, Summary, tune_report
+from tendonfmu.files import counted
+from tendonfmu.report.numbers import Table
 from tendonfmu.statistics import Interval
 
 SHOWN = (0.5, 1.0, 2.0)  # factors of the ROC that are printed
@@ -114,77 +112,60 @@ def _rate(value: float) -> str:
 
 
 def tune_tables(tuning: ContactTuning) -> Iterator[Table]:
-    """List the tables to print: bounds by joint, then results by pretension."""
-    yield _bounds(tuning)
-    yield _pretensions(tuning)
-
-
-def _bounds(tuning: ContactTuning) -> Table:
-    headings, columns = ["joint"], []
-    for name, bound in reversed(tuning.bounds_.items()):
-        headings += [f"{name}\nmN·m", "+ per N\nmN·m/N"]
-        columns += [bound.base, bound.per_force]
-    headings += ["deviation\nmN·m", "+ per N\nmN·m/N"]
-    columns += [tuning.deviation_.base, tuning.deviation_.per_force]
-    main = list(tuning.bounds_.values())[-1]
-    also = f" + {main.stuck_share:g} · stuck friction + {main.jump_share:g} · friction jump" if main.stuck_share else ""
-    if main.jump_share and not main.stuck_share:
-        also = f" + {main.jump_share:g} · friction jump"
-    rows = [
-        (joint, *(f"{1e3 * column[j]:.3g}" for column in columns))
-        for j, joint in enumerate(tuning.description_.joint_names)
-    ]
-    return f"{tuning.description_.name}: {tuning.method}, bound = base + per N · force{also}", tuple(headings), rows
-
-
-def _pretensions(tuning: ContactTuning) -> Table:
-    headings: Row = ("mean force, N", "minutes", "residual rms\nmN·m", "false alarms", "at most,\nper hour", "(r/std)²")
-    rows: list[Row] = [
+    """List the tables to print: what is found, by joint, then results by pretension."""
+    report = tune_report.build_report(tuning)
+    pushes, deviation = report["pushes"], tuning.deviation_
+    by_joint = zip(report["joints"], pushes["torque"], deviation.base, deviation.per_force, strict=True)
+    yield (
+        f"{report['finger']}: {report['method']}",
         (
-            f"{pretension.force:.3g}",
-            f"{60 * pretension.hours:.1f}",
-            ", ".join(f"{1e3 * value:.2g}" for value in pretension.rms),
-            str(pretension.alarms),
-            f"{pretension.limit:.3g}",
-            ", ".join(f"{value:.2g}" for value in square),
-        )
-        for pretension, square in zip(tuning.pretensions_, tuning.deviation_.square, strict=True)
-    ]
-    return "free motion", headings, rows
+            "joint",
+            f"found within {1e3 * pushes['within_s']:.0f} ms,\n9 of 10: from mN·m",
+            "deviation\nmN·m",
+            "+ per N\nmN·m/N",
+        ),
+        [(joint, *(f"{1e3 * value:.3g}" for value in values)) for joint, *values in by_joint],
+    )
+    yield (
+        "free motion",
+        ("mean force, N", "minutes", "residual rms\nmN·m"),
+        [
+            (
+                f"{each['mean_force']:.3g}",
+                f"{each['minutes']:.1f}",
+                ", ".join(f"{1e3 * value:.2g}" for value in each["free_rms"]),
+            )
+            for each in report["pretensions"]
+        ],
+    )
 
 
 def tune_lines(tuning: ContactTuning) -> Iterator[str]:
-    """List the lines to print: the rate of false alarms, and the data it was measured on."""
-    alarms = sum(loop.alarms for loop in tuning.loop_)
-    percent = 100 * tuning.confidence
-    held, limit = tuning.held_out_
+    """List the lines to print: what was asked for and found, and the noise of bias and sensors."""
+    report = tune_report.build_report(tuning)
+    yield report["sentence"]
+    kept_out, bias, sensors = report["kept_out"], report["bias"], report["sensor_fault"]
+    low, high = kept_out["interval"]
+    if kept_out["alarms"]:
+        where = ", ".join(f"{each['alarms']} in {each['path']}" for each in kept_out["recordings"] if each["alarms"])
+        yield (
+            f"kept out: {where}; the longest {kept_out['longest_s']:.3g} s, "
+            f"{100 * kept_out['share_in_alarm']:.2g} % of the time in alarm"
+        )
+    yield f"with 95 % confidence between {low:.3g} and {high:.3g} false alarms an hour"
+    forces = report["holds_for"]
     yield (
-        f"run with detection on: {counted(alarms, 'false alarm')} in {60 * tuning.hours_:.1f} min, at most "
-        f"{rate_limit(alarms, tuning.hours_, tuning.confidence):.3g} per hour ({percent:g} %)"
+        f"learned at mean tendon forces of {forces['lowest_force']:.3g} to {forces['highest_force']:.3g} N; beyond "
+        "them bounds are extrapolated"
     )
-    if alarms:
-        longest = max(loop.longest for loop in tuning.loop_)
-        share = sum(loop.alarm_seconds for loop in tuning.loop_) / sum(loop.seconds for loop in tuning.loop_)
-        yield f"longest alarm {longest:.3g} s; {100 * share:.2g} % of the time in alarm"
     yield (
-        f"held out: {counted(held, 'false alarm')} in blocks that the bounds were not chosen on, at most {limit:.3g} "
-        f"per hour; {tuning.allowed_} {are(tuning.allowed_)} allowed for {tuning.rate_:.3g} per hour"
+        f"bias: noise {1e3 * bias['noise_std']:.3g} mN·m + {1e3 * bias['noise_std_per_force']:.3g} mN·m per N, "
+        f"time constant {bias['time_constant']:.3g} s at {bias['mean_force']:.3g} N"
     )
-    low, high = tuning.forces_
-    yield f"chosen at mean tendon forces of {low:.3g} to {high:.3g} N; beyond them thresholds are extrapolated"
-    bias = tuning.bias_
-    yield (
-        f"bias: noise {1e3 * bias.noise_std:.3g} mN·m + {1e3 * bias.noise_std_per_force:.3g} mN·m per N, "
-        f"time constant {bias.time_constant:.3g} s at {bias.force:.3g} N"
-    )
-    sensors = tuning.sensors_
-    if sensors.keys is None:
-        yield f"sensor faults are not watched: {sensors.why}"
+    if sensors["keys"] is None:
+        yield f"sensor faults are not watched: {sensors['left_out']}"
     else:
         yield (
-            f"sensor faults: forces differ from those of their springs by up to {sensors.largest:.2g} N in free "
-            f"motion, {sensors.keys['jump_margin']:.3g} N are allowed"
+            f"sensor faults: forces differ from those of their springs by up to {sensors['largest_difference']:.2g} N "
+            f"in free motion, {sensors['keys']['jump_margin']:.3g} N are allowed"
         )
-    levels = np.array([level.held_out / level.in_sample for level in tuning.levels_.values()])
-    if levels.max() > 1:
-        yield f"held-out halves need bounds {levels.max():.2f} times as large as the halves they were chosen on"

@@ -1,0 +1,175 @@
+"""Learns the numbers of `contact.bands` from free motion (docs/reference/commands/tune.md).
+
+A bound is the root of a weighted sum of squares (docs/reference/semantics/detection.md). The weights come from a gamma
+likelihood, one level for each joint and band from the tail of the largest ratios, and a factor on all of them from runs
+of the finger as it will be. Each recording is judged with numbers that were learned from the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import genpareto
+
+from tendonfmu.arrays import Indices, Numbers
+from tendonfmu.detect.terms import AVERAGED, COMPARED, Terms, begins, largest
+
+BLOCK = 0.5  # s, of which only the largest ratio shapes a bound: most samples are far below any
+ROUNDS = 3  # of choosing the largest ratios by the weights, and the weights by them
+_MOST = 20_000  # cells for the first weights
+_LEAST = 1e-6  # of the mean square: a smaller part of a bound is left out
+_LEAST_NOISE = 0.02  # of the rms distance: the noise is above 0
+TAIL, ENOUGH = 0.05, 30  # share of the seconds whose maxima are the tail, and least number for its shape
+FACTORS = 0.85  # from one factor to the next
+HIGHEST, LOWEST = 20.0, 0.1
+SEEN = 20  # alarms at the lowest factor that is tried, or three times those asked for
+SLOPE = (-25.0, -1.0)  # of the log of the alarms over the log of the factor
+WITHIN = 0.06  # s in which a push is found
+SURE = 0.9  # share of the instants at which it is found
+
+
+# --- weights and levels -----------------------------------------------------------------------------------------------
+
+
+def weights_of(parts: Sequence[Terms]) -> Numbers:
+    """Learn the weights [n, 4, 6] of the squared terms, each joint and band alone."""
+    block = np.concatenate([np.floor(part.time / BLOCK) + 1e9 * k for k, part in enumerate(parts)])
+    first = begins(block)
+    distance, squares = (np.concatenate([getattr(part, name) for part in parts]) for name in ("distance", "squares"))
+    weights = np.zeros(squares.shape[1:])
+    for j, k in np.ndindex(*weights.shape[:2]):
+        y, z = distance[:, j, k].astype(float) ** 2, squares[:, j, k].astype(float)
+        few = slice(None, None, max(1, len(y) // _MOST))
+        weights[j, k] = gamma_weights(y[few], z[few])
+        for _ in range(ROUNDS):
+            top = largest(y / (z @ weights[j, k]), first)
+            weights[j, k] = gamma_weights(y[top], z[top])
+    return weights
+
+
+def gamma_weights(square: Numbers, terms: Numbers) -> Numbers:
+    """Return w ≥ 0 [6] with the least mean of log v + y²/v, v = Z·w, for squared distances y² [c] and terms Z [c, 6]."""
+    scale, size = terms.mean(axis=0), max(float(square.mean()), 1e-30)
+    used = np.flatnonzero(scale > 0)
+    z, y = terms[:, used] / scale[used], square / size
+
+    def loss(log_weight: Numbers) -> tuple[float, Numbers]:
+        weight = np.exp(log_weight)
+        v = z @ weight + _LEAST
+        return float(np.mean(np.log(v) + y / v)), (z * (1 / v - y / v**2)[:, None]).mean(axis=0) * weight
+
+    even = np.full(len(used), -np.log(len(used)))
+    starts = (even, even + np.where(used == 0, 2.0, -2.0))
+    ends = [minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[(-30.0, 10.0)] * len(used)) for start in starts]
+    share = np.exp(min(ends, key=lambda end: float(end.fun)).x)
+    weights = np.zeros(terms.shape[1])
+    weights[used] = np.where(share > _LEAST, share, 0.0) * size / scale[used]
+    weights[0] = max(weights[0], _LEAST_NOISE**2 * size)
+    return weights
+
+
+def seconds_of(parts: Sequence[Terms], weights: Numbers) -> Numbers:
+    """Return the largest ratio of level to bound in each second [s, n, 4]."""
+    maxima = []
+    for part in parts:
+        ratio = np.abs(part.level) / np.sqrt(np.einsum("cjkp,jkp->cjk", part.squares, weights))
+        if len(ratio):
+            maxima.append(np.maximum.reduceat(ratio, begins(np.floor(part.time)), axis=0))
+    return np.concatenate(maxima)
+
+
+def levels_of(maxima: Numbers, rate: float) -> Numbers:
+    """Return by joint and band [n, 4] the ratio that is exceeded at an equal share of the rate (1/h)."""
+    # maxima: [s, n, 4] of each second
+    levels = np.zeros(maxima.shape[1:])
+    expected = rate * len(maxima) / 3600.0 / levels.size
+    for j, k in np.ndindex(*levels.shape):
+        ordered = np.sort(maxima[:, j, k])
+        tail = max(int(TAIL * len(ordered)), min(ENOUGH, len(ordered) // 2), 1)
+        over = ordered[-tail:] - ordered[-tail - 1 if len(ordered) > tail else 0]
+        shape, scale = 0.0, max(float(over.mean()), 1e-12)
+        if tail >= ENOUGH:
+            shape, _, scale = genpareto.fit(over[over > 0], floc=0)
+        share = min(expected / tail, 1.0)
+        levels[j, k] = ordered[-tail] - over[0] + genpareto.ppf(1.0 - share, min(max(shape, 0.0), 0.5), 0.0, scale)
+    return levels
+
+
+# --- the finger as it runs --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """What was found with bounds times a factor, each group [g] with numbers that were learned from the others."""
+
+    factor: float  # at which the rate is found
+    tried: Numbers  # [f] factors
+    alarms: Indices  # [f, g] alarms at them
+    kept_out: Numbers  # [g] factor that the other groups alone ask for
+
+
+def close_the_loop(count: Callable[[int, float], int], hours: Numbers, rate: float) -> ClosedLoop:
+    """Find the factor for a rate (1/h); `count` runs a group with a factor, and returns its alarms."""
+    groups, asked = range(len(hours)), rate * float(hours.sum())
+    rows: dict[float, list[int]] = {}
+
+    def alarms(factor: float) -> int:
+        rows[factor] = [count(group, factor) for group in groups]
+        return sum(rows[factor])
+
+    factor = 1.0 / FACTORS**2
+    while alarms(factor) > asked and factor < HIGHEST:
+        factor /= FACTORS**2
+    factor = min(rows) * FACTORS
+    while factor > LOWEST and alarms(factor) < max(SEEN, 3.0 * asked):
+        factor *= FACTORS
+    tried = np.array(sorted(rows, reverse=True))
+    counts = np.array([rows[factor] for factor in tried])
+    others = [_factor_for(tried, counts.sum(axis=1) - counts[:, g], rate * (hours.sum() - hours[g])) for g in groups]
+    return ClosedLoop(_factor_for(tried, counts.sum(axis=1), asked), tried, counts, np.array(others))
+
+
+def _factor_for(factors: Numbers, alarms: Numbers, asked: float) -> float:
+    """Return the factor with so many alarms by Poisson regression of alarms [f] on the log of the factor."""
+    if not alarms.any():
+        return float(factors.min())
+    x = np.log(factors)
+
+    def loss(line: Numbers) -> tuple[float, Numbers]:
+        mean = np.exp(np.clip(line[0] + line[1] * x, -50.0, 50.0))
+        left = mean - alarms
+        return float(np.sum(mean - alarms * np.log(mean))), np.array([left.sum(), left @ x])
+
+    start = np.array([np.log(alarms.max()) + 8.0 * x[np.argmax(alarms)], -8.0])
+    line = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[(None, None), SLOPE]).x
+    return float(np.clip(np.exp((np.log(asked) - line[0]) / line[1]), factors.min(), HIGHEST))
+
+
+# --- numbers of the description, and what they mean to a user -----------------------------------------------------------------------
+
+
+def numbers_of(weights: Numbers, levels: Numbers, factor: float) -> Numbers:
+    """Return the numbers [n, 4, 6] of the bands."""
+    return np.asarray(factor * levels[..., None] * np.sqrt(weights))
+
+
+def push_sizes(parts: Sequence[Terms], numbers: Numbers) -> Numbers:
+    """Return by joint [n] the sudden torque that is found within `WITHIN` from `SURE` of the instants (N·m)."""
+    gain = _step_gain()
+    sizes = []
+    for part in parts:
+        bound = np.sqrt(np.einsum("cjkp,jkp->cjk", part.squares, numbers**2))
+        for sign in (-1.0, 1.0):
+            sizes.append(((bound - sign * part.distance) / gain).min(axis=2))
+    return np.maximum(np.quantile(np.concatenate(sizes), SURE, axis=0), 0.0)
+
+
+def _step_gain() -> Any:
+    """Return by band [4] the largest a − m within `WITHIN` after a step of 1."""
+    t = np.linspace(0.0, WITHIN, 601)[:, None]
+    followed = (COMPARED * np.exp(-t / COMPARED) - AVERAGED * np.exp(-t / AVERAGED)) / (COMPARED - AVERAGED)
+    return (followed - np.exp(-t / AVERAGED)).max(axis=0)
