@@ -209,7 +209,7 @@ def test_detection_before_and_after() -> None:
     found = detection_gain(poor, finger.data, recordings)
     assert found is not None and found.events > 5
     assert (found.found_after, -found.false_alarms_after) >= (found.found_before, -found.false_alarms_before)
-    assert np.mean(found.thresholds_after) < np.mean(found.thresholds_before)
+    assert np.mean(found.smallest_push_after) < np.mean(found.smallest_push_before)
     assert detection_gain(poor, finger.data, recordings[:1]) is None
 
 

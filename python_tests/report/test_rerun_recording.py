@@ -61,7 +61,7 @@ def test_what_is_written_is_the_run(tmp_path: Path) -> None:
     require("rerun")
     recording, finger = tf.read_recording(DEMO / "index_finger_pushes.parquet")[8.0:16.0], tf.read_finger(CALIBRATED)
     outputs = tf.run(finger, recording).outputs
-    write_rerun(tmp_path / "out.rrd", outputs, recording, finger, 1)
+    write_rerun(tmp_path / "out.rrd", outputs, recording, finger)
     found, time = contents_of(tmp_path / "out.rrd"), outputs["time"]
     residual, bound = residual_and_bound(finger, recording, 1)
     assert recording.contact is not None

@@ -100,7 +100,7 @@ class Calibration:
 
 def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
     """Return the options that affect the thresholds only."""
-    return {"false_alarms_per_hour": options.false_alarms_per_hour, "confidence": options.confidence}
+    return {"false_alarms_per_hour": options.false_alarms_per_hour}
 
 
 def _of_all(options: CalibrateOptions) -> dict[str, int]:
@@ -288,7 +288,7 @@ class _Run:
             "tests": [recording_of(recording) for recording in case.tests],
             "routing": case.routing,
             "error": error,
-            "alarms": after.alarms(self._options.confidence),
+            "alarms": after.alarms(),
             "structure": {key: value for key, value in lacks.items() if key not in ("extended", "nominal", "warnings")},
             "detection": {key: value for key, value in tuned.items() if key not in ("finger", "warnings")},
             "pushes": pushed,
@@ -390,7 +390,6 @@ class _Run:
         tuning = ContactTuning(
             described(case.finger, fitted["most"]),
             false_alarms_per_hour=options.false_alarms_per_hour,
-            confidence=options.confidence,
             kinematics=options.kinematics,
             bias_time=BIAS_TIME,
             progress=lambda done, total: step(done / max(total, 1)),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Indices, Numbers
-from tendonfmu.detect import pretension_of, rate_limit, sample_seconds, stretches
+from tendonfmu.detect import pretension_of, sample_seconds, stretches
 from tendonfmu.fmu import run_model
 from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import FitRecording, Held, Recording, at_rows, flagged_stretches, held_out_blocks, rms
@@ -66,15 +66,14 @@ class Delivered:
         """Return [n] the rms of what is left at the chosen samples [N] of each recording, or at all judged ones."""
         return rms(np.concatenate(self.left), np.concatenate(chosen or self._judged.masks()))
 
-    def alarms(self, confidence: float) -> dict[str, Any]:
-        """Count the contacts that begin in judged motion; rates with 95 % interval and upper limit (1/h)."""
+    def alarms(self) -> dict[str, Any]:
+        """Count the contacts that begin in judged motion; the rate with its 95 % interval (1/h)."""
         count = 0
         for each, contact, mask in zip(self._judged.recordings, self.contact, self._judged.masks(), strict=True):
             count += int(mask[stretches(each.time, contact)[:, 0]].sum())
         minutes = self._judged.minutes(self._judged.masks())
         rate = intervals.rate(count, minutes / 60.0)
-        limit = rate_limit(count, minutes / 60.0, confidence)
-        return {"alarms": count, "minutes": minutes, "interval": [rate.low, rate.high], "limit": limit}
+        return {"alarms": count, "minutes": minutes, "interval": [rate.low, rate.high]}
 
 
 def compared(before: Delivered, after: Delivered, judged: Judged, name: str) -> dict[str, Any]:

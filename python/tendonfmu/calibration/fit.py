@@ -23,15 +23,12 @@ from tendonfmu.estimate import (
     FrictionFit,
     Watch,
     build_structure,
-    evaluate,
     learn_batch,
-    parameter_uncertainty,
     read_previous_fit,
     settings_of,
     unknowns,
     with_known_numbers,
     with_previous_values,
-    with_uncertainty,
     with_values,
 )
 from tendonfmu.files import read_json
@@ -62,10 +59,6 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     learned = learn_batch(structure, kept, Watch(None), settings_of(finger.data, kept, threads), None)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     result = with_known_numbers(result, kept)
-    if np.isfinite(learned.covariance).all():
-        judged = [evaluate(finger.data, result.data, recording) for recording in kept]
-        directions, _ = parameter_uncertainty(structure, learned, result.data, judged)
-        result = with_uncertainty(result, directions, (finger.data["contact"] or {}).get("uncertainty_level"))
     return CalibratedFit(result.data, events, tuple(learned.warnings))
 
 

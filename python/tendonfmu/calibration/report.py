@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.detect import ContactTuning, Scored, contact_at_rest, tune_report
+from tendonfmu.detect import ContactTuning, Scored, tune_report
 from tendonfmu.diagnosis import Diagnosis, Event
 from tendonfmu.recordings import FitRecording
 from tendonfmu.report import cards_of, names_of
@@ -18,15 +18,13 @@ BEFORE, AFTER, POINTS = 0.5, 1.0, 1000  # s around a push that is shown, and sam
 OF_TUNING = (
     "method",
     "false_alarms_per_hour",
-    "tuned_for_per_hour",
-    "more_minutes",
-    "confidence",
     "minutes",
-    "held_out",
-    "closed_loop",
+    "more_minutes",
+    "kept_out",
+    "pushes",
     "pretensions",
-    "rest",
     "sensor_fault",
+    "sentence",
 )
 OF_SCORE = (
     "events",
@@ -99,26 +97,13 @@ def left_out(events: Sequence[Event]) -> list[str]:
 
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
-    """Report the tuned thresholds and their alarms, without the warning that there were no rests to learn from."""
+    """Report the tuned bounds and their alarms."""
     report = tune_report.build_report(tuning)
     return {
         "finger": tuning.description_.data,
-        "warnings": [text for text in report["warnings"] if not text.startswith(contact_at_rest.LEFT_OUT)],
+        "warnings": report["warnings"],
         **{key: report[key] for key in OF_TUNING},
-        "smallest_torque": smallest_torque(tuning),
     }
-
-
-def smallest_torque(tuning: ContactTuning) -> dict[str, list[float]]:
-    """Compute the smallest change of each joint torque that is reported, [n] each (N·m)."""
-    name = "innovation" if "innovation" in tuning.bounds_ else "residual"
-    bound, search = tuning.bounds_[name], tuning.searches_[name]
-    whole = bound.own(tuning.cells_.force)
-    whole = whole + bound.stuck_share * search.mean_stuck + bound.jump_share * search.mean_jump
-    parts = {"median": (whole, 0.5), "nine_tenths": (whole, 0.9)}
-    if "drift" in tuning.bounds_:
-        parts["slow"] = tuning.bounds_["drift"].own(tuning.cells_.force), 0.5
-    return {key: [float(value) for value in np.quantile(each, q, axis=0)] for key, (each, q) in parts.items()}
 
 
 def recording_of(each: FitRecording) -> dict[str, Any]:
@@ -131,15 +116,11 @@ def record_next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]
     found = []
     if tuned["more_minutes"]:
         found.append(
-            f"{tuned['more_minutes']:.0f} min more of free motion: thresholds then hold for "
-            f"{tuned['false_alarms_per_hour']:g} false alarms an hour instead of {tuned['tuned_for_per_hour']:.3g}"
+            f"{tuned['more_minutes']:.0f} min more of free motion: it then shows whether "
+            f"{tuned['false_alarms_per_hour']:g} false alarms an hour are kept"
         )
     if len(tuned["pretensions"]) == 1:
         found.append("the same motion at another pretension: the growth with the force is not known yet")
-    if tuned["rest"] is None:
-        found.append(
-            "rests of some seconds with standing motors, a few minutes in all: touches at rest can then be found"
-        )
     if lacks["next_experiment"]:
         found.append(lacks["next_experiment"])
     return found

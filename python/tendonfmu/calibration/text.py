@@ -89,23 +89,14 @@ def verdict(report: Report) -> tuple[str, str]:
 
 def alarms(report: Report) -> str:
     """Say how many false alarms there were in unseen motion, and what so much motion says of their rate."""
-    found = report["alarms"]
+    found, detection = report["alarms"], report["detection"]
     many = "No false alarm" if found["alarms"] == 0 else capital(counted(found["alarms"], "false alarm"))
-    seen = f"{many} in {_long(found['minutes'])} of that motion"
-    if found["limit"] is None:
-        return f"{seen}."
-    detection = report["detection"]
-    seen += f": with {100 * detection['confidence']:.0f} % confidence fewer than {rounded(found['limit'])} an hour"
-    if found["interval"][0] > detection["tuned_for_per_hour"]:
-        return f"{seen}, but more than the {detection['tuned_for_per_hour']:.3g} that the thresholds were chosen for."
+    low, high = found["interval"]
+    asked = f"{detection['false_alarms_per_hour']:g} an hour"
+    seen = f"{many} in {_long(found['minutes'])} of that motion; at most {asked} were asked for"
+    if low is not None and low > detection["false_alarms_per_hour"]:
+        return f"{seen}, and there are more: with 95 % confidence {rounded(low)} to {rounded(high)} an hour."
     return f"{seen}."
-
-
-def tuned_for(report: Report) -> str:
-    """Say for which rate of false alarms the thresholds were chosen, and on how much motion."""
-    detection = report["detection"]
-    rate = f"{detection['tuned_for_per_hour']:.3g} false alarms an hour"
-    return f"tuned for {rate} on {_long(detection['minutes'])} of other motion"
 
 
 def _first(report: Report) -> str:
@@ -137,17 +128,17 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
     if len(places(report)) > 1:
         worst = max(places(report), key=lambda place: place.after)
         yield _fell(worst.before, worst.after), "mN·m", f"the same where it is worst: {worst.words}"
-    meaning = "false alarms in the same motion"
-    if found["limit"] is not None:
-        meaning += (
-            f"; with {100 * detection['confidence']:.0f} % confidence fewer than {rounded(found['limit'])} an hour"
-        )
-    yield str(found["alarms"]), f"in {_long(found['minutes'])}", f"{meaning}; {tuned_for(report)}"
-    least, joint = max(zip(detection["smallest_torque"]["median"], report["joints"], strict=True))
+    yield (
+        str(found["alarms"]),
+        f"in {_long(found['minutes'])}",
+        f"false alarms in the same motion; at most {detection['false_alarms_per_hour']:g} an hour were asked for",
+    )
+    least, joint = max(zip(detection["pushes"]["torque"], report["joints"], strict=True))
+    within = 1e3 * detection["pushes"]["within_s"]
     yield (
         mnm(least),
         "mN·m",
-        f"sudden change of torque that is reported in 1 of 2 cases, at {joint}, the least sensitive joint",
+        f"pushes of more are found within {within:.0f} ms, nine of ten, at {joint}, the least sensitive joint",
     )
     pushes = report["pushes"]
     if pushes is not None and pushes["events"]:
@@ -187,16 +178,12 @@ def error_caption(report: Report) -> str:
     )
 
 
-TORQUE_HEADINGS = ("sudden, in 1 of 2 cases", "sudden, in 9 of 10 cases", "over seconds")
-
-
 def torque_rows(report: Report) -> list[Row]:
-    """Return a row per joint: the smallest change that is reported (`TORQUE_HEADINGS`, mN·m)."""
-    smallest = report["detection"]["smallest_torque"]
-    joints = report["joints"]
-    columns = [[mnm(value) for value in smallest[key]] for key in ("median", "nine_tenths")]
-    slow = [mnm(value) for value in smallest["slow"]] if "slow" in smallest else ["not found"] * len(joints)
-    return list(zip(joints, *columns, slow, strict=True))
+    """Return a row per joint: the sudden torque that is found nine times of ten (mN·m)."""
+    return [
+        (joint, mnm(torque))
+        for joint, torque in zip(report["joints"], report["detection"]["pushes"]["torque"], strict=True)
+    ]
 
 
 def size_rows(report: Report) -> list[Row]:
@@ -285,6 +272,7 @@ def lines(report: Report) -> Iterator[str]:
     """Yield the lines for the terminal."""
     yield verdict(report)[1]
     yield error_caption(report)
+    yield report["detection"]["sentence"]
     yield from (report.get("routing") or {}).get("sentences", ())
     if report["pushes"] is not None:
         yield push_sentence(report)
@@ -301,11 +289,7 @@ def tables(report: Report) -> Iterator[Table]:
             ("cause", "place", "size", "gain on unseen data"),
             cause_rows(report),
         )
-    yield (
-        "smallest change that is reported, mN·m",
-        ("joint", *TORQUE_HEADINGS),
-        torque_rows(report),
-    )
+    yield "pushes found, nine of ten", ("joint", "from mN·m"), torque_rows(report)
     if sizes := size_rows(report):
         yield "pushes found, by size relative to the error in free motion", ("size", "found", "95 % interval"), sizes
 
@@ -376,9 +360,8 @@ def calibration_page(calibration: Calibration) -> str:
         error_caption=error_caption(report),
         causes=cause_rows(report),
         torques=torque_rows(report),
-        torque_headings=list(TORQUE_HEADINGS),
         sensors=sensor_sentence(report),
-        tuned=tuned_for(report),
+        tuned=report["detection"]["sentence"],
         push=push_sentence(report) if report["pushes"] is not None else "",
         sizes=size_rows(report),
         every_push=push_rows(report),

@@ -93,7 +93,7 @@ def run(
     if report is not None:
         say(f"{write_run_page(report, numbers, table, samples.contact)}: the run, to be read in a browser")
     if rerun is not None:
-        write_rerun(rerun, result.outputs, samples, finger_of(model), options.kinematics)
+        write_rerun(rerun, result.outputs, samples, finger_of(model))
         say(f"{rerun}: the run, for the viewer Rerun")
     print_json(lambda: numbers)
 

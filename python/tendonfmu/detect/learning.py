@@ -52,7 +52,7 @@ def weights_of(parts: Sequence[Terms]) -> Numbers:
 
 
 def gamma_weights(square: Numbers, terms: Numbers) -> Numbers:
-    """Return w ≥ 0 [6] with the least mean of log v + y²/v, v = Z·w, for squared distances y² [c] and terms Z [c, 6]."""
+    """Return w ≥ 0 [6] with the least mean of log v + y²/v, v = Z·w, for squares y² [c] and squared terms Z [c, 6]."""
     scale, size = terms.mean(axis=0), max(float(square.mean()), 1e-30)
     used = np.flatnonzero(scale > 0)
     z, y = terms[:, used] / scale[used], square / size
@@ -149,12 +149,12 @@ def _factor_for(factors: Numbers, alarms: Numbers, asked: float) -> float:
     return float(np.clip(np.exp((np.log(asked) - line[0]) / line[1]), factors.min(), HIGHEST))
 
 
-# --- numbers of the description, and what they mean to a user -----------------------------------------------------------------------
+# --- numbers of the description, and what they mean to a user ---------------------------------------------------------
 
 
-def numbers_of(weights: Numbers, levels: Numbers, factor: float) -> Numbers:
+def numbers_of(weights: Numbers, levels: Numbers) -> Numbers:
     """Return the numbers [n, 4, 6] of the bands."""
-    return np.asarray(factor * levels[..., None] * np.sqrt(weights))
+    return np.asarray(levels[..., None] * np.sqrt(weights))
 
 
 def push_sizes(parts: Sequence[Terms], numbers: Numbers) -> Numbers:
@@ -165,7 +165,7 @@ def push_sizes(parts: Sequence[Terms], numbers: Numbers) -> Numbers:
         bound = np.sqrt(np.einsum("cjkp,jkp->cjk", part.squares, numbers**2))
         for sign in (-1.0, 1.0):
             sizes.append(((bound - sign * part.distance) / gain).min(axis=2))
-    return np.maximum(np.quantile(np.concatenate(sizes), SURE, axis=0), 0.0)
+    return np.asarray(np.maximum(np.quantile(np.concatenate(sizes), SURE, axis=0), 0.0))
 
 
 def _step_gain() -> Any:

@@ -10,8 +10,8 @@ from scipy.optimize import brentq, nnls
 
 from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers
 from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.detect.learning import CELL
 from tendonfmu.detect.pretension import pretension_of
+from tendonfmu.detect.terms import CELL
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, number_of
 
@@ -51,10 +51,10 @@ def residuals_of(parts: Sequence[FreePart], outputs: Sequence[dict[str, Array]])
         every = max(1, round(CELL / float(np.median(np.diff(part.time)))))
         rows, hours = rows[::every], np.add.reduceat(part.seconds[rows], np.arange(0, len(rows), every)) / 3600.0
         found = (run["residual"][rows], run["compensated_torque_std"][rows], part.mean_force[rows], hours)
-        for column, values in zip(columns, (*found, part.time[rows], np.full(len(rows), owner)), strict=True):
+        for column, values in zip(columns, (*found, part.time[rows], np.full(len(rows), float(owner))), strict=True):
             column.append(values)
     residual, std, force, hours, time, owners = map(np.concatenate, columns)
-    return Residuals(residual, std, force, pretension_of(force, time, owners), hours)
+    return Residuals(residual, std, force, pretension_of(force, time, owners.astype(np.int64)), hours)
 
 
 def line_over_force(force: Numbers, value: Numbers) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, rounded
 from tendonfmu.detect.free_motion import FreePart
@@ -24,13 +25,16 @@ _BLOCK = 50_000  # samples at once: the terms are 32 numbers for each joint
 _KEPT = ("residual", "compensated_torque_std")
 
 
+Signal = NDArray[np.float32]  # saves memory for millions of samples
+
+
 @dataclass(frozen=True)
 class Terms:
     """Distances and squared terms of a stretch of free motion, by cell, joint and band."""
 
-    distance: Numbers  # [c, n, 4] a − m (N·m)
-    level: Numbers  # [c, n, 4] the distance that decides: the lesser of those from m and from the slow mean
-    squares: Numbers  # [c, n, 4, 6] of 1, |T|, B, D, min(|ΔT|, D), min(S, D_3)
+    distance: Signal  # [c, n, 4] a − m (N·m)
+    level: Signal  # [c, n, 4] the distance that decides: the lesser of those from m and from the slow mean
+    squares: Signal  # [c, n, 4, 6] of 1, |T|, B, D, min(|ΔT|, D), min(S, D_3)
     time: Numbers  # [c] (s)
 
 
@@ -51,7 +55,7 @@ def begins(number: Numbers) -> Indices:
     return np.flatnonzero(np.diff(number, prepend=np.nan) != 0)
 
 
-def largest(values: Numbers, first: Indices) -> Indices:
+def largest(values: Numbers | Signal, first: Indices) -> Indices:
     """Return the index of the largest value along axis 0 in each block that begins at `first`."""
     most = np.repeat(np.maximum.reduceat(values, first, axis=0), np.diff(np.append(first, len(values))), axis=0)
     index = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1))

@@ -48,7 +48,7 @@ def sentence(report: Mapping[str, Any]) -> str:
     """Say how many false alarms were asked for and found, and which pushes are found at the least sensitive joint."""
     found, pushes = report["kept_out"], report["pushes"]
     minutes = found["minutes"]
-    long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.0f} min" if minutes >= 1.0 else "less than 1 min"
+    long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.2g} min"
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
     largest = int(np.argmax(pushes["torque"]))
     asked = counted(report["false_alarms_per_hour"], "alarm")
@@ -95,10 +95,9 @@ def _tail(tuning: ContactTuning) -> list[dict[str, Any]]:
 def _pretensions(tuning: ContactTuning) -> list[dict[str, Any]]:
     residuals = tuning.residuals_
     force, rms = residuals.of_pretensions(residuals.force), residuals.rms()
-    hours = [float(residuals.hours[residuals.group == g].sum()) for g in range(len(force))]
-    return [
-        {"mean_force": float(force[g]), "minutes": 60.0 * hours[g], "free_rms": rms[g].tolist()} for g in range(len(force))
-    ]
+    minutes = 60.0 * np.bincount(residuals.group, residuals.hours)
+    columns = zip(force.tolist(), minutes.tolist(), rms.tolist(), strict=True)
+    return [{"mean_force": mean, "minutes": long, "free_rms": spread} for mean, long, spread in columns]
 
 
 def _sensors(tuning: ContactTuning) -> dict[str, Any]:

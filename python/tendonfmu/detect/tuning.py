@@ -18,7 +18,15 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers, rounded
 from tendonfmu.detect.free_motion import Alarms, FreePart, count_alarms, free_parts
-from tendonfmu.detect.learning import ClosedLoop, close_the_loop, levels_of, numbers_of, push_sizes, seconds_of, weights_of
+from tendonfmu.detect.learning import (
+    ClosedLoop,
+    close_the_loop,
+    levels_of,
+    numbers_of,
+    push_sizes,
+    seconds_of,
+    weights_of,
+)
 from tendonfmu.detect.noise import (
     BiasNoise,
     Deviation,
@@ -134,6 +142,7 @@ class ContactTuning(Configured):
         """
         begin = perf_counter()
         self._start: Finger = read_finger(self.finger)
+        self._data: dict[str, Any] = {**self._start.data, "sensor_fault": None}
         self._groups = _groups(self._parts(listed_sources(recordings), checked))
         parts = [part for group in self._groups for part in group]
         self.hours_ = sum(part.hours for part in parts)
@@ -170,7 +179,6 @@ class ContactTuning(Configured):
         """Learn noise and drift of the bias in rounds, since the residuals depend on the bias; return the terms."""
         time = wanted_time(self._start, parts, self.options.bias_time)
         of_bias = noise_time(self._start.data, parts)
-        self._data: dict[str, Any] = {**self._start.data, "sensor_fault": None}
         for _ in range(2):
             terms, runs = run_free(self._data, parts)
             self.residuals_: Residuals = residuals_of(parts, runs)

@@ -54,7 +54,7 @@ def candidate_columns(
     worth: Worth | None = None,
 ) -> CandidateColumns:
     """Compute the columns of all candidates that a description lacks."""
-    plain = without_uncertainty(data)
+    plain = without_sensor_fault(data)
     span = span or span_of(data, samples.recordings)
     proposals = tuple(_proposed(plain, samples.recordings[0].kinematics, span, candidates, worth))
     count = proposals[-1].columns.stop if proposals else 0
@@ -90,10 +90,9 @@ def _refuse_too_many(size: float, columns: int) -> None:
         )
 
 
-def without_uncertainty(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description without directions of uncertainty and without sensor monitoring."""
-    contact = {key: value for key, value in data["contact"].items() if not key.startswith("uncertainty")}
-    return {**data, "contact": contact, "sensor_fault": None}
+def without_sensor_fault(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description without sensor monitoring."""
+    return {**data, "sensor_fault": None}
 
 
 def _proposed(

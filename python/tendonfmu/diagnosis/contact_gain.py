@@ -1,13 +1,12 @@
 """How much the extended model improves contact detection, measured on labelled recordings.
 
-Both models are tuned alike on free motion: the thresholds of each are the lowest that keep the same rate of false
-alarms in the same free motion (`detect.tuning.ContactTuning`). Both are then scored on the labels: `detect.counting`
+Both models are tuned alike on free motion, for the same rate of false alarms in the same free motion
+(`detect.tuning.ContactTuning`). Both are then scored on the labels: `detect.counting`
 counts events, false alarms and delays.
 """
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +22,6 @@ from tendonfmu.detect import (
     Subject,
     TuneWarning,
     free_parts,
-    least_hours,
     pooled,
     require_no_contact,
     run_track,
@@ -33,15 +31,13 @@ from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, finger_from_data
 from tendonfmu.recordings import FitRecording, Recording
 
-RATE = 6.0  # 1/h; false alarm rate that both are tuned for, or the lowest that the free motion supports
-CONFIDENCE = 0.9
+RATE, HIGHEST = 6.0, 3600.0  # 1/h; false alarm rate that both are tuned for, at least one alarm in the free motion
 _SHORTEST = 4.0  # s; shortest stretch without contact that counts as free motion
 _MARGIN = 1.0  # s, on either side of a contact
-_SPARE = 1.3  # times the least time that supports a rate: recordings are cut into blocks
 
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
-    """Return the gain for contact detection; None without labelled contact or if no thresholds can be tuned."""
+    """Return the gain for contact detection; None without labelled contact or if nothing can be tuned."""
     labelled = [recording.recording for recording in recordings if recording.recording.contact is not None]
     labelled = [recording for recording in labelled if recording.contact is not None and recording.contact.any()]
     if not labelled:
@@ -51,14 +47,13 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
     if not free:
         return None
     hours = sum(float(recording.time[-1] - recording.time[0]) - SETTLING for recording in free) / 3600
-    rate = max(RATE, _SPARE * least_hours(1.0, CONFIDENCE) / hours)
-    if rate > 3600:
+    if not hours > 0:
         return None
     try:
-        tuned = [_tuned(data, free, kinematics, rate) for data in (nominal, extended)]
-    except InputError:  # no thresholds can be tuned, for example with a bias without drift
+        tuned = [_tuned(data, free, kinematics, min(max(RATE, 1.0 / hours), HIGHEST)) for data in (nominal, extended)]
+    except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
-    before, after = (_score(data, labelled, kinematics) for data in tuned)
+    before, after = (_score(tuning.description_.data, labelled, kinematics) for tuning in tuned)
     return DetectionGain(
         events=len(before.events),
         found_before=before.found,
@@ -67,8 +62,8 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         false_alarms_after=len(after.false_alarms),
         median_delay_before=_median(before),
         median_delay_after=_median(after),
-        thresholds_before=_thresholds(tuned[0]),
-        thresholds_after=_thresholds(tuned[1]),
+        smallest_push_before=tuple(map(float, tuned[0].push_)),
+        smallest_push_after=tuple(map(float, tuned[1].push_)),
     )
 
 
@@ -117,31 +112,16 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
 # --- tuned and scored -------------------------------------------------------------------------------------------------
 
 
-def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> Data:
-    method = str((data["contact"] or {}).get("method") or "innovation")
-    tuning = ContactTuning(
-        finger_from_data(data),
-        false_alarms_per_hour=rate,
-        confidence=CONFIDENCE,
-        method=method,
-        kinematics=kinematics,
-        strict=True,
-    )
+def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> ContactTuning:
+    tuning = ContactTuning(finger_from_data(data), false_alarms_per_hour=rate, kinematics=kinematics)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)
-        return tuning.tune(list(free), checked=True).description_.data
+        return tuning.tune(list(free), checked=True)
 
 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
     subject = Subject(Path("finger"), finger_from_data(data), packed=False)
     return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
-
-
-def _thresholds(data: Data) -> tuple[float, ...]:
-    """Return the thresholds of the method that decides first [n], N·m."""
-    contact = data["contact"]
-    thresholds = (contact.get("innovation") or contact)["threshold"]
-    return tuple(math.inf if threshold is None else float(threshold) for threshold in thresholds)
 
 
 def _median(score: DetectionScore) -> float | None:

@@ -105,7 +105,7 @@ class ResidualView:
 
 @dataclass(frozen=True)
 class DetectionGain:
-    """What the extended model changes for contact detection on labelled recordings, at thresholds tuned alike."""
+    """What the extended model changes for contact detection on labelled recordings, both tuned alike."""
 
     events: int  # number of labelled contacts
     found_before: int  # how many of them the nominal and the extended model detect
@@ -114,8 +114,8 @@ class DetectionGain:
     false_alarms_after: int
     median_delay_before: float | None  # s
     median_delay_after: float | None  # s
-    thresholds_before: tuple[float, ...]  # N·m
-    thresholds_after: tuple[float, ...]
+    smallest_push_before: tuple[float, ...]  # N·m, found within 60 ms nine times of ten, by joint
+    smallest_push_after: tuple[float, ...]
 
 
 @dataclass(frozen=True)

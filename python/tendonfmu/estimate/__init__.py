@@ -1,7 +1,7 @@
 """Estimates the numbers of a finger from recordings (`tendonfmu fit`), and says how well each is known.
 
 `structure` chooses the numbers, `methods` runs the compiled estimator (`estimation`), and `fitting` combines both
-behind an interface like that of scikit-learn. `verdicts`, `identifiability` and `uncertainty` judge the result.
+behind an interface like that of scikit-learn. `verdicts` and `identifiability` judge the result.
 """
 
 from typing import TYPE_CHECKING
@@ -53,10 +53,8 @@ if TYPE_CHECKING:
         get_number,
         own_copy,
         set_number,
-        with_uncertainty,
         with_values,
     )
-    from .uncertainty import parameter_uncertainty
     from .verdicts import Fitted, with_known_numbers
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -102,10 +102,6 @@ class CoreRuns:
         other.__dict__ = {**self.__dict__, "data": data}
         return other
 
-    def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
-        """Return runs of the same description over other signals of the same samples."""
-        return CoreRuns(self.data, recordings, self.grid, rate=self._rate, threads=self._threads)
-
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T.
 

@@ -34,7 +34,6 @@ def build_report(
     innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
     training: Sequence[Evaluation],
     comparisons: Sequence[Evaluation],
-    uncertainty: Mapping[str, Any] | None,  # of the modelled friction torque; None if not asked for
     memory: Mapping[str, Any] | None,  # how friction that remembers was fitted; None if there is none
 ) -> dict[str, Any]:
     """Build the report of a finished fit; numbers that are not finite become None."""
@@ -67,7 +66,6 @@ def build_report(
             "comparisons": [_comparison(evaluation) for evaluation in comparisons],
         },
         "innovations": _innovations(innovations, learned.weights),
-        "uncertainty": uncertainty,
         "memory": memory,
     }
     return {key: finite(value) for key, value in report.items()}

@@ -33,8 +33,7 @@ from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.remembered import Remembered, learn_remembered
-from tendonfmu.estimate.structure import Choice, build_structure, with_uncertainty, with_values
-from tendonfmu.estimate.uncertainty import parameter_uncertainty
+from tendonfmu.estimate.structure import Choice, build_structure, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
@@ -257,8 +256,6 @@ class FrictionFit(Configured):
         self.parameters_ = {number.number.path: number.value for number in self.numbers_}
         self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
         self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
-        is_known = self.options.uncertainty and bool(np.isfinite(learned.covariance).all())
-        uncertainty = self._write_uncertainty(learned) if is_known else None
         numbers, noise = [each.number for each in self.numbers_], number_of(self.description_.data, "bias.noise_std")
         self.description_ = with_estimates(self.description_, numbers, self.covariance_, sizes_of(numbers, noise))
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
@@ -276,7 +273,6 @@ class FrictionFit(Configured):
             innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
             training=self.training_,
             comparisons=self.comparisons_,
-            uncertainty=uncertainty,
             memory=None if self.remembered_ is None else self.remembered_.entry(),
         )
         if self.remembered_ is None:
@@ -285,13 +281,6 @@ class FrictionFit(Configured):
             self.warnings_ += self.remembered_.sentences()
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
-
-    def _write_uncertainty(self, learned: Learned) -> dict[str, Any]:
-        """Write `contact.uncertainty` into the fitted description and return its entry in the report."""
-        directions, entry = parameter_uncertainty(self.structure_, learned, self.description_.data, self.training_)
-        level = (read_finger(self.finger).data["contact"] or {}).get("uncertainty_level")
-        self.description_ = with_uncertainty(self.description_, directions, level)
-        return entry
 
     def _judged(self, learned: Learned) -> tuple[list[Fitted], Numbers]:
         data = self.description_.data

@@ -54,10 +54,6 @@ class MemoryEvidence:
     problem: MemoryProblem
     minimum: Minimum
 
-    def scores(self) -> tuple[Numbers, float]:
-        """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
-        return self.problem.scores(self.minimum.state, self.minimum.linearised)
-
 
 @dataclass(frozen=True)
 class Learned:

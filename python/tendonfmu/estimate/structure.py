@@ -30,7 +30,7 @@ DIGITS = 10  # of a fitted number: far finer than any standard error, and static
 class Structure:
     """What is fitted."""
 
-    # description that the fit starts from: laws expanded or merged, shared values made equal, no `contact.uncertainty`
+    # description that the fit starts from: laws expanded or merged, shared values made equal
     start: Finger
     numbers: list[Unknown]  # the estimated numbers in the order of `unknowns`, `bias.initial_torque` last
     # [p] by parameter of the description in canonical order: −1 is fixed, equal numbers share one value
@@ -89,12 +89,8 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
 
 
 def model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Remove `contact.uncertainty*`, `sensor_fault` and `estimated`."""
-    data = {key: value for key, value in data.items() if key not in ("sensor_fault", "estimated")}
-    contact = data.get("contact") or {}
-    if contact.get("uncertainty") is None:
-        return data
-    return {**data, "contact": {key: value for key, value in contact.items() if not key.startswith("uncertainty")}}
+    """Remove `sensor_fault` and `estimated`."""
+    return {key: value for key, value in data.items() if key not in ("sensor_fault", "estimated")}
 
 
 def values_of(structure: Structure, finger: Finger) -> list[Unknown]:
@@ -159,13 +155,6 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
     data |= structure.beside
     with own_fault("the fitted description"):  # a fit keeps within every bound
         return finger_from_data(data, structure.start.path)
-
-
-def with_uncertainty(finger: Finger, directions: Sequence[Sequence[Sequence[float]]], level: float | None) -> Finger:
-    """Set `contact.uncertainty`, and `contact.uncertainty_level` if a level is given."""
-    contact = {**finger.data["contact"], "uncertainty": directions}
-    contact |= {} if level is None else {"uncertainty_level": level}
-    return finger_from_data({**finger.data, "contact": contact}, finger.path)
 
 
 # --- sides of laws ----------------------------------------------------------------------------------------------------

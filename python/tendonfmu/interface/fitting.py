@@ -162,7 +162,6 @@ def fit(
     passes: int | None = None,
     tolerance: float = 0.3,
     drift: float = 0.0,
-    uncertainty: bool = True,
     resume: str | os.PathLike[str] | None = None,
     progress: Callable[[Any], bool | None] | None = None,
 ) -> FitResult:
@@ -200,8 +199,6 @@ def fit(
         Most passes over the data (None: 60, "ekf" 2), and for "batch" the last step in standard errors.
     drift
         For "ekf": relative variance of the numbers per s.
-    uncertainty
-        Whether the fitted description states the uncertainty of its friction, for detection.
     resume
         File of an interrupted fit to continue.
     progress

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 from tendonfmu.detect import ContactTuning, Scored, Summary, tune_report
-from tendonfmu.files import counted
 from tendonfmu.report.numbers import Table
 from tendonfmu.statistics import Interval
 

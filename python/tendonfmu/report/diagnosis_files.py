@@ -295,7 +295,7 @@ def _detection(gain: DetectionGain) -> dict[str, Any]:
             "found": getattr(gain, f"found_{when}"),
             "false_alarms": getattr(gain, f"false_alarms_{when}"),
             "median_delay_s": getattr(gain, f"median_delay_{when}"),
-            "thresholds": getattr(gain, f"thresholds_{when}"),
+            "smallest_push": getattr(gain, f"smallest_push_{when}"),
         }
 
     return {"events": gain.events, "nominal": of("before"), "extended": of("after")}

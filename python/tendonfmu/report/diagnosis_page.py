@@ -233,7 +233,11 @@ def _detection(gain: DetectionGain, factor: float, unit: str) -> dict[str, Any]:
             ("found", gain.found_before, gain.found_after),
             ("false alarms", gain.false_alarms_before, gain.false_alarms_after),
             ("median delay", seconds(gain.median_delay_before), seconds(gain.median_delay_after)),
-            (f"thresholds ({unit})", levels(gain.thresholds_before), levels(gain.thresholds_after)),
+            (
+                f"pushes found, 9 of 10, from ({unit})",
+                levels(gain.smallest_push_before),
+                levels(gain.smallest_push_after),
+            ),
         ],
     }
 

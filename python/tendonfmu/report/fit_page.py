@@ -50,7 +50,6 @@ def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:
         joint_names=picture.fitted.joint_names,
         residuals=[_residuals(table) for table in page_tables(picture)],
         consistency=list(consistency(picture)),
-        uncertainty=list(_uncertainty(picture)),
         doubts=list(_doubts(report)),
         pairs=[
             (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
@@ -93,23 +92,6 @@ def _residuals(table: ResidualTable) -> dict[str, Any]:
         for row in table.rows
     ]
     return {"title": f"{table.title}: rms in {table.unit}", "rows": rows}
-
-
-def _uncertainty(picture: FitPicture) -> Iterator[Row]:
-    """List what is unknown of the friction torque, a row per joint; empty where it was not computed."""
-    uncertainty = picture.report.get("uncertainty")
-    if not uncertainty:
-        return
-    for j, joint in enumerate(picture.fitted.joint_names):
-        row = [joint, _number(uncertainty["inflation"][j]), str(uncertainty["directions"][j])]
-        row.append(f"{rounded(100 * uncertainty['captured'][j], 2)} %")
-        for name in ("train", "held_out", "loaded"):
-            data = uncertainty[name]
-            std = data["std"][j] if data else None
-            row.append(rounded(None if std is None else 1e3 * std))
-            errors = [data["error_rms"][j], data["error_worst"][j]] if std else [None, None]
-            row += ["–" if error is None else f"{rounded(100 * error / std, 2)} %" for error in errors]
-        yield tuple(row)
 
 
 def _doubts(report: Entry) -> Iterator[tuple[str, list[Row]]]:

@@ -315,8 +315,6 @@ def lines(fit: FrictionFit) -> Iterator[str]:
     yield from (report["routing"] or {}).get("sentences", ())
     yield from memory_sentences(report)
     yield report["given_numbers"]["paragraph"]
-    if report["uncertainty"]:
-        yield _uncertainty(report["uncertainty"])
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():
         yield f"  {count} not identified: {verdicts.CAUSES[cause]}"
         several = [number for number in numbers if number.cause == cause and number.advice]
@@ -325,14 +323,3 @@ def lines(fit: FrictionFit) -> Iterator[str]:
         if len(several) > EXAMPLES:
             yield f"    ... and {count - EXAMPLES} more; --report lists all"
     yield from sums_known(fit.description_)
-
-
-def _uncertainty(uncertainty: Report) -> str:
-    std, error = uncertainty["train"]["std"], uncertainty["train"]["error_rms"]
-    size = ", ".join(_milli(value) for value in std)
-    times = ", ".join(f"{value:.3g}" for value in uncertainty["inflation"])
-    left = ", ".join(f"{100 * e / s:.0f}" if s else "-" for e, s in zip(error, std, strict=True))
-    return (
-        f"uncertainty of the modelled friction torque by joint: {size} mN·m rms; residuals {times} times as large "
-        f"as the noise settings say; contact.uncertainty reproduces the uncertainty within {left} % rms"
-    )

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect import residual_and_bound
 from tendonfmu.drawing import BLUE, DARK, GREEN, GREY, IN_DARK, LIGHT, ORANGE, VERMILION
 from tendonfmu.errors import InputError
 from tendonfmu.files import check_output, whole_file
@@ -52,9 +51,8 @@ def write_rerun(
     outputs: Mapping[str, NDArray[Any]],
     recording: Recording,
     finger: Finger | None,
-    kinematics: int,
 ) -> None:
-    """Write a run, whole or not at all; without a finger it has no names, no residuals and no drawing."""
+    """Write a run, whole or not at all; without a finger it has no names and no drawing."""
     # outputs: [N], [N, n] or [N, m]
     joints, tendons = outputs["joint_torque"].shape[1], outputs["slack"].shape[1]
     joint_names = _distinct(["joint"] * joints if finger is None else finger.joint_names)
@@ -64,6 +62,9 @@ def write_rerun(
         for group, curves in _GROUPS.items():
             for output, (word, colour) in curves.items():
                 stream.send_curve(["joints", name, group, output], outputs[output][:, j], word, colour)
+        for group in ("residual", "contact_level"):
+            if group in outputs:  # FMUs built before version 0.2 lack them
+                _send_detection(stream, [name, group], outputs[group][:, j], outputs["joint_contact"][:, j])
         stream.send_stretches(["contact", f"{j + 1}_{name}"], outputs["joint_contact"][:, j], "contact", VERMILION)
     if "external_torque" in recording.groups:
         for name, torque in zip(joint_names, recording.groups["external_torque"].T, strict=False):
@@ -77,9 +78,6 @@ def write_rerun(
         stream.send_stretches(["contact", "label"], recording.contact, "labelled", GREY)
     bounds = None
     if finger is not None:
-        residual, bound = residual_and_bound(finger, recording, kinematics)
-        for j, name in enumerate(joint_names):
-            _send_residual(stream, name, residual[:, j], bound[:, j], outputs["joint_contact"][:, j])
         bounds = _send_drawing(stream, finger_drawing(finger.data), outputs)
     data = stream.finished(_layout(stream.rr, joint_names, bounds))
     with whole_file(file) as temporary:
@@ -160,12 +158,10 @@ def _rgb(colour: str) -> list[int]:
     return list(bytes.fromhex(IN_DARK.get(colour, colour)[1:]))
 
 
-def _send_residual(stream: _Stream, name: str, residual: Numbers, bound: Numbers, contact: Flags) -> None:
-    path = ["joints", name, "residual"]
-    stream.send_curve([*path, "residual"], residual, "residual", BLUE)
-    stream.send_curve([*path, "in_contact"], np.where(contact, residual, np.nan), "in contact", VERMILION, 2.5)
-    stream.send_curve([*path, "bound"], bound, "bound", GREY)
-    stream.send_curve([*path, "minus_bound"], -bound, "− bound", GREY)
+def _send_detection(stream: _Stream, path: Sequence[str], values: Numbers, contact: Flags) -> None:
+    """Send what the detection decides by, [N], once more where it decides on contact."""
+    stream.send_curve(["joints", *path, path[-1]], values, path[-1].replace("_", " "), BLUE)
+    stream.send_curve(["joints", *path, "in_contact"], np.where(contact, values, np.nan), "in contact", VERMILION, 2.5)
 
 
 # --- drawing ----------------------------------------------------------------------------------------------------------
@@ -232,7 +228,8 @@ def _layout(rr: Any, joints: Sequence[str], bounds: Any) -> Any:
     lanes = rrb.StateTimelineView(origin="contact", name="contact")
     left = lanes
     if bounds is not None:
-        tabs.insert(1, views("residual", "residual and bound (N·m)", "residuals"))
+        tabs.insert(1, views("residual", "residual (N·m)", "residuals"))
+        tabs.insert(2, views("contact_level", "contact level (bound: 1)", "contact levels"))
         left = rrb.Vertical(
             rrb.Spatial2DView(origin="finger", name="finger", visual_bounds=bounds), lanes, row_shares=[3, 2]
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from . import error_directions, intervals, paired_gain, quintic
+    from . import intervals, paired_gain, quintic
     from .block_grams import MEMORY, Grams, Products, bounded, standard_error
     from .blocks import (
         FEWEST_STRETCHES,
