@@ -72,11 +72,7 @@ def test_the_errors_on_held_out_stretches_are_those_of_the_fmu(
 def test_no_held_out_sample_chooses_anything(
     alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
 ) -> None:
-    """With other forces there, structure, numbers and bias are the same to the last bit, and only the figures change.
-
-    The least squares of `contact.uncertainty` end in a flat valley, so the same call gives it, and what follows from
-    it, only to some 1e-4.
-    """
+    """With other forces there, structure, numbers and bounds are the same to the last bit, and only the figures change."""
     recording = read_recording(short)
     rows = np.flatnonzero(every_fifth(recording.time))
     force = recording.groups["tendon_force"].copy()
@@ -84,20 +80,9 @@ def test_no_held_out_sample_chooses_anything(
     replace(recording, groups={**recording.groups, "tendon_force": force}).write(tmp_path / "short.parquet")
     other = calibrate(folder / FINGER, [tmp_path / "short.parquet"], tmp_path / "out")
     found = alone[0]
-    assert {**other.data, "contact": None} == {**found.data, "contact": None}
-    assert listed(other.data["contact"]) == pytest.approx(listed(found.data["contact"]), rel=1e-3, abs=1e-5)
+    assert other.data == found.data and other.report["detection"] == found.report["detection"]
     assert other.report["structure"] == found.report["structure"] and other.report["next"] == found.report["next"]
-    assert listed(other.report["detection"]) == pytest.approx(listed(found.report["detection"]), rel=1e-3, abs=1e-5)
     assert min(other.report["error"]["calibrated"]) > 2.0 * max(found.report["error"]["calibrated"])
-
-
-def listed(content: Any) -> list[float]:
-    """All numbers of JSON, in order."""
-    if isinstance(content, dict | list):
-        return [
-            number for each in (content.values() if isinstance(content, dict) else content) for number in listed(each)
-        ]
-    return [float(content)] if isinstance(content, int | float) else []
 
 
 def test_a_test_chooses_nothing(

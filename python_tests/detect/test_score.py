@@ -164,25 +164,12 @@ def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None
 
 
 def test_scaled_detection_scales_all_that_decides() -> None:
-    data = {"contact": {"threshold": [0.1, 0.2], "threshold_per_force": [None, 0.01], "hold_time": 0.05}}
-    scaled = scaled_detection(data, 2.0)["contact"]
-    assert scaled == {"threshold": [0.2, 0.4], "threshold_per_force": [None, 0.02], "hold_time": 0.05}
-    assert data["contact"]["threshold"] == [0.1, 0.2]
-    more = {
-        "threshold": [0.1],
-        "method": "cusum",
-        "innovation": {"time": 0.1, "threshold": [0.2], "threshold_per_force": None, "evidence_time": 0.02},
-        "friction_bound": {"stuck_share": 0.3, "jump_share": 4.0, "jump_time": 0.06},
-        "uncertainty": [None],
-    }
-    assert scaled_detection({"contact": more}, 4.0)["contact"] == {
-        "threshold": [0.4],
-        "method": "cusum",
-        "innovation": {"time": 0.1, "threshold": [0.8], "threshold_per_force": None, "evidence_time": 0.02},
-        "friction_bound": {"stuck_share": 1.2, "jump_share": 10.0, "jump_time": 0.06},
-        "uncertainty": [None],
-        "uncertainty_level": 12.0,
-    }
+    band = {"noise": [0.1, 0.2], "motor_load": [0.0, 3.0]}
+    data = {"contact": {"threshold": [0.1, 0.2], "method": "bands", "bands": [band] * 4, "deviation": [1.0, 1.0]}}
+    wider = {"noise": [0.2, 0.4], "motor_load": [0.0, 6.0]}
+    scaled = {"threshold": [0.2, 0.4], "method": "bands", "bands": [wider] * 4, "deviation": [1.0, 1.0]}
+    assert scaled_detection(data, 2.0)["contact"] == scaled
+    assert data["contact"]["threshold"] == [0.1, 0.2] and band["noise"] == [0.1, 0.2]
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

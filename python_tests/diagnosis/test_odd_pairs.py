@@ -75,10 +75,10 @@ def test_a_pair_gets_a_diagnosis_or_a_refusal(name: str, tmp_path: Path) -> None
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", ["innovation", "cusum", "threshold"])
+@pytest.mark.parametrize("method", ["bands", "paper"])
 @pytest.mark.parametrize("name", QUIRKS)
 def test_a_pair_is_tuned_or_refused(name: str, method: str, tmp_path: Path) -> None:
-    """A description that the core takes, no more alarms than allowed, or a refusal."""
+    """A description that the core takes, with numbers that make sense, or a refusal."""
     pair = make_pair(name)
     finger, recordings, _ = pair.write(tmp_path)
     tuning = ContactTuning(finger, method=method, bias_time=0.4, kinematics=pair.kinematics)
@@ -97,9 +97,7 @@ def test_a_pair_is_tuned_or_refused(name: str, method: str, tmp_path: Path) -> N
     Instance.from_description(data, pair.kinematics)  # the core takes it
     contact = data["contact"]
     assert contact["method"] == method
-    for part in (contact, contact.get("innovation", contact)):
-        assert np.isfinite(part["threshold"]).all() and (np.array(part["threshold"]) >= 0).all()
+    for part in (*contact.get("bands", ()), {"threshold": contact["threshold"]}):
+        assert all(np.isfinite(numbers).all() and min(numbers) >= 0 for numbers in part.values())
     schema("tune_report").validate(build_report(tuning))
-    assert tuning.rate_ >= tuning.options.false_alarms_per_hour and (tuning.more_minutes_ > 0) == (tuning.rate_ > 6.0)
-    alarms = sum(each.alarms for each in tuning.loop_)
-    assert alarms <= tuning.allowed_ or any("even with bounds" in sentence for sentence in tuning.warnings_)
+    assert np.isfinite(tuning.push_).all() and tuning.kept_out_.hours == pytest.approx(tuning.hours_)

@@ -70,7 +70,7 @@ def test_friction_that_only_shows_together_is_known_as_the_sum_over_its_tendon()
 
 def fitted(finger: Any, *recordings: Recording) -> FrictionFit:
     """All tendons alike: 19 unknowns, 70 numbers."""
-    return FrictionFit(finger, share=["tendons"], kinematics=3, tolerance=1e-3, uncertainty=False).fit(recordings)
+    return FrictionFit(finger, share=["tendons"], kinematics=3, tolerance=1e-3).fit(recordings)
 
 
 def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -> None:

@@ -48,7 +48,7 @@ def recording(*rows: dict[str, Any], seed: int = 1, duration: float = 40.0) -> R
 
 
 def fitted(given: Rows, truth: Rows, seed: int = 1, **options: Any) -> FrictionFit:
-    settings = {"share": ["tendons"], "kinematics": 3, "uncertainty": False} | options
+    settings = {"share": ["tendons"], "kinematics": 3} | options
     return FrictionFit(finger(*given, start=True), **settings).fit(recording(*truth, seed=seed))
 
 
@@ -101,7 +101,7 @@ def test_the_kalman_filter_refuses_by_name() -> None:
 
 def test_never_worse_on_unseen_motion_than_the_given_numbers() -> None:
     truth = ({**RELATIVE, "relaxation_time": 0.8},)
-    fit = FrictionFit(finger(*truth), kinematics=3, holdout=0.3, holdout_block=5.0, uncertainty=False)
+    fit = FrictionFit(finger(*truth), kinematics=3, holdout=0.3, holdout_block=5.0)
     fit.fit(recording(*truth))
     held = fit.report_["residual"]["held_out"]
     assert fit.report_["given_numbers"]["kept"] or np.mean(held["rms"]) <= 1.02 * np.mean(held["start_rms"])
@@ -123,7 +123,7 @@ def test_intervals_hold_the_truth() -> None:
     for law in _laws(start):
         law.update({key: 1.25 * value for key, value in law.items()})
     for seed in range(2, 7):
-        fit = FrictionFit(start, share=["tendons"], kinematics=3, uncertainty=False).fit(recording(truth, seed=seed))
+        fit = FrictionFit(start, share=["tendons"], kinematics=3).fit(recording(truth, seed=seed))
         known = [each["path"] for each in fit.report_["parameters"] if each["identified"]]
         errors = [
             (fit.parameters_[path] - get_number(finger(truth), path)) / fit.standard_errors_[path] for path in known

@@ -21,7 +21,7 @@ from tendonfmu.recordings.recording import Recording
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 
 Numbers = NDArray[np.float64]
-SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 0.05, "uncertainty": False}
+SHARED = {"share": ["tendons"], "kinematics": 3, "tolerance": 0.05}
 TRUTH = small_finger()
 
 

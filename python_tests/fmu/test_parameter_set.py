@@ -34,7 +34,7 @@ def fitted() -> Any:
         warnings.simplefilter(
             "ignore", FitWarning
         )  # few samples and passes: what is known badly is of interest as well
-        return tf.fit(FINGER, samples, passes=2, uncertainty=False)
+        return tf.fit(FINGER, samples, passes=2)
 
 
 @pytest.fixture(scope="module")

@@ -80,8 +80,8 @@ def test_a_name_that_is_no_option_is_an_error_of_the_call() -> None:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    fit = options.FitOptions(holdout=np.float32(0.5), uncertainty=np.True_, only="joints[1].*")  # type: ignore[arg-type]
+    fit = options.FitOptions(holdout=np.float32(0.5), routing=np.True_, only="joints[1].*")  # type: ignore[arg-type]
     diagnose = options.DiagnoseOptions(jobs=np.int64(2))  # type: ignore[arg-type]
-    values = fit.holdout, diagnose.jobs, fit.uncertainty, fit.only, options.FitOptions(holdout=0).holdout
+    values = fit.holdout, diagnose.jobs, fit.routing, fit.only, options.FitOptions(holdout=0).holdout
     assert values == (0.5, 2, True, ["joints[1].*"], 0.0)
     assert [type(value) for value in values] == [float, int, bool, list, float]

@@ -1,4 +1,4 @@
-"""A run as a recording for Rerun, read back: numbers of the table, contacts, residual and bound.
+"""A run as a recording for Rerun, read back: numbers of the table, contacts, residual and contact level.
 
 The viewer takes 0.5 GB, so what needs it is long.
 """
@@ -19,7 +19,6 @@ import tendonfmu as tf
 from command import Call
 from optional_parts import require
 from repository_paths import ROOT
-from tendonfmu.detect.contact_bound import residual_and_bound
 from tendonfmu.recordings.recording import flagged_stretches
 from tendonfmu.report.rerun_recording import write_rerun
 
@@ -57,21 +56,20 @@ def contents_of(file: Path) -> Contents:
 
 @pytest.mark.long
 def test_what_is_written_is_the_run(tmp_path: Path) -> None:
-    """Signals, residual and bound, contacts and labels of a part of the demo."""
+    """Signals, residual and contact level, contacts and labels of a part of the demo."""
     require("rerun")
     recording, finger = tf.read_recording(DEMO / "index_finger_pushes.parquet")[8.0:16.0], tf.read_finger(CALIBRATED)
     outputs = tf.run(finger, recording).outputs
     write_rerun(tmp_path / "out.rrd", outputs, recording, finger)
     found, time = contents_of(tmp_path / "out.rrd"), outputs["time"]
-    residual, bound = residual_and_bound(finger, recording, 1)
     assert recording.contact is not None
     flags = {"contact/label": recording.contact}
     for j, name in enumerate(finger.joint_names):
         flags[f"contact/{j + 1}_{name}"] = outputs["joint_contact"][:, j]
         drawn = {
             "torque/external_torque": recording.groups["external_torque"],
-            "residual/residual": residual,
-            "residual/bound": bound,
+            "residual/residual": outputs["residual"],
+            "contact_level/contact_level": outputs["contact_level"],
             "motion/joint_angle": outputs["joint_angle"],
             **{f"torque/{output}": outputs[output] for output in ("joint_torque", "compensated_torque")},
         }
@@ -85,27 +83,6 @@ def test_what_is_written_is_the_run(tmp_path: Path) -> None:
         begins = found.times[path]
         spans = [each[:2] for each in zip(begins, np.append(begins[1:], time[-1]), states, strict=True) if each[2]]
         np.testing.assert_allclose(spans, flagged_stretches(time, expected), rtol=0, atol=1e-9)
-
-
-def test_the_residual_exceeds_its_bound_in_contact_and_only_then() -> None:
-    """By the rule of the paper the bound decides alone. It has all that adds to the threshold."""
-    data = json.loads(CALIBRATED.read_text(encoding="utf-8"))
-    kept = ("threshold", "threshold_per_force", "uncertainty", "friction_bound")
-    data["contact"] = {key: data["contact"][key] for key in kept}
-    data.pop("sensor_fault", None)
-    finger, recording = tf.read_finger(data), tf.read_recording(DEMO / "index_finger_pushes.parquet")[:20000]
-    outputs = tf.run(finger, recording).outputs
-    residual, bound = residual_and_bound(finger, recording, 1)  # in several blocks
-    assert outputs["joint_contact"].any(axis=0).all()
-    np.testing.assert_array_equal((np.abs(residual) > bound)[1:], outputs["joint_contact"][1:])
-    force = np.abs(recording.groups["tendon_force"]).mean(axis=1)
-    for without in ("friction_bound", "uncertainty"):  # each is a part of it
-        other = {**data, "contact": {key: value for key, value in data["contact"].items() if key != without}}
-        lower = residual_and_bound(tf.read_finger(other), recording, 1)[1]
-        assert (bound - lower).max() > 0.01 * bound.max()
-    plain = {**data, "contact": {key: data["contact"][key] for key in kept[:2]}}
-    expected = plain["contact"]["threshold"] + force[:, None] * plain["contact"]["threshold_per_force"]
-    np.testing.assert_allclose(residual_and_bound(tf.read_finger(plain), recording, 1)[1], expected, rtol=1e-15)
 
 
 # --- the command ------------------------------------------------------------------------------------------------------

@@ -143,7 +143,7 @@ class ContactTuning(Configured):
         begin = perf_counter()
         self._start: Finger = read_finger(self.finger)
         self._data: dict[str, Any] = {**self._start.data, "sensor_fault": None}
-        self._groups = _groups(self._parts(listed_sources(recordings), checked))
+        self._groups = groups_of(self._parts(listed_sources(recordings), checked))
         parts = [part for group in self._groups for part in group]
         self.hours_ = sum(part.hours for part in parts)
         terms = self._learn_bias(parts)
@@ -278,7 +278,7 @@ class ContactTuning(Configured):
 # --- what is left out together ----------------------------------------------------------------------------------------
 
 
-def _groups(parts: Sequence[FreePart]) -> list[list[FreePart]]:
+def groups_of(parts: Sequence[FreePart]) -> list[list[FreePart]]:
     """Divide free motion: each recording is a group, or, of few recordings, each quarter of their time."""
     sources = list(dict.fromkeys(part.source for part in parts))
     of_source = [[part for part in parts if part.source == source] for source in sources]
