@@ -68,24 +68,16 @@ def finger(joints: int, tendons: int, points: int) -> Description:
 
 def calibrated(plain: Description) -> Description:
     """With all that `tendonfmu calibrate` writes, presliding apart."""
-    joints, tendons = len(plain["joints"]), len(plain["tendons"])
-    bounds: Description = {"threshold": [5.0] * joints, "threshold_per_force": [0.001] * joints}
-    small = {"threshold": [0.01] * joints}
-    directions = [[0.01 * (1 + i % 3) for i in range(tendons + 3)]] * 4
+    joints = len(plain["joints"])
+    numbers = ("friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
+    band = {"noise": [5.0] * joints, **{name: [0.1] * joints for name in numbers}}
     contact = {
         "threshold": [5.0] * joints,
-        "method": "innovation",
-        "innovation": {"time": 0.05, **bounds},
-        "friction_bound": {"stuck_share": 0.4, "jump_share": 0.6},
-        "uncertainty": [directions] * joints,
+        "method": "bands",
+        "bands": [band] * 4,
         "deviation": [0.002] * joints,
-        "release_ratio": 0.7,
-        "hold_time": 0.05,
-        "release_time": 2,
-        "drift": bounds,
-        "rest": {"travel": 1e-5, **small, "creep": [0.001] * joints, "innovation": {"time": 0.5, **small}},
     }
-    return {**plain, "contact": contact, "bias": {"start_share": 1, "noise_time": 0.001}, "sensor_fault": {}}
+    return {**plain, "contact": contact, "bias": {"noise_time": 0.001}, "sensor_fault": {}}
 
 
 def motion(description: Description, shaking: bool = False) -> Numbers:

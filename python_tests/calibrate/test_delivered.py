@@ -72,7 +72,7 @@ def test_the_errors_on_held_out_stretches_are_those_of_the_fmu(
 def test_no_held_out_sample_chooses_anything(
     alone: tuple[Calibration, Path], folder: Path, short: Path, tmp_path: Path
 ) -> None:
-    """With other forces there, structure, numbers and bounds are the same to the last bit, and only the figures change."""
+    """With other forces there, structure, numbers and bounds are the same to the last bit; only the figures change."""
     recording = read_recording(short)
     rows = np.flatnonzero(every_fifth(recording.time))
     force = recording.groups["tendon_force"].copy()
