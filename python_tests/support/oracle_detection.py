@@ -25,7 +25,6 @@ LEAK, HOME, FORGET = 10.0, 3.0, 1.0  # s
 LEAST_TIME, END = 0.02, 0.4  # s, of the peak
 HIGHEST = 1e12  # level
 NUMBERS = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
-OF_POSITIONS = ("motor_load", "friction_change", "friction_reserve")
 
 
 def direction_above(v: float, limit: float, key: Key, out: Step) -> int:
@@ -108,9 +107,8 @@ class Detector:
         self.numbers = [{name: per_joint(row, name).tolist() for name in NUMBERS} for row in given(contact, "bands", [])]
         if len(self.numbers) != (len(SHORT) if self.by_bands else 0):
             raise ValueError("contact.bands: 4 rows, with the method bands alone")
-        loads = any(max(row[name]) > 0.0 for row in self.numbers for name in OF_POSITIONS)
         watches = given(description, "sensor_fault", None) is not None
-        self.uses_positions = self.by_bands and (source == 1 or watches or loads)
+        self.uses_positions = self.by_bands and (source == 1 or watches or given(contact, "watches_motors", False))
         self.joints = [Joint() for _ in range(n)]
         self.in_contact = np.zeros(n, dtype=bool)
         self.level = np.zeros(n)

@@ -289,6 +289,7 @@ def random_detection(seed: int, finger: Description) -> Description:
     contact: Description = dict(finger["contact"])
     if rng.random() < 0.6:
         contact |= {"method": "bands", "bands": random_bands(rng, scale)}
+        contact |= {"watches_motors": bool(rng.random() < 0.8)} if rng.random() < 0.7 else {}
     elif rng.random() < 0.5:
         contact["method"] = "paper"
     if rng.random() < 0.5:
