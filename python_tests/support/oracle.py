@@ -367,7 +367,8 @@ class FingerOracle:
 
     def _held_at_most(self, products: Places) -> Array:
         """B [n] N·m, of the products |F|·f."""
-        return np.asarray(self._at_joints(products, np.abs(self.R)))
+        own = [self.extensions.own_limit(j) if self._remembers("joint", (j,)) else 0.0 for j in range(self.n)]
+        return self._at_joints(products, np.abs(self.R)) + np.array(own)
 
     def _driven(self, x0: Array | None) -> Array:
         """x [n] N·m: what the motors load. x0: tendon positions less their zeros."""
@@ -396,7 +397,7 @@ class FingerOracle:
         """What step 6 takes of r, per joint; updates P."""
         if contact:
             self._inhibit(time)
-            return self._absorb(np.full(self.n, self.detector.leak(dt)))
+            return np.full(self.n, self.detector.leak(dt))
         if self.noise_time is not None:
             noise = noise * float(self.noise_time) / dt
             self.branches["noise_time"] += 1
@@ -404,10 +405,7 @@ class FingerOracle:
         self.branches["gain_zero_of_zero"] += int((self.P + noise == 0.0).sum())
         K = np.array([P / (P + noise) if P + noise != 0.0 else 0.0 for P in self.P])
         self.P = (1.0 - K) * self.P
-        return self._absorb(K)
-
-    def _absorb(self, K: Array) -> Array:
-        """K: the same for all joints: one start, one drift, one noise."""
+        # all joints have one K: one start, one drift, one noise
         self.absorbed += LARGEST_ABSORPTION if K[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - K[0]))
         return K
 

@@ -23,7 +23,7 @@ SHORT = (0.004, 0.02, 0.06, 0.5)  # A_k, s
 LONG = (0.05, 0.3, 1.0, 10.0)  # M_k, s
 LEAK, HOME, FORGET = 10.0, 3.0, 1.0  # s
 LEAST_TIME, END = 0.02, 0.4  # s, of the peak
-HIGHEST = 1e12  # level
+HIGHEST = 1e150  # level
 NUMBERS = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
 
 
@@ -150,7 +150,7 @@ class Detector:
             joint.bands = []
             joint.begin(e, x, T, time)
             joint.h, joint.V = e, B
-            self.terms[j, :, 2:5] = 1.0, abs(T), B
+            self.terms[j] = self._nothing(T, B)
             return False
         self._follow(joint, sample, time, dt, held)
         distances, bounds = zip(*(self._measure(j, k, abs(T), B) for k in range(len(SHORT))), strict=True)
@@ -160,9 +160,14 @@ class Detector:
             self._begin_contact(j, levels, bounds, time, out)
         elif self._ends(j, time, dt, out):
             joint.begin(e, x, T, time)
-            joint.V = joint.peak
+            joint.V, self.terms[j] = joint.peak, self._nothing(T, B)
             self.branches["contact_ends"] += 1
         return joint.band is not None
+
+    @staticmethod
+    def _nothing(T: float, B: float) -> list[float]:
+        """Terms of a band of a joint that begins anew."""
+        return [0.0, 0.0, 1.0, abs(T), B, 0.0, 0.0, 0.0]
 
     def _follow(self, joint: Joint, sample: tuple[float, ...], time: float, dt: float, held: bool) -> None:
         """Rules 1 to 5."""
