@@ -7,7 +7,6 @@ Indices in this file start at 0; joint 0 is the first joint, so the edge before 
 
 from __future__ import annotations
 
-import functools
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -16,12 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle_detection import Detector, direction_above
+from oracle_detection import Detector, Signals, direction_above
 from oracle_elements import Elements
 from oracle_extensions import Extensions
 from oracle_finger import Effect, Key, Places, Result, Step, given, read_joints, read_tendons, tendon_velocity
 from oracle_sensors import SensorWatch, Watch
-from oracle_start import StartFriction, gain_of
 
 Array = NDArray[Any]
 
@@ -39,7 +37,7 @@ class FingerOracle:
         self.branches: Counter[str] = Counter()
         self._read_structure(description)
         self._read_settings(description)
-        self.detector = Detector(description, self.R, self.branches)
+        self.detector = Detector(description, self.R, kinematics_source, self.branches)
         self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
         watches = given(description, "sensor_fault", None) is not None
         self.sensors = SensorWatch(description, self.R, kinematics_source, self.branches) if watches else None
@@ -52,6 +50,7 @@ class FingerOracle:
         self.time = math.nan
         self.q, self.v, self.b_eff, self.P = (np.zeros(self.n) for _ in range(4))
         self.absorbed = 0.0  # Λ
+        self.jumps = np.zeros(self.n)  # Σ Δb
         self.last = Step()
         # of a guided run (oracle_guided.py): N·m known from elsewhere, and whether the bias begins with this sample
         self.known_torque: Array | float = 0.0
@@ -91,7 +90,6 @@ class FingerOracle:
         self.initial_torque = given(bias, "initial_torque", None)
         self.noise_time = given(bias, "noise_time", None)
         self.by_absorption = given(bias, "forgetting", "time") == "absorption"
-        self.start = StartFriction(given(bias, "start_share", None), self.n, self.branches)
 
     def step(self, time: float, inputs: Mapping[str, Array], forced: Mapping[Key, Any] | None = None) -> Step:
         """Takes one sample. `forced` fixes single decisions (by key) instead of deciding them."""
@@ -118,15 +116,15 @@ class FingerOracle:
         self.travelled = travel, tendon_velocity(self.R, travel)
         self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, self.elements, out)
         self.elements.turn(self.travelled, dt, first)
-        # 2. each friction effect: F, the increment b, and what stiction may hide
-        F, b, hidden = self._effects(q, v, x_dot, time, dt, first, out)
+        # 2. each friction effect: F, the increment b, and |F| of its law
+        F, b, limits = self._effects(q, v, x_dot, time, dt, first, out)
         # 3. forces at and between the joints, and with them what multiplies an F or a b
         f_between, f_before_edge, slack, lost = self._propagate(f0, F.edge, F.pulley, out)
         f = self._loads(f_before_edge, f_between)
         # 4. totals, eq. (10)
         products = self._remembered(F * f, lost, out)
-        self._start_of_elements(F, first)
-        T = self._total(products) + self._springs(q)
+        friction = self._total(products)
+        T = friction + self._springs(q)
         db = self._total(b * f)
         tau = self.R.T @ f0 - self.known_torque
         mean_force = float(np.mean(np.abs(f0))) if self.sensors is None else self.sensors.mean_force(f0)
@@ -134,34 +132,20 @@ class FingerOracle:
         if first:
             self.P = np.full(self.n, noise if self.initial_variance is None else float(self.initial_variance))
             self.b_eff = tau - T if self.initial_torque is None else np.array(self.initial_torque, dtype=float)
-            self.detector.begin(time)
             self.branches["initial_torque" if self.initial_torque is not None else "initial_bias"] += 1
         else:
             self.b_eff = np.where(np.array(self.watch.anew) | self.begins, tau - T, self.b_eff + db)
+            self.jumps = self.jumps + db
         T_eff = self.b_eff + T
-        hold = functools.partial(self._at_joints, arms=np.abs(self.R))
-        self.start.turn(self.places, Places.zeros(self.m, self.n), f, hold, out)
-        # 4a. what friction may differ by
-        change = np.zeros(self.n) if first else T_eff - self.last.values["friction_torque"]
-        unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew)
-        self.start.forget(unwatched)
-        bounds = self.detector.bounds(hold(hidden * f), self._parts(products, q), change, self.start.unlearned, dt)
-        unwell = bool(unwatched.any()) or (self.sensors is not None and bool(self.sensors.faults.any()))
-        self.detector.watch(f0, x0, mean_force, time, dt, first or unwell, out)
-        joint_contact, r, y = np.zeros(self.n, dtype=bool), np.zeros(self.n), np.zeros(self.n)
+        # 5. contact, 6. bias
+        unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew) | first
+        r = np.where(unwatched, 0.0, tau - T_eff)
+        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, self._held_at_most(limits * f), np.abs(friction))
+        joint_contact = self.detector.take(signals, mean_force, time, dt, unwatched, out)
         if not first:
-            # 5. contact, 6. bias update or its inhibition
-            r = np.where(unwatched, 0.0, tau - T_eff)
-            self.detector.forget(unwatched)
-            joint_contact, y = self.detector.contact(r, bounds, mean_force, time, dt, out)
-            if self.detector.updates(time, dt):
-                K, own = self._gain(dt, noise)
-                correction = K * r
-                self.b_eff = self.b_eff + correction
-                T_eff = T_eff + correction
-                self.detector.update(r, K, own, time, dt)
-            else:
-                self._inhibit(time)
+            correction = self._gain(dt, noise, time, bool(joint_contact.any())) * r
+            self.b_eff = self.b_eff + correction
+            T_eff = T_eff + correction
             self._count_in_contact(out, bool(joint_contact.any()))
         # 7. outputs
         out.values = {
@@ -174,14 +158,11 @@ class FingerOracle:
             "joint_contact": joint_contact,
             "contact": np.asarray(joint_contact.any()),
             "slack": slack,
-            "compensated_torque_std": self.detector.std(self.P + self.start.variance(), bounds, mean_force),
+            "compensated_torque_std": self.detector.std(self.P, mean_force),
             "residual": r,
-            "innovation": y,
-            "stuck_friction": bounds.H,
-            "friction_jump": bounds.J,
-            "drift": self.detector.drift(),
-            "friction_parts": bounds.parts,
-        } | self.detector.at_rest()
+            "contact_level": self.detector.level,
+            "contact_terms": self.detector.terms,
+        }
         if self.sensors is not None:
             observable = np.asarray(not any(self.watch.blind))
             out.values |= {"sensor_fault": self.sensors.faults, "contact_observable": observable}
@@ -222,26 +203,20 @@ class FingerOracle:
     def _effects(
         self, q: Array, v: Array, x_dot: Array, time: float, dt: float, first: bool, out: Step,
     ) -> tuple[Places, Places, Places]:  # fmt: skip
-        """Step 2: F, b and, of the stuck effects, |F| at the present |v| on the side of their last motion (for H)."""
-        F, b, hidden = (Places.zeros(self.m, self.n) for _ in range(3))
+        """Step 2: F, b and |F| of the law, of a stuck effect on the side of its last motion."""
+        F, b, limits = (Places.zeros(self.m, self.n) for _ in range(3))
         seen = q.tolist(), v.tolist(), x_dot.tolist()
         for (kind, at, effect), rows in zip(self.places, self.grips, strict=True):
             velocity, angle, key = self._seen_by(kind, at, *seen)
             factor = self.extensions.factor(rows, abs(velocity), time)
             if self._remembers(kind, at):
-                taken = abs(effect.value(self.extensions.side_of(effect, key), abs(velocity), angle)), 0.0
-                effect.whole = factor * taken[0]
-                direction = direction_above(velocity, effect.threshold, key, out)
-                effect.side, effect.rests = direction or effect.side, direction == 0
-                if effect.rests and self.detector.bounds_presliding:
-                    getattr(hidden, kind)[at] = effect.whole
+                effect.side = self.extensions.side_of(effect, key)
+                taken = abs(effect.value(effect.side, abs(velocity), angle)), 0.0
             else:
                 taken = self._take_effect(effect, velocity, angle, time, first, key, out)
-                self.start.sticks(effect, factor * taken[0], first)
             getattr(F, kind)[at], getattr(b, kind)[at] = factor * taken[0], factor * taken[1]
-            if effect.stuck and self.detector.friction_bound is not None:
-                getattr(hidden, kind)[at] = factor * abs(effect.value(effect.side or 1, abs(velocity), angle))
-        return F, b, hidden
+            getattr(limits, kind)[at] = abs(factor * effect.value(effect.side or 1, abs(velocity), angle))
+        return F, b, limits
 
     def _remembers(self, kind: str, at: tuple[int, ...]) -> bool:
         """Whether the friction of a place has a memory: F is then |F|, the limit without the force."""
@@ -260,13 +235,6 @@ class FingerOracle:
                 products.load[j] *= share
                 products.joint[j] = held - products.load[j] if own else held
         return products
-
-    def _start_of_elements(self, F: Places, first: bool) -> None:
-        for kind, at, effect in self.places:
-            if self._remembers(kind, at):
-                *_, key = self._seen_by(kind, at, [0.0] * self.n, [0.0] * self.n, [[0.0] * (self.n + 1)] * self.m)
-                turns = key[0] == "joint" or bool(self.R[key[1], key[2] :].any())  # else nothing of it is ever held
-                self.start.remembers(effect, self.elements.kept.get(key, 0.0) if turns else 0.0, first)
 
     def _seen_by(
         self, kind: str, at: tuple[int, ...], q: list[float], v: list[float], x_dot: list[list[float]]
@@ -397,6 +365,18 @@ class FingerOracle:
         """Friction part of eq. (10), of the products F·f or b·f."""
         return self._at_joints(products, self.R)
 
+    def _held_at_most(self, products: Places) -> Array:
+        """B [n] N·m, of the products |F|·f."""
+        own = [self.extensions.own_limit(j) if self._remembers("joint", (j,)) else 0.0 for j in range(self.n)]
+        return self._at_joints(products, np.abs(self.R)) + np.array(own)
+
+    def _driven(self, x0: Array | None) -> Array:
+        """x [n] N·m: what the motors load. x0: tendon positions less their zeros."""
+        if not self.detector.uses_positions:
+            return np.zeros(self.n)
+        k = np.array([tendon.stiffness for tendon in self.tendons])
+        return np.asarray(self.R.T @ (k * x0))
+
     def _at_joints(self, products: Places, arms: Array) -> Array:
         """[n] N·m: the tendons' losses by their arms [m, n], and what acts at the joints themselves."""
         loss = products.loss()
@@ -404,11 +384,6 @@ class FingerOracle:
         for j in range(self.n):
             torque[j] += arms[:, j] @ loss[:, j]
         return torque
-
-    def _parts(self, products: Places, q: Array) -> Array:
-        """[n, m + 3] N·m: T by its sources: each tendon, the joint's own friction, its load friction, its cover."""
-        tendons = (self.R * products.loss()).T
-        return np.column_stack([tendons, products.joint, products.load, self._covers(q)])
 
     def _covers(self, q: Array) -> Array:
         """T_jq, [n] N·m."""
@@ -418,24 +393,24 @@ class FingerOracle:
         """T_jq and the torques of `extensions`."""
         return self._covers(q) + self.extensions.torques()
 
-    def _gain(self, dt: float, noise: float) -> tuple[Array, Array]:
-        """Kalman gain per joint, and that without V; updates P."""
+    def _gain(self, dt: float, noise: float, time: float, contact: bool) -> Array:
+        """What step 6 takes of r, per joint; updates P."""
+        if contact:
+            self._inhibit(time)
+            return np.full(self.n, self.detector.leak(dt))
         if self.noise_time is not None:
             noise = noise * float(self.noise_time) / dt
             self.branches["noise_time"] += 1
-        K, own = np.zeros(self.n), np.zeros(self.n)
-        for j in range(self.n):
-            self.P[j] += self.drift_variance * dt
-            own[j], K[j] = gain_of(self.P[j], noise), gain_of(self.P[j] + self.start.variance()[j], noise)
-            self.branches["gain_zero_of_zero"] += self.P[j] + noise == 0.0
-            self.P[j] = (1.0 - own[j]) * self.P[j]
-        self.start.learn(K)
-        # all joints have one K of P: one start, one drift, one noise
-        self.absorbed += LARGEST_ABSORPTION if own[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - own[0]))
-        return K, own
+        self.P = self.P + self.drift_variance * dt
+        self.branches["gain_zero_of_zero"] += int((self.P + noise == 0.0).sum())
+        K = np.array([P / (P + noise) if P + noise != 0.0 else 0.0 for P in self.P])
+        self.P = (1.0 - K) * self.P
+        # all joints have one K: one start, one drift, one noise
+        self.absorbed += LARGEST_ABSORPTION if K[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - K[0]))
+        return K
 
     def _inhibit(self, time: float) -> None:
-        """Contact: b_eff and P stay, the rest counts as begun now (fig. 5, t1 = t)."""
+        """Contact: P stays, the rest counts as begun now (fig. 5, t1 = t)."""
         for _, _, effect in self.places:
             if effect.stuck:
                 effect.stuck_since = time

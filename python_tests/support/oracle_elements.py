@@ -76,7 +76,6 @@ class Elements:
         self.R, self.thresholds, self.branches = R, thresholds, branches
         self.forces: dict[Place, list[float]] = {}  # F of each element
         self.tension: dict[Place, float] = {}  # f behind a place
-        self.kept: dict[tuple[Any, ...], float] = {}  # of the present sample, by velocity
         self.first, self.dt = True, 0.0
 
     def at(self, place: Place) -> list[Element]:
@@ -102,7 +101,7 @@ class Elements:
     def turn(self, travelled: tuple[Array, Array], dt: float, first: bool) -> None:
         """travelled: Δ of the joints [n] and of the tendons [m, n + 1]."""
         self.joints, self.tendons = (np.zeros_like(each) if first else each for each in travelled)
-        self.dt, self.first, self.kept = dt, first, {}
+        self.dt, self.first = dt, first
 
     def loss(self, kind: str, i: int, j: int, limit: float, before: float, out: Step) -> float:
         """F of an edge or pulley, N. limit: |F(v)|·f; before: the force before it."""
@@ -113,7 +112,7 @@ class Elements:
         if self.compliance and not self.first:
             compliance = self.compliance * self.sections(i, level)
             turned += (before - self.tension[place]) * compliance
-        return self._take(place, ("tendon", i, level), limit, turned, compliance, out)
+        return self._take(place, limit, turned, compliance, out)
 
     def sections(self, i: int, level: int) -> int:
         """S, of the cord of tendon i from a level to the last joint that it moves."""
@@ -123,13 +122,13 @@ class Elements:
     def own(self, j: int, limit: float, out: Step) -> float:
         """F of a joint, N·m."""
         limit = min(max(limit, 0.0), LARGEST_LIMIT)
-        return self._take(("joint", j), ("joint", j), limit, float(self.joints[j]), 0.0, out)
+        return self._take(("joint", j), limit, float(self.joints[j]), 0.0, out)
 
     def behind(self, kind: str, i: int, j: int, force: float) -> None:
         """The force behind a place; also where it has no memory."""
         self.tension[kind, i, j] = force
 
-    def _take(self, place: Place, key: Place, limit: float, turned: float, compliance: float, out: Step) -> float:
+    def _take(self, place: Place, limit: float, turned: float, compliance: float, out: Step) -> float:
         elements = self.at(place)
         before = self.forces.get(place, [0.0] * len(elements))
         limits = [element.share * limit for element in elements]
@@ -148,8 +147,6 @@ class Elements:
             sign = out.decide(("slips_to", place, e), math.copysign(1.0, trial))
             forces.append(sign * limits[e] if slips[e] else trial)
             self.branches["element_slips" if slips[e] else "element_holds"] += 1
-            if not slips[e]:
-                self.kept[key] = max(self.kept.get(key, 0.0), elements[e].decay(self.dt)[0])
         self.forces[place] = forces
         return sum(forces)
 

@@ -46,10 +46,6 @@ class Effect:
     stuck_since: float = math.nan
     last_stuck: float = math.nan
     absorbed_since: float = 0.0  # Λ_since: Λ when the effect came to rest
-    rests: bool | None = None  # with `presliding`, which never sticks: whether it is slower than what counts as motion
-    start_left: float = 0.0  # of `bias.start_share`: share of how it stood at the start that motion has not turned over
-    turned: float = 0.0  # of the present sample alone, like
-    whole: float = 0.0  # by how much it may stand otherwise than the model took it
 
     def value(self, side: int, speed: float, angle: float) -> float:
         """F(side * speed); the laws' values are interpolated over the angle, constant outside."""
@@ -200,7 +196,7 @@ def read_tendons(description: Mapping[str, Any]) -> list[Tendon]:
 
 @dataclass
 class Result:
-    """Outputs of a run: name -> [N, n], [N, m], [N] (`contact`) or [N, n, m + 3] (`friction_parts`)."""
+    """Outputs of a run: name -> [N, n], [N, m], [N] (`contact`) or [N, n, 4, 8] (`contact_terms`)."""
 
     outputs: dict[str, Array]
     margin: Array  # [N], of each step

@@ -24,18 +24,17 @@ class GuidedOracle(FingerOracle):
         self.begins, self.learns, self.known_torque = begins, learns, known_torque
         self.S = np.full(self.n, np.nan)
 
-    def _gain(self, dt: float, noise: float) -> tuple[Array, Array]:
+    def _gain(self, dt: float, noise: float, time: float, contact: bool) -> Array:
         if self.begins:
             self.P = np.full(self.n, noise if self.initial_variance is None else float(self.initial_variance))
-            self.start.forget(np.ones(self.n, dtype=bool))
-            return np.zeros(self.n), np.zeros(self.n)
+            return np.zeros(self.n)
         scale = 1.0 if self.noise_time is None else float(self.noise_time) / dt
         predicted = self.P + self.drift_variance * dt
-        self.S = predicted + self.start.variance() + noise * scale
+        self.S = predicted + noise * scale
         if self.learns:
-            return super()._gain(dt, noise)
+            return super()._gain(dt, noise, time, contact)
         self.P = predicted
-        return np.zeros(self.n), np.zeros(self.n)
+        return np.zeros(self.n)
 
 
 def run_guided(

@@ -268,96 +268,38 @@ def random_recording(
     }
 
 
-def random_innovation(rng: np.random.Generator, method: str, scale: Array, bounded: bool) -> Description:
-    """`contact.innovation`; bounded: a friction bound keeps B above 0 where the threshold is 0."""
+def random_bands(rng: np.random.Generator, scale: Array) -> list[Description]:
+    """`contact.bands`: any of them may find most; a number is left out for some."""
     n = len(scale)
-    innovation: Description = {
-        "time": float(10.0 ** rng.uniform(-2.0, -0.5)),
-        "threshold": (scale * 10.0 ** rng.uniform(-1.2, 0.2, n)).tolist(),
-    }
-    if rng.random() < 0.4:
-        innovation["threshold_per_force"] = rng.uniform(0.0, 1e-3, n).tolist()
-    elif rng.random() < 0.6 and not bounded:
-        innovation["threshold"][int(rng.integers(0, n))] = 0.0
-    if method == "cusum":
-        innovation["evidence_time"] = float(10.0 ** rng.uniform(-2.5, -1.0))
-    return innovation
-
-
-def random_directions(rng: np.random.Generator, n: int, m: int) -> list[Any]:
-    """`contact.uncertainty`: up to 4 directions of relative errors a joint, null for some."""
-    directions: list[Any] = []
-    for _ in range(n):
-        count = int(rng.integers(0, 5))
-        errors = rng.normal(0.0, 0.1, (count, m + 3)) * (rng.random((count, m + 3)) < 0.7)
-        directions.append(None if rng.random() < 0.2 else errors.tolist())
-    return directions
-
-
-def random_drift(rng: np.random.Generator, scale: Array, n: int) -> Description:
-    keys: Description = {"threshold": np.asarray(scale * rng.uniform(0.03, 0.4, n)).tolist()}
-    if rng.random() < 0.5:
-        keys["threshold_per_force"] = np.asarray(rng.uniform(0.0, 1e-3, n)).tolist()
-    for name, (low, high) in {"quick_time": (-2.0, -0.5), "slow_time": (-1.5, 0.5)}.items():
-        if rng.random() < 0.8:
-            keys[name] = float(10.0 ** rng.uniform(low, high))
-    return keys
-
-
-def random_release(rng: np.random.Generator) -> Description:
-    """How a contact ends; a key left out, null or at its least for some."""
-    keys: Description = {}
-    if rng.random() < 0.5:
-        keys["release_ratio"] = 1.0 if rng.random() < 0.1 else rng.uniform(0.2, 0.95)
-    if rng.random() < 0.5:
-        keys["hold_time"] = 0.0 if rng.random() < 0.1 else float(10.0 ** rng.uniform(-2.5, -1.0))
-    if rng.random() < 0.6:
-        keys["release_time"] = (
-            None if rng.random() < 0.1 else 0.0 if rng.random() < 0.15 else float(10.0 ** rng.uniform(-2.5, -0.7))
-        )
-    return keys
+    most = {"friction": 1.0, "friction_limit": 0.3, "motor_load": 0.3, "friction_change": 1.0, "friction_reserve": 0.5}
+    bands: list[Description] = []
+    for size in (2.0, 1.0, 0.5, 0.3):  # so that the slow ones find something, too
+        band: Description = {"noise": (size * scale * 10.0 ** rng.uniform(-0.8, 0.7, n)).tolist()}
+        optional = {name: rng.uniform(0.0, largest, n).tolist() for name, largest in most.items()}
+        bands.append(band | {name: values for name, values in optional.items() if rng.random() < 0.4})
+    return bands
 
 
 def random_detection(seed: int, finger: Description) -> Description:
     """The finger with any subset of the optional keys of the detection."""
     rng = np.random.default_rng([seed, 4])
     R = np.array([tendon["moment_arms"] for tendon in finger["tendons"]])
-    m, n = R.shape
+    n = R.shape[1]
     scale: Array = friction_scale(R) * (1.0 + 0.3 * n)
-    contact: Description = finger["contact"] | random_release(rng)
-    if rng.random() < 0.5:
-        contact["friction_bound"] = {}
-        for key, most in (("stuck_share", 1.0), ("stuck_time", 0.2), ("jump_share", 0.5), ("jump_time", 0.2)):
-            if rng.random() < 0.8:
-                contact["friction_bound"][key] = rng.uniform(0.01, most)
-        if rng.random() < 0.5:
-            contact["friction_bound"]["stuck_presliding"] = bool(rng.random() < 0.8)
-    method = str(rng.choice(["threshold", "innovation", "cusum"], p=[0.3, 0.35, 0.35]))
-    if method != "threshold" or rng.random() < 0.5:
-        contact["method"] = method
-    if method != "threshold":
-        contact["innovation"] = random_innovation(rng, method, scale, "friction_bound" in contact)
-    if rng.random() < 0.5:
-        contact["drift"] = random_drift(rng, scale, n)
-    if rng.random() < 0.5:
-        contact["uncertainty"] = random_directions(rng, n, m)
-        if rng.random() < 0.5:
-            contact["uncertainty_level"] = 0.0 if rng.random() < 0.2 else rng.uniform(0.5, 4.0)
+    contact: Description = dict(finger["contact"])
+    if rng.random() < 0.6:
+        contact |= {"method": "bands", "bands": random_bands(rng, scale)}
+        contact |= {"watches_motors": bool(rng.random() < 0.8)} if rng.random() < 0.7 else {}
+    elif rng.random() < 0.5:
+        contact["method"] = "paper"
     if rng.random() < 0.5:
         contact["deviation"] = np.asarray(scale * rng.uniform(0.0, 0.2, n)).tolist()
     if rng.random() < 0.5:
         contact["deviation_per_force"] = np.asarray(rng.uniform(0.0, 1e-3, n)).tolist()
-    # bounds make contact rarer; some of it shall remain
-    wide = ("friction_bound" in contact) + ("uncertainty" in contact)
-    contact["threshold"] = (np.array(contact["threshold"]) * 0.7**wide).tolist()
     finger = finger | {"contact": contact}
-    bias = dict(finger.get("bias", {}))
     if rng.random() < 0.6:
-        bias["forgetting"] = "absorption" if rng.random() < 0.8 else "time"
-    if rng.random() < 0.5:
-        bias["start_share"] = float(rng.choice([0.0, 1.0, rng.uniform(0.1, 1.0)]))
-    if bias:
-        finger["bias"] = bias
+        forgetting = "absorption" if rng.random() < 0.8 else "time"
+        finger["bias"] = finger.get("bias", {}) | {"forgetting": forgetting}
     if rng.random() < 0.3:
         hardening = {
             "effect": "cover_hardening",
@@ -397,39 +339,6 @@ def random_case(
         bias = description.setdefault("bias", {})
         bias["initial_torque"] = (torque + rng.normal(0.0, 0.01, len(torque))).tolist()
     return description, recording
-
-
-def resting_case(seed: int) -> tuple[Description, Recording]:
-    """A random finger whose motors stand in blocks, with steps of its forces there; motors give way in some."""
-    description, recording = random_case(seed, 400, detection=True)
-    rng = np.random.default_rng([seed, 11])
-    samples, m = recording["tendon_force"].shape
-    arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
-    scale = np.abs(arms).sum(axis=0) * float(np.abs(recording["tendon_force"]).mean()) * 0.02
-    step = float(np.median(np.diff(recording["time"])))
-    for begin in range(20, samples - 60, 70):
-        rows = slice(begin, begin + 50)
-        force, position = recording["tendon_force"][begin].copy(), recording["tendon_position"][begin].copy()
-        load = np.zeros((50, m))
-        for first in rng.integers(8, 45, 3):
-            load[first:] += rng.normal(0.0, 0.1, m) * np.abs(force).mean()
-        gives_way = 1e-4 * (rng.random() < 0.5) * rng.choice([1.0, 0.1])
-        recording["tendon_force"][rows] = force + load + rng.normal(0.0, 1e-3, (50, m))
-        recording["tendon_position"][rows] = position - gives_way * load + rng.normal(0.0, 1e-7, (50, m))
-    rest: dict[str, Any] = {"travel": 2e-6, "threshold": (scale * rng.uniform(0.3, 1.5, arms.shape[1])).tolist()}
-    rest["settle_time"] = step * rng.uniform(0.5, 5.0)
-    optional = {
-        "averaging_time": 0.0 if rng.random() < 0.2 else step * rng.uniform(0.5, 3.0),
-        "threshold_per_force": rng.uniform(0.0, 1e-4, arms.shape[1]).tolist(),
-        "creep": (scale * rng.uniform(0.0, 3.0, arms.shape[1])).tolist(),
-        "fall_share": rng.uniform(0.0, 0.6),
-        "innovation": {
-            "time": step * rng.uniform(2.0, 30.0),
-            "threshold": (scale * rng.uniform(0.2, 1.0, arms.shape[1])).tolist(),
-        },
-    }
-    rest |= {key: value for key, value in optional.items() if rng.random() < 0.7}
-    return description | {"contact": description["contact"] | {"rest": rest}}, recording
 
 
 def failing_case(seed: int) -> tuple[Description, Recording]:
