@@ -20,7 +20,6 @@ AVERAGED = np.array([0.004, 0.02, 0.06, 0.5])  # s, A of the bands
 COMPARED = np.array([0.05, 0.3, 1.0, 10.0])  # s, M
 CELL = 0.01  # s, of which only the sample farthest from its reference counts, by joint and band
 _NEVER = 1e6  # N·m, a noise that no residual exceeds
-_SLIGHT = 1e-9  # with it a bound uses the tendon positions, whatever the kinematics
 _BLOCK = 50_000  # samples at once: the terms are 32 numbers for each joint
 _KEPT = ("residual", "compensated_torque_std")
 
@@ -84,13 +83,17 @@ def run_free(data: Data, parts: Sequence[FreePart]) -> tuple[list[Terms], list[d
 
 
 def _without_contact(data: Data, parts: Sequence[FreePart]) -> dict[str, Any]:
-    """Return the description with bounds that nothing exceeds, which use the tendon positions where there are any."""
+    """Return the description with bounds that nothing exceeds."""
     joints = len(data["joints"])
-    band = {"noise": [_NEVER] * joints}
+    contact: dict[str, Any] = {"threshold": [_NEVER] * joints, **motors_of(parts)}
+    return {**data, "contact": {**contact, "method": "bands", "bands": [{"noise": [_NEVER] * joints}] * len(AVERAGED)}}
+
+
+def motors_of(parts: Sequence[FreePart]) -> dict[str, bool]:
+    """Return the key that makes bounds of measured angles use the tendon positions, if all parts have them."""
     measured = parts[0].kinematics != KinematicsSource.TENDON_POSITIONS
-    if measured and all(np.isfinite(part.arrays.get("tendon_position", np.nan)).all() for part in parts):
-        band["motor_load"] = [_SLIGHT] * joints
-    return {**data, "contact": {"threshold": [_NEVER] * joints, "method": "bands", "bands": [band] * len(AVERAGED)}}
+    known = all(np.isfinite(part.arrays.get("tendon_position", np.nan)).all() for part in parts)
+    return {"watches_motors": True} if measured and known else {}
 
 
 def bands_of(numbers: Numbers, digits: int = 4) -> list[dict[str, list[float]]]:

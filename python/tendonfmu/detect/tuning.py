@@ -39,7 +39,7 @@ from tendonfmu.detect.noise import (
     wanted_time,
 )
 from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
-from tendonfmu.detect.terms import Terms, bands_of, run_free
+from tendonfmu.detect.terms import Terms, bands_of, motors_of, run_free
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted
@@ -146,6 +146,7 @@ class ContactTuning(Configured):
         self._groups = groups_of(self._parts(listed_sources(recordings), checked))
         parts = [part for group in self._groups for part in group]
         self.hours_ = sum(part.hours for part in parts)
+        self._motors = motors_of(parts)
         terms = self._learn_bias(parts)
         self.sensors_: SensorRule = learn_sensors(self._data, parts)
         self._data = {key: value for key, value in self._data.items() if key != "sensor_fault"}
@@ -226,7 +227,7 @@ class ContactTuning(Configured):
         if self.options.method == "paper":
             contact["threshold"], contact["threshold_per_force"] = (rounded(factor * each, _DIGITS) for each in rule)
         else:
-            contact["bands"] = bands_of(factor * rule[0])
+            contact |= {"bands": bands_of(factor * rule[0]), **self._motors}
         if learned:
             contact["deviation"] = rounded(self.deviation_.base, _DIGITS)
             contact["deviation_per_force"] = rounded(self.deviation_.per_force, _DIGITS)
