@@ -13,7 +13,6 @@ from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, rounded
 from tendonfmu.detect.free_motion import FreePart
 from tendonfmu.errors import InputError
 from tendonfmu.model import native
-from tendonfmu.options import KinematicsSource
 
 NAMES = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
 AVERAGED = np.array([0.004, 0.02, 0.06, 0.5])  # s, A of the bands
@@ -72,7 +71,7 @@ def run_free(data: Data, parts: Sequence[FreePart]) -> tuple[list[Terms], list[d
         for begin in range(0, len(part.time), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
             try:
-                run = finger.run({name: values[rows] for name, values in part.arrays.items()})
+                run = finger.run({name: values[rows] for name, values in part.arrays.items()}, terms=True)
             except native.NativeError as refused:
                 raise InputError(f"{part.source}: {refused}") from None
             pieces.append(terms_of(part.time[rows], run["contact_terms"], part.counted[rows]))
@@ -90,10 +89,9 @@ def _without_contact(data: Data, parts: Sequence[FreePart]) -> dict[str, Any]:
 
 
 def motors_of(parts: Sequence[FreePart]) -> dict[str, bool]:
-    """Return the key that makes bounds of measured angles use the tendon positions, if all parts have them."""
-    measured = parts[0].kinematics != KinematicsSource.TENDON_POSITIONS
+    """Return the key that makes bounds use the tendon positions, if all parts have them."""
     known = all(np.isfinite(part.arrays.get("tendon_position", np.nan)).all() for part in parts)
-    return {"watches_motors": True} if measured and known else {}
+    return {"watches_motors": True} if known else {}
 
 
 def bands_of(numbers: Numbers, digits: int = 4) -> list[dict[str, list[float]]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tendonfmu.detect.learning import SURE, WITHIN
 from tendonfmu.detect.tuning import ContactTuning
-from tendonfmu.files import counted, finite
+from tendonfmu.files import finite
 from tendonfmu.statistics import intervals
 
 FORMAT = "tendonfmu-tune-2"
@@ -51,11 +51,10 @@ def sentence(report: Mapping[str, Any]) -> str:
     long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.2g} min"
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
     largest = int(np.argmax(pushes["torque"]))
-    asked = counted(report["false_alarms_per_hour"], "alarm")
     return (
-        f"At most {asked} an hour were asked for; {alarms} in {long} of motion that was kept out. Pushes of more than "
-        f"{1e3 * pushes['torque'][largest]:.2g} mN·m at {report['joints'][largest]} are found within "
-        f"{1e3 * pushes['within_s']:.0f} ms, nine of ten."
+        f"At most {report['false_alarms_per_hour']:g} alarms an hour were asked for; {alarms} in {long} of motion that "
+        f"was kept out. Pushes of more than {1e3 * pushes['torque'][largest]:.2g} mN·m at {report['joints'][largest]} "
+        f"are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
     )
 
 
