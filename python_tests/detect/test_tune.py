@@ -134,7 +134,7 @@ def test_pushes_of_that_size_are_found_within_60_ms_nine_of_ten() -> None:
     assert 0.85 <= found / 300 <= 0.99, found
 
 
-def test_a_cell_keeps_the_sample_farthest_from_its_reference() -> None:
+def test_a_cell_keeps_the_sample_with_the_largest_distance() -> None:
     """By joint and band alone, with its terms squared; samples that do not count are none."""
     draws = np.random.default_rng(5)
     time, values = np.arange(400) * 2.5e-3, draws.standard_normal((400, 2, 4, 8))
@@ -144,7 +144,7 @@ def test_a_cell_keeps_the_sample_farthest_from_its_reference() -> None:
     k = 7
     inside = np.flatnonzero((time >= terms.time[k] - 1e-9) & (time < terms.time[k] + 0.01 - 1e-9) & counted)
     for j, band in np.ndindex(2, 4):
-        row = inside[np.argmax(np.abs(values[inside, j, band, 0]))]
+        row = inside[np.argmax(np.abs(values[inside, j, band, 1]))]
         assert terms.distance[k, j, band] == pytest.approx(values[row, j, band, 0], rel=1e-6)
         np.testing.assert_allclose(terms.squares[k, j, band], values[row, j, band, 2:] ** 2, rtol=1e-5)
 

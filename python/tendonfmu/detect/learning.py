@@ -39,10 +39,10 @@ def weights_of(parts: Sequence[Terms]) -> Numbers:
     """Learn the weights [n, 4, 6] of the squared terms, each joint and band alone."""
     block = np.concatenate([np.floor(part.time / BLOCK) + 1e9 * k for k, part in enumerate(parts)])
     first = begins(block)
-    distance, squares = (np.concatenate([getattr(part, name) for part in parts]) for name in ("distance", "squares"))
+    level, squares = (np.concatenate([getattr(part, name) for part in parts]) for name in ("level", "squares"))
     weights = np.zeros(squares.shape[1:])
     for j, k in np.ndindex(*weights.shape[:2]):
-        y, z = distance[:, j, k].astype(float) ** 2, squares[:, j, k].astype(float)
+        y, z = level[:, j, k].astype(float) ** 2, squares[:, j, k].astype(float)
         few = slice(None, None, max(1, len(y) // _MOST))
         weights[j, k] = gamma_weights(y[few], z[few])
         for _ in range(ROUNDS):

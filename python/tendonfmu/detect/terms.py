@@ -17,7 +17,7 @@ from tendonfmu.model import native
 NAMES = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
 AVERAGED = np.array([0.004, 0.02, 0.06, 0.5])  # s, A of the bands
 COMPARED = np.array([0.05, 0.3, 1.0, 10.0])  # s, M
-CELL = 0.01  # s, of which only the sample farthest from its reference counts, by joint and band
+CELL = 0.01  # s, of which only the sample with the largest distance counts, by joint and band
 _NEVER = 1e6  # N·m, a noise that no residual exceeds
 _BLOCK = 50_000  # samples at once: the terms are 32 numbers for each joint
 _KEPT = ("residual", "compensated_torque_std")
@@ -43,7 +43,7 @@ def terms_of(time: Numbers, values: Numbers, counted: Flags) -> Terms:
         empty = np.zeros((0, *values.shape[1:3]), dtype=np.float32)
         return Terms(empty, empty, np.zeros((*empty.shape, len(NAMES)), dtype=np.float32), np.zeros(0))
     first = begins(np.floor(time[rows] / CELL + 1e-6))
-    farthest = rows[largest(np.abs(values[rows, :, :, 0]), first)]
+    farthest = rows[largest(np.abs(values[rows, :, :, 1]), first)]
     picked = np.take_along_axis(values, farthest[..., None], axis=0).astype(np.float32)
     return Terms(picked[..., 0], picked[..., 1], picked[..., 2:] ** 2, time[rows[first]])
 
