@@ -15,7 +15,8 @@ from tendonfmu.model import Finger, native, number_of
 from tendonfmu.options import KinematicsSource
 from tendonfmu.recordings import Held, Recording, flagged_rows, prepare
 
-SETTLING = 2.0  # s after the start, while the bias forgets its initial variance; not counted
+SETTLING = 2.0  # s after the first motion, before which the state of the friction is not known; not counted
+SLOW = 0.05  # of a joint's usual largest speed, from which on it moves
 STILL = 0.01  # least share of the time with motion; less says nothing about friction
 
 
@@ -29,6 +30,7 @@ class FreePart:
     counted: Flags  # [N] samples after settling, without a stuck sensor
     seconds: Numbers  # [N] time that each sample stands for (s)
     kinematics: KinematicsSource = KinematicsSource.TENDON_POSITIONS
+    moves: Flags | None = None  # [N] whether a joint moves; None: always
 
     @property
     def time(self) -> Numbers:
@@ -47,9 +49,17 @@ class FreePart:
             self,
             arrays={name: values[rows] for name, values in self.arrays.items()},
             mean_force=self.mean_force[rows],
-            counted=self.counted[rows] & (time - time[0] >= SETTLING),
+            counted=self.counted[rows] & _settled(time, None if self.moves is None else self.moves[rows]),
             seconds=self.seconds[rows],
+            moves=None if self.moves is None else self.moves[rows],
         )
+
+
+def _settled(time: Numbers, moves: Flags | None) -> Flags:
+    """Return [N] the samples from `SETTLING` after the first motion on."""
+    if moves is not None and not moves.any():
+        return np.zeros(len(time), dtype=bool)
+    return np.asarray(time - time[0 if moves is None else int(np.argmax(moves))] >= SETTLING)
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
@@ -60,16 +70,16 @@ def free_parts(finger: Finger, recording: Recording, kinematics: int) -> tuple[l
     contact = touched(recording)
     groups = {name: values for name, values in recording.groups.items() if name != "external_torque"}
     prepared = prepare(finger, replace(recording, groups=groups, contact=None), kinematics, Held())
-    _refuse_stillness(finger, recording, prepared.model.joint_speed)
+    moves = _moves(finger, recording, np.nan_to_num(np.abs(prepared.model.joint_speed)))
     force = np.abs(groups["tendon_force"]).mean(axis=1)
     parts = []
     for rows in (piece for part in prepared.parts for piece in _without(contact, part)):
         time = recording.time[rows]
-        settled = time - time[0] >= SETTLING
-        arrays = prepared.arrays(rows)
-        counted = settled & ~prepared.faulty[rows]
+        counted = _settled(time, moves[rows]) & ~prepared.faulty[rows]
         seconds, source = sample_seconds(time), KinematicsSource(kinematics)
-        parts.append(FreePart(str(recording.path), arrays, force[rows], counted, seconds, source))
+        parts.append(
+            FreePart(str(recording.path), prepared.arrays(rows), force[rows], counted, seconds, source, moves[rows])
+        )
     sentences = [sentence.replace("are fitted as", "count as") for sentence in prepared.warnings]
     if contact.any():
         lost = float(sample_seconds(recording.time)[contact].sum())
@@ -83,14 +93,16 @@ def _without(contact: Flags, part: slice) -> Iterator[slice]:
         yield slice(part.start + begin, part.start + end)
 
 
-def _refuse_stillness(finger: Finger, recording: Recording, speed: Numbers) -> None:
+def _moves(finger: Finger, recording: Recording, speed: Numbers) -> Flags:
+    """Return [N] whether a joint moves. Raises InputError for a recording that stands still."""
     least = number_of(finger.data, "velocity_threshold.joint")
-    share = float(np.nanmean((np.abs(speed) > least).any(axis=1)))
+    share = float((speed > least).any(axis=1).mean())
     if share < STILL:
         raise InputError(
             f"{recording.path}: no motion: no joint is faster than velocity_threshold.joint = {least:g} rad/s in "
             f"{100 * (1 - share):.1f} % of the time; expected free motion with stops and reversals of all joints"
         )
+    return np.asarray((speed > np.maximum(least, SLOW * np.quantile(speed, 0.95, axis=0))).any(axis=1))
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -117,7 +129,7 @@ class Alarms:
     hours: float  # counted time
     longest: float  # s; 0 without alarms
     seconds: float  # in alarm, of all time (s)
-    at_start: int  # within `SETTLING`, which do not count
+    at_start: int  # before `SETTLING`, which do not count
 
 
 def count_alarms(data: Data, parts: Sequence[FreePart]) -> list[Alarms]:
@@ -128,7 +140,7 @@ def count_alarms(data: Data, parts: Sequence[FreePart]) -> list[Alarms]:
         spans = stretches(part.time, contact)
         length = part.time[spans[:, 1]] + part.seconds[spans[:, 1]] - part.time[spans[:, 0]]
         counted = part.counted[spans[:, 0]]
-        early = part.time[spans[:, 0]] - part.time[0] < SETTLING
+        early = spans[:, 0] < (np.argmax(part.counted) if part.counted.any() else len(part.counted))
         found.append(
             Alarms(
                 source=part.source,

@@ -262,8 +262,8 @@ class ContactTuning(Configured):
         start = sum(part.at_start for part in self.kept_out_.parts)
         if start:
             self.warnings_.append(
-                f"{counted(start, 'alarm')} within 2 s of a start {are(start)} not counted: bias.initial_variance is "
-                "too small"
+                f"{counted(start, 'alarm')} before 2 s of motion {are(start)} not counted: how friction stands there "
+                "is not known"
             )
         wide = [self._start.joint_names[j] for j in np.flatnonzero(self.deviation_.too_wide)]
         if wide:
@@ -290,7 +290,7 @@ def groups_of(parts: Sequence[FreePart]) -> list[list[FreePart]]:
     groups = [[part for part in group if part.counted.any()] for group in groups]
     groups = [group for group in groups if group]
     if len(groups) < 2:
-        raise NotEnough("no free motion after the first 2 s of a recording; expected minutes of it")
+        raise NotEnough("no free motion after the first 2 s of motion of a recording; expected minutes of it")
     return groups
 
 
