@@ -267,7 +267,8 @@ def test_the_rule_of_the_paper_is_tuned_for_the_same_rate() -> None:
     with pytest.warns(TuneWarning):
         contact = tuning.tune([FREE, FREE_X4]).description_.data["contact"]
     assert contact["method"] == "paper" and "bands" not in contact
-    assert all(0 < each < 1.0 for each in contact["threshold"]) and min(contact["threshold_per_force"]) >= 0
+    at_10_newton = np.array(contact["threshold"]) + 10.0 * np.array(contact["threshold_per_force"])
+    assert min(contact["threshold"]) >= 0 and (at_10_newton > 0).all() and (at_10_newton < 1.0).all()
     assert tuning.kept_out_.alarms <= 3 * WISHED * tuning.hours_
 
 
@@ -279,7 +280,7 @@ def test_little_motion_of_one_pretension_is_warned_of(call: Call) -> None:
     assert "show a rate of 6 false alarms an hour only by extrapolation; record 29." in answer.err
     held = report["holds_for"]
     assert 9 < held["lowest_force"] < held["highest_force"] < 11 and len(report["pretensions"]) == 1
-    assert "one pretension, 10" in answer.err and report["sentence"] in answer.err
+    assert "one pretension, " in answer.err and "record several pretensions" in answer.err
 
 
 @pytest.fixture(scope="module")
@@ -318,7 +319,7 @@ def test_contact_that_a_label_or_a_reference_sensor_shows_is_left_out(
         (still, (), ("no motion", "velocity_threshold.joint = 0.01 rad/s")),
         (dict, ("--method", "cusum"), ("method: 'cusum'", "bands or paper")),
         (dict, ("--kinematics", "3"), ("no column joint_velocity[1]",)),
-        (dict, ("--false-alarms-per-hour", "0"), ("false_alarms_per_hour",)),
+        (dict, ("--false-alarms-per-hour", "0"), ("--false-alarms-per-hour",)),
     ],
 )
 def test_bad_input_is_named_and_leaves_nothing(

@@ -65,9 +65,9 @@ def test_tune(frame: pd.DataFrame, recording_file: Path, tmp_path: Path, call: C
     assert answer.status == 0, answer
     found = tf.tune(FINGER, frame)
     assert found.finger.to_dict()["contact"] == tf.read_finger(tmp_path / "t.json").to_dict()["contact"]
-    assert found.attained_rate == json.loads((tmp_path / "r.json").read_text())["tuned_for_per_hour"] > 6.0
-    with pytest.raises(tf.InputError, match="min"):
-        tf.tune(FINGER, frame, strict=True)
+    assert found.attained_rate == json.loads((tmp_path / "r.json").read_text())["kept_out"]["per_hour"]
+    with pytest.raises(tf.InputError, match="expected minutes"):
+        tf.tune(FINGER, frame.iloc[:600])
 
 
 def test_score(tmp_path: Path, call: Call) -> None:

@@ -57,7 +57,7 @@ def test_a_function_has_the_options_of_its_command(
         (FrictionFit, {"sides": "both"}, "sides: 'both'; expected given, symmetric, asymmetric"),
         (FrictionFit, {"parameter_drift": 2.0}, "drift: 2.0; expected a number, 0 to 1"),
         (tf.fit, {"progress": True}, "progress: True; expected a function or None"),
-        (tf.tune, {"strict": 1}, "strict: 1; expected True or False"),
+        (tf.tune, {"method": "cusum"}, "method: 'cusum'; expected bands or paper"),
         (tf.diagnose, {"seed": "a"}, "seed: 'a'; expected a whole number, 0 to 9007199254740992"),
         (tf.score, {"labels": 1}, "labels: 1; expected the name of a column or None"),
         (tf.Runner, {"kinematics": 1.0}, "kinematics: 1.0; expected a whole number, 1 to 3"),

@@ -75,7 +75,6 @@ def calibrate(
     previous: str | os.PathLike[str] | None = None,
     folder: str | os.PathLike[str] | None = None,
     false_alarms_per_hour: float = 6.0,
-    confidence: float = 0.9,
     kinematics: int = 1,
     seed: int = 0,
     jobs: int = 1,
@@ -94,8 +93,8 @@ def calibrate(
         Description or fit report of an earlier calibration, as the prior (`--from`), for little data.
     folder
         Folder for the results of the steps: a repeated call goes on there. None: nothing is kept.
-    false_alarms_per_hour, confidence
-        False alarms that are allowed, and the probability that the rate is at most that.
+    false_alarms_per_hour
+        Rate of false alarms in other free motion of the same finger, at most (1/h).
     kinematics
         1 tendon positions, 2 measured joint positions, 3 joint positions and velocities.
     seed, jobs
