@@ -47,7 +47,7 @@ from tendonfmu.model import Finger, description_text, finger_from_data, read_fin
 from tendonfmu.options import Configured, Options, TuneOptions
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
-RECORDINGS = 3  # from so many on, whole recordings are left out; else quarters of the time
+RECORDINGS, MOST = 3, 10  # from so many on, whole recordings are left out, of more several at once; else quarters
 QUARTERS = 4
 EXPECTED = 3.0  # alarms at the rate asked for, below which the motion is too short to show it
 _DIGITS = 6
@@ -283,7 +283,7 @@ def groups_of(parts: Sequence[FreePart]) -> list[list[FreePart]]:
     """Divide free motion: each recording is a group, or, of few recordings, each quarter of their time."""
     sources = list(dict.fromkeys(part.source for part in parts))
     of_source = [[part for part in parts if part.source == source] for source in sources]
-    groups = of_source
+    groups = [[part for recording in of_source[k::MOST] for part in recording] for k in range(MOST)]
     if len(sources) < RECORDINGS:
         quarters = [_quarters(recording) for recording in of_source]
         groups = [[part for recording in quarters for part in recording[k]] for k in range(QUARTERS)]
