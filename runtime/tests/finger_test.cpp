@@ -165,7 +165,7 @@ TEST_P(EveryFinger, RefusesBadSamplesByNameAndGoesOnAsIfTheyHadNotBeen) {
     }
     Motion broken = motion();
     broken.position[100 * tendons + 2] = broken.angle[100 * joints + 1] = bad;
-    const bool by_tendons = source() == 1 || std::get<0>(GetParam()) == test_finger::watching;
+    const bool by_tendons = source() == 1 || tendonfmu_watches_motors(finger);
     refused(0.1, broken.row(100), by_tendons ? "tendon_position[3]" : "joint_position[2]");
   }
   for (const double time : {nan, inf, 0.0989, -1.0}) {
