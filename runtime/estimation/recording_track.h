@@ -36,8 +36,8 @@ class free_finger {
   std::vector<double> free_; /* numbers with thresholds that nothing reaches */
 };
 
-/* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction. The
- * states kept with a recording, which are those of the start, are then found anew. */
+/* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction, or of
+ * friction with a memory. The states kept with a recording, which are those of the start, are then found anew. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
 /* The finger's state at the beginning of each segment of a recording. */

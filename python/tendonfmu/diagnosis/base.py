@@ -54,7 +54,7 @@ class Base:
         """Return the base fitted without some blocks [B]."""
         samples = self.samples.without(out)
         nominal, model = (
-            refitted(replace(each, slopes={}), samples, self.settings) for each in (self.nominal, self.model)
+            refitted(each, samples, self.settings) for each in (self.nominal, self.model)
         )
         return replace(self, samples=samples, nominal=nominal, model=model)
 
@@ -67,7 +67,6 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
         settings,
         given=model.given,
         fixed=model.fixed,
-        known=model.slopes,
         rough=rough,
     )
 
