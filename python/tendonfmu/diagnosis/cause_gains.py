@@ -132,8 +132,7 @@ class _Bench:
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
             self._full, self.nominal = (
-                refitted(model, self._samples, self._settings)
-                for model in (self._full, self.nominal)
+                refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
             )
         self._training = training
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)

@@ -1,7 +1,7 @@
 """Derivatives of what a finger leaves by the numbers of its friction laws and covers, of all of them in one run.
 
 The core takes the share of its limit that friction with a memory holds as constant, which is exact for what slips and
-within some per cent for what does not. Numbers of the memory and of other extensions have none here.
+near for what does not. Numbers of the memory and of other extensions have none here.
 """
 
 from __future__ import annotations
