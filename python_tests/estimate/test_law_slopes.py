@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_core_runs import REMEMBERING, finger
 
 from fit_finger import made_recording
 from tendonfmu.estimate.core_runs import CoreRuns, Direction
@@ -16,10 +17,10 @@ from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import Held, prepare
-from test_core_runs import REMEMBERING, finger
 
 STIFF = {"effect": "presliding", "stiffness": 2e4}
 SOFT = {"effect": "presliding", "displacement": 2.0, "share": 0.5}
+HELD = 0.5  # of a Stribeck effect: its limit changes while friction is held
 CORDS = {"effect": "cord_stretch", "stiffness": 2e4}
 
 
@@ -27,11 +28,11 @@ CORDS = {"effect": "cord_stretch", "stiffness": 2e4}
     ("rows", "most"),
     [
         ((), 0.15),  # jumps: in the middle of a block
-        ((REMEMBERING,), 0.25),  # Stribeck's drop changes while friction is held; Coulomb friction: 0.03
-        ((REMEMBERING, SOFT), 0.3),
-        ((STIFF,), 0.4),
+        ((REMEMBERING,), 0.2),
+        ((REMEMBERING, SOFT), 0.25),
+        ((STIFF,), 0.2),
         (({**STIFF, "relaxation_time": 0.01},), 0.1),
-        (({**STIFF, "relaxation_time": 0.01}, CORDS), 0.25),
+        (({**STIFF, "relaxation_time": 0.01}, CORDS), 0.2),
     ],
 )
 def test_they_are_the_differences_of_runs(rows: tuple[dict[str, Any], ...], most: float) -> None:
@@ -54,5 +55,6 @@ def test_they_are_the_differences_of_runs(rows: tuple[dict[str, Any], ...], most
         own = drift.without(slopes[:, :, [k]] * unknown.scale)[:, :, 0]
         if np.abs(wanted).max() > 1e-5:
             compared += 1
-            assert np.sum((own - wanted) ** 2) < most**2 * np.sum(wanted**2), unknown.name
+            least = HELD if rows and unknown.role in ("drop", "rate") else most
+            assert np.sum((own - wanted) ** 2) < least**2 * np.sum(wanted**2), unknown.name
     assert compared > 8
