@@ -28,8 +28,8 @@ CORDS = {"effect": "cord_stretch", "stiffness": 2e4}
     ("rows", "most"),
     [
         ((), 0.15),  # jumps: in the middle of a block
-        ((REMEMBERING,), 0.05),
-        ((REMEMBERING, SOFT), 0.1),
+        ((REMEMBERING,), 0.1),
+        ((REMEMBERING, SOFT), 0.15),
         ((STIFF,), 0.2),
         (({**STIFF, "relaxation_time": 0.01},), 0.1),
         (({**STIFF, "relaxation_time": 0.01}, CORDS), 0.2),
