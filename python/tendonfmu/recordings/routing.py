@@ -27,6 +27,7 @@ from tendonfmu.recordings.smoothing import zero_phase
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
+MOST = 60_000  # samples of a recording that are looked at: what is not noise is the same in its neighbours
 FEWEST_BLOCKS = 8
 SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
@@ -272,19 +273,20 @@ def _samples(recording: Recording, side: int) -> _Samples | None:
         noise = {name: white_noise(time, groups[name]) ** 2 for name in ("tendon_force", "joint_position")}
     except InputError:  # gaps everywhere
         return None
+    sound = _changing(time, groups["tendon_force"]) & _changing(time, groups["tendon_position"])
+    sound &= np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None]
+    rows = slice(None, None, max(1, len(time) // MOST))
     return _Samples(
-        groups["tendon_position"],
-        groups["tendon_force"],
-        groups["joint_position"],
-        smooth_speeds(time, groups["tendon_position"]),
-        smooth_speeds(time, groups["tendon_force"]),
+        groups["tendon_position"][rows],
+        groups["tendon_force"][rows],
+        groups["joint_position"][rows],
+        smooth_speeds(time, groups["tendon_position"])[rows],
+        smooth_speeds(time, groups["tendon_force"])[rows],
         noise["tendon_force"],
         noise["joint_position"],
-        np.floor((time - time[0]) / BLOCK).astype(np.int64),
-        np.full(len(time), side),
-        _changing(time, groups["tendon_force"])
-        & _changing(time, groups["tendon_position"])
-        & np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None],
+        np.floor((time[rows] - time[0]) / BLOCK).astype(np.int64),
+        np.full(len(time[rows]), side),
+        sound[rows],
     )
 
 
