@@ -76,7 +76,7 @@ class CoreRuns:
         threads: int = 0,
     ) -> None:
         """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
-        self.data, self._rate, self._threads = data, rate, threads
+        self.data, self._image, self._rate, self._threads = data, _image(data), rate, threads
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
@@ -101,7 +101,7 @@ class CoreRuns:
     def of(self, data: Data) -> CoreRuns:
         """Return runs of another description of the same finger over the same samples."""
         other = object.__new__(CoreRuns)
-        other.__dict__ = {**self.__dict__, "data": data}
+        other.__dict__ = {**self.__dict__, "data": data, "_image": _image(data), "_instances": _Instances()}
         return other
 
     def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
@@ -121,8 +121,7 @@ class CoreRuns:
         ndarray
             [B, n] (N·m).
         """
-        image = _image(self.data)
-        parts = self._pool.map(lambda each: self._left(image, values or {}, each), self.stretches)
+        parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
         return np.concatenate(list(parts)) + self.added
 
     def columns(self, directions: Sequence[Direction], values: Mapping[str, float] | None = None) -> Numbers:
@@ -142,7 +141,7 @@ class CoreRuns:
         """
         at = dict(values or {})
         base = np.zeros(()) if all(direction.central for direction in directions) else self.residual(at)
-        images = [_image(self.data if each.data is None else each.data) for each in directions]
+        images = [self._image if each.data is None else _image(each.data) for each in directions]
         columns = np.empty((self.grid.blocks, self.joints, len(directions)))
 
         def run(k: int, sign: float) -> Numbers:
