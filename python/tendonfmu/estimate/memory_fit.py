@@ -102,6 +102,8 @@ class MemoryProblem:
         self._laws = LawSlopes(structure, runs)
         self._by_runs = np.array([unknown.path.startswith("extensions[") for unknown in unknowns])
         self.mean, self.known = np.zeros(len(log)), np.zeros((len(log), len(log)))  # u_0 and P of the prior
+        # directions, coordinates and derivatives of the last `linearised`: weights change without them
+        self._last: tuple[Numbers, Numbers, Numbers] | None = None
 
     def values(self, u: Numbers) -> dict[str, float]:
         """Return the numbers of the description by path."""
@@ -142,7 +144,9 @@ class MemoryProblem:
 
     def linearised(self, state: State) -> Linearised:
         """Return the derivatives by the directions of `span` at a state."""
-        columns = self.drift.without(self._columns(state.u, self.span))
+        if self._last is None or self._last[0] is not self.span or not np.array_equal(self._last[1], state.u):
+            self._last = self.span, state.u, self.drift.without(self._columns(state.u, self.span))
+        columns = self._last[2]
         products = np.zeros((columns.shape[2],) * 2)
         for j, share in enumerate(self.blocks / self.spread):
             products += share * columns[:, j].T @ columns[:, j]
@@ -198,7 +202,7 @@ class MemoryProblem:
     def over(self, runs: CoreRuns) -> MemoryProblem:
         """Return the problem over other runs of the same samples."""
         other = copy(self)
-        other.runs, other._laws = runs, LawSlopes(self._structure, runs)
+        other.runs, other._laws, other._last = runs, LawSlopes(self._structure, runs), None
         return other
 
     def slopes(self, state: State) -> Numbers:
