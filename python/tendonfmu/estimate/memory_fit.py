@@ -262,7 +262,7 @@ def minimise(
     *,
     rough: bool = False,
 ) -> Minimum:
-    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
+    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors (rms).
 
     Derivatives are computed anew when steps with Broyden's update (Math. Comp. 19, 1965) no longer go down well. A
     rough end has updated ones.
@@ -279,7 +279,7 @@ def minimise(
         tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
         expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < least
+        is_small = step @ matrix @ step < tolerance**2 * len(step) or abs(fall) < least
         if fall > 0.0:
             linearised = problem.moved_on(linearised, state, step, tried)
             state, damping = tried, max(damping / 5.0, DAMPING[1])
