@@ -41,7 +41,8 @@ from tendonfmu.statistics import MEMORY
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
-TOLERANCE = 0.3  # standard errors: a shorter step is the last one
+LASTING = 0.2  # s, for which an error of the model lasts, about
+TOLERANCE = 0.05  # standard errors (rms): a shorter step is the last one, and so few blocks have large ones
 TINY = 1e-9  # expected magnitude of a number that is 0, which stays there
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
@@ -121,7 +122,7 @@ def _problem(structure: Structure, samples: Samples) -> MemoryProblem:
     """Return a fit of a structure, whose blocks are worth fewer independent ones."""
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
     problem = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
-    problem.blocks = problem.blocks / MEMORY
+    problem.blocks = problem.blocks * (samples.grid.step / LASTING / MEMORY)
     problem.mean, problem.known = guess_prior(problem)
     return problem
 
