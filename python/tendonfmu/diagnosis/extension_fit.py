@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
+from tendonfmu.diagnosis.cause import with_error
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.effects.description_edit import sides_at
 from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
@@ -39,7 +40,7 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import MEMORY, bounded
+from tendonfmu.statistics import MEMORY, Interval, bounded
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
@@ -102,11 +103,8 @@ def fit_numbers(
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
-    if fixed:
-        settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
-    problem = _Problem(structure, samples)
-    fit = problem.fit
+    problem = _problem(data, origin, fixed, samples, settings)
+    structure, fit = problem.structure, problem.fit
     state, columns = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
     numbers = fit.estimator.values(
         np.clip(fit.scale.unknowns(state.u), *(fit.scale.unknowns(end) for end in (fit.lower, fit.upper)))
@@ -127,6 +125,7 @@ class _Problem:
 
     def __init__(self, structure: Structure, samples: Samples) -> None:
         estimator = Estimator(structure.start.image, structure.group, structure.scale)
+        self.structure = structure
         self.fit = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
         self.fit.blocks = self.fit.blocks / MEMORY
         self.fit.mean, self.fit.known = guess_prior(self.fit)
@@ -159,6 +158,37 @@ class _Problem:
         matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
         low, high = np.maximum(fit.lower - state.u, -FARTHEST), np.minimum(fit.upper - state.u, FARTHEST)
         return np.asarray(bounded(matrix[None], score[None], low, high)[0])
+
+    def intervals(self) -> dict[str, Interval]:
+        """Return the 95 % intervals of the numbers at the start, by path.
+
+        The error is the larger one of what lasting errors of the model allow and what blocks of time differ by.
+        """
+        fit = self.fit
+        state = fit.state(np.clip(fit.scale.coordinates(fit.estimator.start), fit.lower, fit.upper))
+        linearised, values = fit.linearised(state), fit.values(state.u)
+        scores = fit.scores(state, linearised)[0] * fit.scale.slopes(fit.scale.unknowns(state.u))
+        lasting = np.linalg.pinv(linearised.information + fit.known)
+        scattered = scores @ lasting
+        moves = [fit.values(state.u + STEP * way) for way in np.eye(len(state.u))]
+
+        def interval(path: str) -> Interval:
+            slope = np.array([moved[path] - values[path] for moved in moves]) / STEP
+            error = np.sqrt(max(float(slope @ lasting @ slope), float(np.sum((scattered @ slope) ** 2))))
+            return with_error(values[path], float(error))
+
+        return {path: interval(path) for path in values}
+
+
+def intervals_of(model: FittedModel, samples: Samples, settings: FitSettings) -> dict[str, Interval]:
+    """Return the 95 % intervals of the numbers of a fitted model, by path."""
+    return _problem(model.data, model.given, model.fixed, samples, settings).intervals() if model.values else {}
+
+
+def _problem(data: Data, given: Data, fixed: tuple[str, ...], samples: Samples, settings: FitSettings) -> _Problem:
+    """Return the fit of a description's numbers; `given` says how large each may be."""
+    choice = replace(settings.choice, fix=(*settings.choice.fix, *fixed))
+    return _Problem(_with_scale(build_structure(finger_from_data(data, settings.path), choice), given), samples)
 
 
 def _minimised(problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool) -> tuple[State, Numbers]:
