@@ -33,14 +33,22 @@ def test_found_late_is_found_and_its_delay_is_that_of_the_first_alarm() -> None:
     assert math.isnan(score.events[1].delay) and score.events[1].silent
 
 
-@pytest.mark.parametrize(("until", "found"), [(1.80, 1), (1.81, 0), (2.0, 0), (3.0, 0)])
+@pytest.mark.parametrize(("until", "found"), [(1.78, 1), (1.79, 0), (2.0, 0), (3.0, 0)])
 def test_an_alarm_less_than_200_ms_before_has_found_nothing(until: float, found: int) -> None:
-    """Its last sample is 10 ms before `until`; the one 200 ms before the onset counts."""
+    """Its last sample is 10 ms before `until`; the one 220 ms before the onset counts."""
     score = score_detection(TIME, flags((2.0, 3.0)), flags((1.0, until), (2.5, 2.6)))
     assert score.found == found
     assert score.events[0].silent == bool(found)
     assert summarise(score).masked == 1 - found
     assert score.false_alarms == [(pytest.approx(1.0), pytest.approx(until - 0.01))]
+
+
+@pytest.mark.parametrize(("begin", "found"), [(1.97, 0), (1.98, 1), (1.99, 1)])
+def test_an_alarm_up_to_20_ms_before_the_label_is_of_the_event(begin: float, found: int) -> None:
+    """A label begins at some force; what is felt below it is felt."""
+    score = score_detection(TIME, flags((2.0, 3.0)), flags((begin, 2.5)))
+    assert (score.found, len(score.false_alarms)) == (found, 1 - found)
+    assert score.free_seconds == pytest.approx(8.9)
 
 
 @pytest.mark.parametrize(("again", "events"), [(3.08, 1), (3.09, 2), (3.5, 2)])

@@ -196,10 +196,8 @@ def test_the_command_writes_what_has_changed(call: Call, tmp_path: Path) -> None
     jsonschema.validate(report, SCHEMA)
     assert report["kind"] == "change" and report["references"] == ["then.parquet"]
     first = report["causes"][0]
-    # at one joint the friction of a tendon that does not scale with its force is the joint's own by another name
-    assert first["effect"] in ("joint_friction", "preload_friction") and first["number"] == "coulomb"
-    if first["effect"] == "joint_friction":
-        assert first["now"] / first["reference"] == pytest.approx(1.3, abs=0.05)
+    assert (first["effect"], first["number"]) == ("joint_friction", "coulomb")
+    assert first["now"] / first["reference"] == pytest.approx(1.3, abs=0.05)
     assert first["now_interval"][0] < first["now"] < first["now_interval"][1]
     assert first["change"]["value"] == pytest.approx(first["now"] - first["reference"])
     for name in ("nominal.json", "extended.json"):

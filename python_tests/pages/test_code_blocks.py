@@ -58,7 +58,6 @@ QUICK = (
     Page(
         "reference/finger_description",
         given={"finger.json": FINGER, "monday.parquet": TRAINING},
-        outcome=("filtered.json",),
     ),
     Page("reference/commands/run", given={"finger.json": FINGER, "rec.parquet": UNSEEN}, outcome=("page.html",)),
 )

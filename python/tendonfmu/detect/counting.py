@@ -20,7 +20,8 @@ from tendonfmu.recordings import gaps
 Spans = NDArray[np.int64]
 
 MERGED = 0.1  # s; labelled stretches, or alarms, closer than this are one
-SILENT = 0.2  # s before the onset of a found event that must have no sample of contact
+LEAD = 0.02  # s before the onset in which an alarm is the event's: who labels, labels from some force on
+SILENT = 0.2  # s before that in which a found event must have no sample of contact
 GRACE = 0.1  # s after an event in which an alarm is not false and time is not free
 AFTER = 2.0  # s after an event in which the hand may still feel what the touch did to its friction
 BLOCK = 2.0  # s of free time; longer than the correlation of residuals and alarms in free motion
@@ -47,7 +48,7 @@ class Event:
     onset: float  # first and last labelled sample
     end: float
     silent: bool  # whether no sample in the `SILENT` time before has contact
-    alarm: float = math.nan  # first sample of the first alarm that begins in [onset, end]
+    alarm: float = math.nan  # first sample of the first alarm that begins in [onset - LEAD, end]
     held: bool = False  # whether that alarm lasts until less than `MERGED` before the end
     held_share: float = math.nan  # share of the time from alarm to end that is contact
     overhang: float = 0.0  # free time in alarms that began in the event or its grace (s)
@@ -65,7 +66,7 @@ class Event:
 
     @property
     def delay(self) -> float:
-        """Time from onset to alarm (s); NaN unless found."""
+        """Time from onset to alarm (s), at least -LEAD; NaN unless found."""
         return self.alarm - self.onset if self.found else math.nan
 
 
@@ -141,7 +142,8 @@ def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals 
     hanging = np.concatenate([[0.0], np.cumsum(seconds * (free & alarm))])
     starts = alarms[:, 0]
     events = [_event(time, alarm, alarms, span, hanging, given) for span in spans]
-    false = alarms[free[starts]]
+    early = np.array([_ahead(time, first, LEAD) <= at < first for at in starts for first, _ in spans], dtype=bool)
+    false = alarms[free[starts] & ~early.reshape(len(starts), len(spans)).any(axis=1)]
     return DetectionScore(
         events=events,
         false_alarms=[(float(time[begin]), float(time[end])) for begin, end in false],
@@ -179,17 +181,22 @@ def _free(time: Numbers, spans: Spans) -> Flags:
     return free
 
 
+def _ahead(time: Numbers, first: int, seconds: float) -> int:
+    """Return the first sample at most so many seconds before sample `first`."""
+    return int(np.searchsorted(time, time[first] - seconds - _EQUAL))
+
+
 def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Numbers, given: Signals) -> Event:
     """Build an event. `hanging` is [N + 1] the free time in alarm before each sample (s)."""
     first, last = int(span[0]), int(span[1])
-    before = int(np.searchsorted(time, time[first] - SILENT - _EQUAL))
+    before, lead = (_ahead(time, first, seconds) for seconds in (LEAD + SILENT, LEAD))
     grace = int(np.searchsorted(time, time[last] + GRACE + _EQUAL))
-    begun = alarms[(alarms[:, 0] >= first) & (alarms[:, 0] < grace)]
+    begun = alarms[(alarms[:, 0] >= lead) & (alarms[:, 0] < grace)]
     event = Event(
         onset=float(time[first]),
         end=float(time[last]),
-        silent=not alarm[before:first].any(),
-        overhang=float(sum(hanging[end + 1] - hanging[begin] for begin, end in begun)),
+        silent=not alarm[before:lead].any(),
+        overhang=float(sum(hanging[end + 1] - hanging[max(begin, first)] for begin, end in begun)),
         **_load(time, first, last, given.external),
     )
     inside = begun[begun[:, 0] <= last]

@@ -37,6 +37,7 @@ from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Grams, Interval, Products
 
 MOST_CHANGES = 4
+AS_MUCH = 0.98  # of what the best takes off: what is linearised tells no smaller difference
 STEPS = 3  # of Newton's method, with the derivatives of the reference
 
 
@@ -138,10 +139,14 @@ class ChangeSearch(CauseSearch):
             return None
         best = self.selection.refined(ranked[0].effect)
         if best.terms:  # a number that the description has takes precedence over a term that it lacks
-            present = (cause for cause in ranked if not cause.terms)
-            same = next((cause for cause in present if is_alike(cause.unseen, best.unseen)), None)
-            best = best if same is None else self.selection.refined(same.effect)
+            present = next((cause for cause in ranked if not cause.terms), None)
+            if present is not None and self._explains_as_much(present, best):
+                best = self.selection.refined(present.effect)
         return self._at_best_place(best) if len(self.new_recordings) > 1 else best
+
+    def _explains_as_much(self, cause: Cause, best: Cause) -> bool:
+        least = AS_MUCH * (self.selection.base - best.unseen).sum()
+        return is_alike(cause.unseen, best.unseen) or (self.selection.base - cause.unseen).sum() >= least
 
     def _at_best_place(self, best: Cause) -> Cause:
         """Return, of places that are nearly as good, the one with the smallest error."""

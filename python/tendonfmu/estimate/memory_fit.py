@@ -30,7 +30,6 @@ FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no 
 LEAST_SPREAD = 0.04  # of the mean variance over the joints
 WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
 RIGID = 1e12  # N/m
-LASTING = 0.2  # s, for which an error of the model lasts, about, until it is measured
 LEAST_FALL = 3e-4  # of the cost, for each joint and effective block, in rough fits
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
@@ -93,7 +92,7 @@ class MemoryProblem:
         self.lower = np.where(log, np.maximum(low, -FARTHEST), low)
         self.upper = np.where(log, np.minimum(high, FARTHEST), high)
         self.span: Numbers = np.eye(len(log))  # [u, v] directions that a step may take, in coordinates
-        self.blocks = np.full(runs.joints, drift.used.sum() * runs.grid.step / LASTING)  # N_j: those that count
+        self.blocks = np.full(runs.joints, float(drift.used.sum()))  # N_j: those that count, all until it is measured
         self.spread = np.ones(runs.joints)  # p_j
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30

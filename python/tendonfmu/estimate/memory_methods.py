@@ -1,7 +1,7 @@
 """The method `batch` for a finger whose friction remembers: starts, weights, prior and uncertainty about `memory_fit`.
 
 1. From each start of the memory's numbers (`memory.starts`) a few steps on evenly spread windows of the recordings.
-2. The best is refined on all of them, with model errors that last for `LASTING`.
+2. The best is refined on all of them. A prior that held it back here would make the errors of a wrong model last.
 3. The residuals say how many independent blocks they are worth, and the prior is the one under which the data are most
    likely (`prior`). With both the better one is refined again.
 """
