@@ -3,12 +3,12 @@
 Every sample of a taut tendon satisfies x0 = zero + R q + f0/k, whatever friction, contact and weight are. A regression
 of x0 on q and f0 therefore gives the tendon's row of R, 1/k and its zero. Both sides are noisy: the noise of q and f0,
 measured around a smooth curve, is taken out of their moments, else large noise would make the numbers too small
-(W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). Behind edges and pulleys a cord bears less than f0, by a share
-of f0 that follows which way it moved last: a stop operator of the travel at each level, times f0, is a further column.
-The speeds of x0 and f0 are further columns, so that sensors
-that are read some milliseconds apart do no harm. The intervals are those of sums over blocks of 2 s, so that they hold
-for correlated residuals, too. Recordings of a reference are regressed together with those of now: arms, 1/k and zero
-are free in both, and what the equation lacks (curves) is shared, so that another load or range is no change.
+(W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
+that are read some milliseconds apart do no harm. Behind edges and pulleys a cord bears less than f0 and stretches less,
+by a share of f0 that follows which way it moved last: a stop operator of the travel at each level, times f0, is a
+further column. The intervals are those of sums over blocks of 2 s, so that they hold for correlated residuals, too.
+Recordings of a reference are regressed together with those of now: arms, 1/k and zero are free in both, and what the
+equation lacks (curves) is shared, so that another load or range is no change.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NORMAL = 1.96  # standard deviations of half an interval
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
-TURN = 0.005  # of the range of a travel, over which friction turns round
+TURN = 0.001  # of the range of a travel, over which friction turns round; above the noise of angles
 SLOW = 0.02  # s, between samples of what turns round
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
