@@ -49,7 +49,6 @@ LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers
 STEP = 1e-3  # of a coordinate, for derivatives
 FARTHEST = 10.0  # times its expected magnitude, that a step moves a number
 TINY = 1e-9  # expected magnitude of a number that is 0, which stays there
-FORM = 3.0  # times the error that blocks of time show: what the model's form lacks is the same in all of them
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
 
@@ -164,7 +163,7 @@ class _Problem:
     def intervals(self) -> dict[str, Interval]:
         """Return the 95 % intervals of the numbers at the start, by path.
 
-        The error is the larger one of what lasting noise allows and FORM times what blocks of time differ by.
+        The error is the larger one of what lasting errors of the model allow and what blocks of time differ by.
         """
         fit = self.fit
         state = fit.state(np.clip(fit.scale.coordinates(fit.estimator.start), fit.lower, fit.upper))
@@ -176,7 +175,7 @@ class _Problem:
 
         def interval(path: str) -> Interval:
             slope = np.array([moved[path] - values[path] for moved in moves]) / STEP
-            by_time = FORM * float(np.linalg.norm(scattered @ slope))
+            by_time = float(np.linalg.norm(scattered @ slope))
             return with_error(values[path], max(float(np.sqrt(slope @ lasting @ slope)), by_time))
 
         return {path: interval(path) for path in values}
