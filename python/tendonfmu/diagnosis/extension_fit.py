@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
+from tendonfmu.diagnosis.cause import with_error
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.effects.description_edit import sides_at
 from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
@@ -37,11 +38,12 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import MEMORY
+from tendonfmu.statistics import MEMORY, Interval
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
 LASTING = 0.2  # s, for which an error of the model lasts, about
+STEP = 1e-3  # of a coordinate, for slopes of numbers
 TOLERANCE = 0.05  # standard errors (rms): a shorter step is the last one, and so few blocks have large ones
 TINY = 1e-9  # expected magnitude of a number that is 0, which stays there
 NEW = 3.0  # times its start: prior standard deviation of a new number
@@ -98,9 +100,7 @@ def fit_numbers(
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
-    if fixed:
-        settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
+    structure = _structure(data, origin, fixed, settings)
     problem = _problem(structure, samples)
     begin = problem.state(np.clip(problem.mean, problem.lower, problem.upper))
     found = minimise(problem, begin, MOST_STEPS, TOLERANCE, rough=True)
@@ -125,6 +125,35 @@ def _problem(structure: Structure, samples: Samples) -> MemoryProblem:
     problem.blocks = problem.blocks * (samples.grid.step / LASTING / MEMORY)
     problem.mean, problem.known = guess_prior(problem)
     return problem
+
+
+def _structure(data: Data, given: Data, fixed: tuple[str, ...], settings: FitSettings) -> Structure:
+    """Return what is fitted of a description; `given` says how large each number may be."""
+    choice = replace(settings.choice, fix=(*settings.choice.fix, *fixed))
+    return _with_scale(build_structure(finger_from_data(data, settings.path), choice), given)
+
+
+def intervals_of(model: FittedModel, samples: Samples, settings: FitSettings) -> dict[str, Interval]:
+    """Return the 95 % intervals of the numbers of a fitted model, by path.
+
+    The error is the larger one of what lasting errors of the model allow and what blocks of time differ by.
+    """
+    if not model.values:
+        return {}
+    fit = _problem(_structure(model.data, model.given, model.fixed, settings), samples)
+    state = fit.state(np.clip(fit.mean, fit.lower, fit.upper))
+    linearised, values = fit.linearised(state), fit.values(state.u)
+    scores = fit.scores(state, linearised)[0] * fit.scale.slopes(fit.scale.unknowns(state.u))
+    lasting = np.linalg.pinv(linearised.information + fit.known)
+    scattered = scores @ lasting
+    moves = [fit.values(state.u + STEP * way) for way in np.eye(len(state.u))]
+
+    def interval(path: str) -> Interval:
+        slope = np.array([moved[path] - values[path] for moved in moves]) / STEP
+        by_time = float(np.linalg.norm(scattered @ slope))
+        return with_error(values[path], max(float(np.sqrt(slope @ lasting @ slope)), by_time))
+
+    return {path: interval(path) for path in values}
 
 
 def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
