@@ -2,7 +2,6 @@
 
 - `panel`: what a figure shows, with its colours and sizes
 - `figures`: makes it as a Plotly figure, which pages embed; `grid`: several in one, for notebooks
-- `png`: draws the Plotly figures of a sheet as a PNG file
 - `finger_picture`: draws what an FMU carries, with Pillow
 """
 
@@ -36,6 +35,5 @@ if TYPE_CHECKING:
         Sheet,
         line_of,
     )
-    from .png import write_sheet
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,7 +1,7 @@
 """What a figure shows: sheets of panels and their styles, before they are drawn.
 
-`figures.py` makes a Plotly figure of each panel. Pages embed it; `png.py` draws all panels of a sheet in one PNG file.
-The colours are those of Okabe and Ito, which colour-blind readers can distinguish.
+`figures.py` makes a Plotly figure of each panel, which pages embed. The colours are those of Okabe and Ito, which
+colour-blind readers can distinguish.
 """
 
 from __future__ import annotations
@@ -240,7 +240,7 @@ class Sheet:
     """Panels that belong together."""
 
     section: str  # heading of the page under which the sheet is
-    name: str  # stem of the PNG file
+    name: str
     title: str
     keys: Sequence[tuple[str, str]]  # (style, meaning) of what is drawn
     panels: Sequence[Panel]

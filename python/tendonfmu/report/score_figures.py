@@ -18,9 +18,10 @@ from tendonfmu.drawing import BLUE, SKY, Band, Bars, Curve, Dots, Heat, Panel, S
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import with_ends
-from tendonfmu.report.page import drawn, write_figures
+from tendonfmu.report.page import write_figures
 from tendonfmu.statistics import intervals as statistics_intervals
 
+PAGE = "score.html"
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # drawn at most
 BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, after the end, and at most after onset
@@ -28,17 +29,13 @@ TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
 _HEAT = ("#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B")
-_WORDS = {
-    "contacts": "torques, compensated torques, label and detection over time",
-    "events": "every event from its onset on",
-    "roc": "found events against false alarms, over thresholds",
-    "delays": "how soon events are found",
-}
 
 
 def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
-    """Write the figures of a score as PNG files."""
-    return {file: _WORDS[file.stem] for file in write_figures(drawn(score_sheets(scored)), folder)}
+    """Write the page with the figures of a score."""
+    page = folder / PAGE
+    write_figures(page, "contact detection", scored.subject.finger.name, score_sheets(scored))
+    return {page: "torques and detection over time, every event, thresholds and delays"}
 
 
 def score_sheets(scored: Scored) -> Iterator[Sheet]:
