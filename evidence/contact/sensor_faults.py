@@ -25,7 +25,7 @@ from tendonfmu.recordings import read_recording
 
 Arrays = dict[str, Numbers]
 
-FINGERS = (1, 3, 4, 6)  # numbers of evidence/fingers
+FINGERS = (3, 19)
 KINDS = ("zero", "frozen", "jump", "position")
 SLOT, EARLIEST, LATEST, LASTS = 8.0, 1.0, 2.5, 3.0  # s
 JUMP = (2.0, 10.0)  # N
@@ -36,9 +36,9 @@ SETTLING = 2.0  # s
 
 def arrays_of(folder: Path, number: int, kind: str) -> list[Arrays]:
     """A finger's recordings of one kind, without angles."""
-    from evidence.contact import mujoco_pushes
+    from evidence.contact import pushed_fingers
 
-    recordings = [read_recording(mujoco_pushes.place(folder, number, kind, p)) for p in mujoco_pushes.PRETENSIONS]
+    recordings = [read_recording(pushed_fingers.place(folder, number, kind, p)) for p in pushed_fingers.PRETENSIONS]
     names = ("tendon_force", "tendon_position")
     return [{"time": one.time, **{name: one.groups[name] for name in names}} for one in recordings]
 

@@ -16,7 +16,7 @@ from matplotlib.image import imread
 from real_browser import Elements, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.drawing import draw_finger
-from tendonfmu.drawing.figures import figure_of, figures_json, pooled, thinned
+from tendonfmu.drawing.figures import figure_of, figures_json, thinned
 from tendonfmu.drawing.panel import DIVERGING, Band, Bars, Curve, Dots, Heat, Panel, Sheet
 from tendonfmu.model import finger_drawing
 from tendonfmu.report import write_figures
@@ -37,7 +37,6 @@ EVERYTHING = replace(
 MATRIX = Panel(
     *("m", "what", "the same order", ""),
     heat=Heat((100 * np.eye(4)).astype(np.int8), tuple("abcd"), tuple("abcd"), DIVERGING, -100, 100, "%"),
-    borders=(2.5,),
     x_limits=(-0.5, 3.5),
     y_limits=(3.5, -0.5),
     y_ticks=((1.0, "one"), (3.0, "two")),
@@ -88,13 +87,6 @@ def test_many_points_are_thinned_and_none_that_stands_out_is_lost() -> None:
     assert 1000 < len(one.x) < 2100 and np.array_equal(one.x, other.x) and (one.x[0], one.x[-1]) == (0.0, 19_999.0)
     assert one.y.max() == 5.0 and np.nanmin(other.y) == -5.0 and np.isnan(other.y[one.x == 7000.0]).all()
     np.testing.assert_array_equal(one.y, first[one.x.astype(int)])
-
-
-def test_the_strongest_of_many_stays_visible() -> None:
-    matrix = np.full((1001, 1001), 10, np.int8)
-    matrix[998, 3] = -90
-    drawn, every = pooled(matrix, (400, 400))
-    assert every == (3, 3) and drawn.shape == (334, 334) and drawn[332, 1] == -90 and drawn[0, 0] == 10
 
 
 def test_names_are_text() -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .figures import dark_colours, figures_json, figures_of, packed_plotly, pooled
+    from .figures import dark_colours, figures_json, figures_of, packed_plotly
     from .finger_picture import draw_finger, draw_terminal
     from .grid import SeriesRow, series_figure, sheets_figure
     from .panel import (

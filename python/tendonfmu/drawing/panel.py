@@ -219,7 +219,6 @@ class Panel:
     near_y: float = 0.0
     rows: tuple[str, ...] = ()  # names of y = 0, 1, ... from the top; empty: y is a number
     line: float | None = None  # a marked x
-    borders: tuple[float, ...] = ()  # where lines across a matrix separate its groups
     height: int = 0  # CSS pixels; 0: that of its size
     zoom: str = ""  # panels of a page with the same word are zoomed together along x; empty: this one alone
 
@@ -231,8 +230,8 @@ class Panel:
 
     @property
     def page_height(self) -> int:
-        """Return the height of the drawing in a page, where the title is above it; a matrix is about square."""
-        return 540 if self.borders else self.extent[1] - 20
+        """Return the height of the drawing in a page, where the title is above it."""
+        return self.extent[1] - 20
 
 
 @dataclass(frozen=True)
