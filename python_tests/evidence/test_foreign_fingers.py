@@ -46,26 +46,3 @@ def test_a_case_hides_what_its_seed_says_in_both_recordings_alike() -> None:
     machines = [cases.machine("dahl", 5)[:2] for _ in range(2)]
     assert machines[0][1] == machines[1][1] and machines[0][1].effect == cases.ORDER[2]
     assert (machines[0][0].edge == machines[1][0].edge).all()
-
-
-@needs("mujoco")
-def test_a_push_is_what_the_tendons_bear_while_it_holds() -> None:
-    """A stiff finger hardly moves, so what a push adds to the tendons' torque is its external torque."""
-    from evidence.contact import pushed_fingers
-    from evidence.families import cases, elastic
-    from evidence.families.finger import Hidden
-    from evidence.families.motion import random_motion
-
-    made, _, _ = cases.machine("elastic", 3)
-    smooth = dataclasses.replace(made, edge=0.0 * made.edge, friction=0.0 * made.friction)
-    push = pushed_fingers.Push(0.5, 2.5, 1.0, 2, 0.05)
-    motion = random_motion(elastic.JOINTS, 18.0, np.random.default_rng(1))
-    traces, torques = [], []
-    for pushes in ([], [push]):
-        mechanism = pushed_fingers.Pushed(smooth, Hidden(), pushes)
-        traces.append(elastic.moved(mechanism, motion, 3.0))
-        torques.append(np.array(mechanism.torques[-3000::2]))
-    held = [t.force @ made.arms - made.cover * t.angle for t in traces]
-    middle = (traces[0].time > 1.5) & (traces[0].time < 2.4)
-    np.testing.assert_allclose(np.median((held[1] - held[0] + torques[1])[middle], axis=0), 0.0, atol=2e-3)
-    assert np.abs(torques[1][middle]).min(axis=0).max() > 0.02 and not torques[0].any()
