@@ -47,17 +47,6 @@ build_sanitized() {
     -DTENDONFMU_BUILD_TESTS=ON -DTENDONFMU_SANITIZE=ON "$@"
 }
 
-# The package of clang's sanitizer and fuzzer runtime: its own on Debian 12, a part of libclang-common before.
-fuzzer_runtime() {
-  local version
-  version=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p' | head -n 1)
-  if apt-cache show "libclang-rt-$version-dev" >/dev/null 2>&1; then
-    echo "libclang-rt-$version-dev"
-  else
-    echo "libclang-common-$version-dev"
-  fi
-}
-
 # What tests use if it is there, a failure for each that a distribution lacks: tests then say what they skip.
 install_optional() {
   local packages
@@ -67,6 +56,16 @@ install_optional() {
     if dpkg-query -W $packages >/dev/null 2>&1 || apt_install $packages >build/apt.log 2>&1; then continue; fi
     echo "NOT installed: $packages ($(tail -n 1 build/apt.log))"
   done
+}
+
+# clang with its sanitizer and fuzzer runtime: a package of its own on Debian 12, a part of libclang-common before. Its
+# version is known once clang is there.
+install_clang() {
+  local version
+  install_optional clang
+  if echo '#include <fuzzer/FuzzedDataProvider.h>' | clang++ -x c++ -fsyntax-only - 2>/dev/null; then return 0; fi
+  version=$(clang --version | sed -n 's/.*clang version \([0-9]*\).*/\1/p')
+  apt_install "libclang-rt-$version-dev" >/dev/null 2>&1 || install_optional "libclang-common-$version-dev"
 }
 
 # A locale with a decimal comma, which numbers in texts must not follow.

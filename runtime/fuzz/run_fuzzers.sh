@@ -43,4 +43,4 @@ export -f fuzz
 export build seconds
 # As many at once as there are processors; a failure of one ends no other.
 find "$build" -type f -perm -u+x -name 'fuzz_*' -print0 | sort -z |
-  xargs -0 -n 1 -P "$(getconf _NPROCESSORS_ONLN)" bash -c 'fuzz "$1"' fuzz
+  xargs -0 -r -n 1 -P "$(getconf _NPROCESSORS_ONLN)" bash -c 'fuzz "$1"' fuzz
