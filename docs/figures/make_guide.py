@@ -74,7 +74,7 @@ def tendonfmu(folder: Path, *words: str | Path) -> None:
 
 
 def photograph(page: Path, height: int, place: str = "") -> Path:
-    """`height` pixels of a page, 1280 pixels wide, from its top or from the element with an id on."""
+    """`height` pixels of a page, 1280 pixels wide, from its top, or of the element with an id alone."""
     picture = page.with_suffix(".png")
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
@@ -82,8 +82,12 @@ def photograph(page: Path, height: int, place: str = "") -> Path:
     # figures are drawn after the page has loaded
     options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
     options.append(f"--window-size=1280,{height}")
-    address = f"{page.as_uri()}#{place}" if place else page.as_uri()
-    subprocess.run([browser, *options, f"--screenshot={picture}", address], check=True, stderr=subprocess.DEVNULL)
+    if place:  # a page that is scrolled is photographed white, so all else is hidden
+        others = f"<style>body *:not(:has(#{place}), #{place}, #{place} *) {{ display: none !important }}</style>"
+        page = page.with_stem(place)
+        page.write_text(picture.with_suffix(".html").read_text("utf-8") + others, encoding="utf-8")
+    command = [browser, *options, f"--screenshot={picture}", page.as_uri()]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     return picture
 
 
