@@ -83,7 +83,8 @@ def photograph(page: Path, height: int, place: str = "") -> Path:
     options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
     options.append(f"--window-size=1280,{height}")
     if place:  # a page that is scrolled is photographed white, so all else is hidden
-        others = f"<style>body *:not(:has(#{place}), #{place}, #{place} *) {{ display: none !important }}</style>"
+        shown = ", ".join(f"#{each}, #{each} *" for each in (place, "js-plotly-tester"))  # which measures texts
+        others = f"<style>body *:not(:has(#{place}), {shown}) {{ display: none !important }}</style>"
         page = page.with_stem(place)
         page.write_text(picture.with_suffix(".html").read_text("utf-8") + others, encoding="utf-8")
     command = [browser, *options, f"--screenshot={picture}", page.as_uri()]
