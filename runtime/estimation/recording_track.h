@@ -64,7 +64,6 @@ class recording_track {
   double time(std::size_t row) const { return time_[row]; }
   tendonfmu_inputs inputs(std::size_t row) const;
   bool used(std::size_t row) const { return use_[row] != 0; }
-  std::size_t used_count() const { return used_count_; }
   double external_torque(std::size_t row, std::size_t joint) const {
     return external_.empty() ? 0.0 : external_[row * joints_ + joint];
   }
