@@ -259,7 +259,7 @@ def test_the_demo_is_tuned(tuned: Path) -> None:
     assert [round(each["mean_force"]) for each in report["pretensions"]] == [10, 40]
     assert report["sentence"].startswith("At most 200 alarms an hour were asked for; ")
     assert "mN·m at" in report["sentence"] and report["sentence"].endswith("within 60 ms, nine of ten.")
-    assert [file.name for file in (tuned / "fig").iterdir()] == ["tail.png"]
+    assert [file.name for file in (tuned / "fig").iterdir()] == ["tuning.html"]
 
 
 def test_the_rule_of_the_paper_is_tuned_for_the_same_rate() -> None:

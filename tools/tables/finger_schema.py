@@ -109,12 +109,10 @@ def _of_key(facts: Facts, row: Row) -> Schema:
     if kind == "object":
         return _object(facts, row)
     if kind == "list":
-        most = limits[last(row["path"]) if last(row["path"]) in limits else "joints"]
-        return described | _list(
-            (most if last(row["path"]) == "bands" else 1, most),
-            {"$ref": f"#/$defs/{row['path'][:-1]}"},
-            "required" not in row,
-        )
+        name = last(row["path"])
+        most = limits.get(name, limits["joints"])
+        items = {"$ref": f"#/$defs/{row['path'][:-1]}"}
+        return described | _list((most if name == "bands" else 1, most), items, "required" not in row)
     if kind == "word":
         return {"enum": [*row["words"], None]} | described | {"default": row["words"][0]}
     if kind == "flag":

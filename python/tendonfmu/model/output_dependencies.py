@@ -119,10 +119,8 @@ def dependencies(structure: Structure) -> Dependencies:
 def _of_contact(structure: Structure, others: Dependencies) -> Dependencies:
     """Add, with contact.bands, all motors to the contact of each joint: their load says what friction may do."""
     motors = {"tendon_position": list(range(structure.tendons))} if watches_motors(structure.data) else {}
-    of_all = [element | motors for element in others["contact"]]
-    return {
-        name: [element | motors for element in others["residual"]] for name in ("joint_contact", "contact_level")
-    } | {"contact": of_all}
+    names = {"joint_contact": "residual", "contact_level": "residual", "contact": "contact"}
+    return {name: [element | motors for element in others[other]] for name, other in names.items()}
 
 
 def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:

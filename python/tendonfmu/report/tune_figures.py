@@ -9,14 +9,16 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import ContactTuning, tune_report
 from tendonfmu.drawing import Band, Curve, Dots, Panel, Sheet
-from tendonfmu.report.page import drawn, write_figures
+from tendonfmu.report.page import write_figures
 
-_WORDS = {"tail": "false alarms in motion that was kept out, over the level of the bounds"}
+PAGE = "tuning.html"
 
 
 def write_tune_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
-    """Write the figures of a tuning as PNG files."""
-    return {file: _WORDS[file.stem] for file in write_figures(drawn([tail_sheet(tuning)]), folder)}
+    """Write the page with the figure of a tuning."""
+    page = folder / PAGE
+    write_figures(page, "tuning of contact detection", tuning.description_.name, [tail_sheet(tuning)])
+    return {page: "false alarms in motion that was kept out, over the level of the bounds"}
 
 
 def tail_sheet(tuning: ContactTuning) -> Sheet:
