@@ -140,7 +140,8 @@ class FingerOracle:
         # 5. contact, 6. bias
         unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew) | first
         r = np.where(unwatched, 0.0, tau - T_eff)
-        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, self._held_at_most(limits * f), np.abs(friction))
+        B = self._held_at_most(limits * f)
+        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, B, np.abs(friction))
         joint_contact = self.detector.take(signals, mean_force, time, dt, unwatched, out)
         if not first:
             correction = self._gain(dt, noise, time, bool(joint_contact.any())) * r

@@ -104,7 +104,8 @@ class Detector:
         self.deviation = per_joint(contact, "deviation")
         self.deviation_per_force = per_joint(contact, "deviation_per_force")
         self.by_bands = given(contact, "method", "paper") == "bands"
-        self.numbers = [{name: per_joint(row, name).tolist() for name in NUMBERS} for row in given(contact, "bands", [])]
+        rows = given(contact, "bands", [])
+        self.numbers = [{name: per_joint(row, name).tolist() for name in NUMBERS} for row in rows]
         if len(self.numbers) != (len(SHORT) if self.by_bands else 0):
             raise ValueError("contact.bands: 4 rows, with the method bands alone")
         watches = given(description, "sensor_fault", None) is not None
