@@ -79,10 +79,6 @@ int model_has_links(const model* m) {
   return tendonfmu_has_links(m->finger);
 }
 
-int model_watches_rest(const model* m) {
-  return tendonfmu_watches_rest(m->finger);
-}
-
 int model_watches_sensors(const model* m) {
   return tendonfmu_watches_sensors(m->finger);
 }

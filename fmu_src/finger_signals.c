@@ -27,10 +27,10 @@ tendonfmu_outputs variables_outputs(const variables* v) {
     .fingertip_force_std = v->number[GROUP_FINGERTIP_FORCE_STD],
     .fingertip_force_observable = v->flag[GROUP_FINGERTIP_FORCE_OBSERVABLE],
     .fingertip_force_misfit = v->number[GROUP_FINGERTIP_FORCE_MISFIT],
-    .contact_change = v->number[GROUP_CONTACT_CHANGE],
-    .contact_at_rest = v->flag[GROUP_CONTACT_AT_REST],
     .sensor_fault = v->flag[GROUP_SENSOR_FAULT],
     .contact_observable = v->flag[GROUP_CONTACT_OBSERVABLE],
+    .residual = v->number[GROUP_RESIDUAL],
+    .contact_level = v->number[GROUP_CONTACT_LEVEL],
   };
 }
 

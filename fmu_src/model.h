@@ -30,7 +30,6 @@ size_t model_tendon_count(const model* m);
 
 /* Whether there are the groups of the table that need links. */
 int model_has_links(const model* m);
-int model_watches_rest(const model* m);
 int model_watches_sensors(const model* m);
 
 /* One line about the last call that failed. */

@@ -5,8 +5,7 @@
 
 /* Elements of a group; 0 where the model does not have what it needs. */
 static size_t count_elements(const variables* v, const variable_group* group) {
-  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_REST && !v->watches_rest) ||
-      (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
+  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
     return 0;
   }
   switch (group->size) {
@@ -62,7 +61,6 @@ int variables_create(variables* v, const model* m, int arrays) {
   v->tendons = model_tendon_count(m);
   v->parameter_count = model_parameter_count(m);
   v->has_links = model_has_links(m);
-  v->watches_rest = model_watches_rest(m);
   v->watches_sensors = model_watches_sensors(m);
   for (int g = 0; g < GROUP_COUNT; ++g) {
     v->count[g] = count_elements(v, &variable_groups[g]);

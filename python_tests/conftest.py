@@ -128,6 +128,8 @@ def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp
     from tendonfmu.cli import main
 
     monkeypatch.chdir(tmp_path)
+    # It leaves without waiting for threads, which may be another test's: the process of the tests would end.
+    monkeypatch.setattr("tendonfmu.cli.program.leave", sys.exit)
 
     def run(*arguments: str | Path) -> Answer:
         monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])

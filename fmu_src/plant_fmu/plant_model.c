@@ -90,11 +90,6 @@ int model_has_links(const model* m) {
   return 0;
 }
 
-int model_watches_rest(const model* m) {
-  (void)m; /* nor this */
-  return 0;
-}
-
 int model_watches_sensors(const model* m) {
   (void)m; /* nor this */
   return 0;

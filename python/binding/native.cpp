@@ -57,7 +57,7 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
   std::size_t joints() const { return tendonfmu_joint_count(get()); }
   std::size_t tendons() const { return tendonfmu_tendon_count(get()); }
   bool has_links() const { return tendonfmu_has_links(get()) != 0; }
-  bool watches_rest() const { return tendonfmu_watches_rest(get()) != 0; }
+  bool watches_motors() const { return tendonfmu_watches_motors(get()) != 0; }
   bool watches_sensors() const { return tendonfmu_watches_sensors(get()) != 0; }
   std::size_t parameter_count() const { return tendonfmu_parameter_count(get()); }
   std::string kernel() const { return tendonfmu_get_kernel(get()); }
@@ -99,7 +99,7 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
   // Name of each output to its rows; with `learns` of tendonfmu_run_guided(), and residual_variance too.
   nb::dict run(const number_row& time, const std::optional<number_rows>& force,
                const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-               const std::optional<number_rows>& velocity, bool with_parts, const std::optional<flag_row>& learns,
+               const std::optional<number_rows>& velocity, bool with_terms, const std::optional<flag_row>& learns,
                const std::optional<number_rows>& known_torque) {
     const std::size_t samples = time.shape(0), n = joints(), m = tendons();
     const tendonfmu_inputs inputs = {
@@ -108,7 +108,7 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
     tendonfmu_outputs outputs = {};
     nb::dict arrays;
     for (const output_row& row : output_table) {
-      if (row.need == output_need::parts ? with_parts : has(row.need)) {
+      if (row.need == output_need::terms ? with_terms : has(row.need)) {
         void* data = nullptr;
         arrays[row.name] = new_output(row.type, shape_of(row.size, samples), &data);
         set_array(outputs, row, data);
@@ -142,7 +142,7 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
     if (!step_arrays_.is_valid()) {
       nb::dict arrays;
       for (const output_row& row : output_table) {
-        if (row.need != output_need::parts && has(row.need)) {
+        if (row.need != output_need::terms && has(row.need)) {
           void* data = nullptr;
           const std::vector<std::size_t> shape = shape_of(row.size, 1);
           arrays[row.name] = new_output(row.type, {shape.back()}, &data);
@@ -196,7 +196,6 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
   bool has(output_need need) const {
     switch (need) {
       case output_need::links: return has_links();
-      case output_need::rest: return watches_rest();
       case output_need::sensor_fault: return watches_sensors();
       default: return true;
     }
@@ -206,7 +205,7 @@ class bound_finger : bound_handle<tendonfmu_finger, tendonfmu_destroy, tendonfmu
       case output_size::joints: return {samples, joints()};
       case output_size::tendons: return {samples, tendons()};
       case output_size::vector: return {samples, 3};
-      case output_size::parts: return {samples, joints(), tendons() + 3};
+      case output_size::terms: return {samples, joints(), 4, 8};
       default: return {samples};
     }
   }
@@ -248,7 +247,7 @@ NB_MODULE(_native, m) {
       .def_prop_ro("joints", &bound_finger::joints)
       .def_prop_ro("tendons", &bound_finger::tendons)
       .def_prop_ro("has_links", &bound_finger::has_links)
-      .def_prop_ro("watches_rest", &bound_finger::watches_rest)
+      .def_prop_ro("watches_motors", &bound_finger::watches_motors)
       .def_prop_ro("watches_sensors", &bound_finger::watches_sensors)
       .def_prop_ro("parameter_count", &bound_finger::parameter_count)
       .def_prop_rw("kernel", &bound_finger::kernel, &bound_finger::set_kernel)
@@ -263,7 +262,7 @@ NB_MODULE(_native, m) {
       .def("restore_state", &bound_finger::restore_state)
       .def("run", &bound_finger::run, nb::arg("time"), nb::arg("tendon_force").none(),
            nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none(),
-           nb::arg("with_parts"), nb::arg("learns").none(), nb::arg("known_torque").none())
+           nb::arg("with_terms"), nb::arg("learns").none(), nb::arg("known_torque").none())
       .def("step_outputs", &bound_finger::step_outputs)
       .def("step", &bound_finger::step, nb::arg("time"), nb::arg("tendon_force").none(),
            nb::arg("tendon_position").none(), nb::arg("joint_position").none(), nb::arg("joint_velocity").none())

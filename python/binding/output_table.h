@@ -7,8 +7,8 @@
 #include "tendonfmu.h"
 
 enum class output_type { number, flag, count };
-enum class output_size { scalar, joints, tendons, vector, parts }; /* parts: joints × (tendons + 3) */
-enum class output_need { nothing, parts, links, rest, sensor_fault };
+enum class output_size { scalar, joints, tendons, vector, terms }; /* terms: joints × 4 × 8 */
+enum class output_need { nothing, terms, links, sensor_fault };
 
 struct output_row {
   const char* name;
@@ -30,19 +30,14 @@ constexpr output_row output_table[] = {
     {"contact", offsetof(tendonfmu_outputs, contact), output_type::flag, output_size::scalar, output_need::nothing, false},
     {"slack", offsetof(tendonfmu_outputs, slack), output_type::flag, output_size::tendons, output_need::nothing, false},
     {"compensated_torque_std", offsetof(tendonfmu_outputs, compensated_torque_std), output_type::number, output_size::joints, output_need::nothing, false},
-    {"residual", offsetof(tendonfmu_outputs, residual), output_type::number, output_size::joints, output_need::nothing, false},
-    {"innovation", offsetof(tendonfmu_outputs, innovation), output_type::number, output_size::joints, output_need::nothing, false},
-    {"stuck_friction", offsetof(tendonfmu_outputs, stuck_friction), output_type::number, output_size::joints, output_need::nothing, false},
-    {"friction_jump", offsetof(tendonfmu_outputs, friction_jump), output_type::number, output_size::joints, output_need::nothing, false},
-    {"friction_parts", offsetof(tendonfmu_outputs, friction_parts), output_type::number, output_size::parts, output_need::parts, false},
     {"fingertip_force", offsetof(tendonfmu_outputs, fingertip_force), output_type::number, output_size::vector, output_need::links, false},
     {"fingertip_force_std", offsetof(tendonfmu_outputs, fingertip_force_std), output_type::number, output_size::vector, output_need::links, false},
     {"fingertip_force_observable", offsetof(tendonfmu_outputs, fingertip_force_observable), output_type::flag, output_size::scalar, output_need::links, false},
     {"fingertip_force_misfit", offsetof(tendonfmu_outputs, fingertip_force_misfit), output_type::number, output_size::scalar, output_need::links, false},
     {"contact_link", offsetof(tendonfmu_outputs, contact_link), output_type::count, output_size::scalar, output_need::links, false},
-    {"contact_change", offsetof(tendonfmu_outputs, contact_change), output_type::number, output_size::joints, output_need::rest, false},
-    {"contact_at_rest", offsetof(tendonfmu_outputs, contact_at_rest), output_type::flag, output_size::scalar, output_need::rest, false},
-    {"drift", offsetof(tendonfmu_outputs, drift), output_type::number, output_size::joints, output_need::nothing, false},
     {"sensor_fault", offsetof(tendonfmu_outputs, sensor_fault), output_type::flag, output_size::tendons, output_need::sensor_fault, false},
     {"contact_observable", offsetof(tendonfmu_outputs, contact_observable), output_type::flag, output_size::scalar, output_need::sensor_fault, false},
+    {"residual", offsetof(tendonfmu_outputs, residual), output_type::number, output_size::joints, output_need::nothing, false},
+    {"contact_level", offsetof(tendonfmu_outputs, contact_level), output_type::number, output_size::joints, output_need::nothing, false},
+    {"contact_terms", offsetof(tendonfmu_outputs, contact_terms), output_type::number, output_size::terms, output_need::terms, false},
 };

@@ -19,7 +19,7 @@ class Finger:
     @property
     def has_links(self) -> bool: ...
     @property
-    def watches_rest(self) -> bool: ...
+    def watches_motors(self) -> bool: ...
     @property
     def watches_sensors(self) -> bool: ...
     @property
@@ -41,7 +41,7 @@ class Finger:
         tendon_position: NDArray[np.float64] | None,
         joint_position: NDArray[np.float64] | None,
         joint_velocity: NDArray[np.float64] | None,
-        with_parts: bool,
+        with_terms: bool,
         learns: NDArray[np.uint8] | None,
         known_torque: NDArray[np.float64] | None,
     ) -> dict[str, NDArray[Any]]: ...

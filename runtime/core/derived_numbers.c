@@ -116,70 +116,23 @@ static void derive_finger(derivation* d, const model_item* item) {
     case ITEM_INITIAL_VARIANCE: settings->initial_variance = values[0]; break;
     case ITEM_FORGET_RATE: settings->forget_rate = values[0]; break;
     case ITEM_NOISE_TIME: settings->noise_time = values[0]; break;
-    case ITEM_START_SHARE: settings->start_share = values[0]; break;
     case ITEM_INITIAL_TORQUE:
       settings->has_initial_torque = 1;
       memcpy(to->initial_torque, values, bytes);
       break;
     case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
     case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
+    case ITEM_DEVIATION: memcpy(to->deviation, values, bytes); break;
+    case ITEM_DEVIATION_PER_FORCE: memcpy(to->deviation_per_force, values, bytes); break;
     default: break; /* extensions read their parameters where they are */
   }
 }
 
-/* directions lie side by side, so that all of them are summed at once */
-static void derive_direction(derivation* d, const model_item* item) {
-  double* to = d->finger->derived.direction + (size_t)item->joint * item->count * MODEL_MAX_DIRECTIONS + item->point;
-  for (uint32_t i = 0; i < item->count; ++i) {
-    to[i * MODEL_MAX_DIRECTIONS] = d->values[item->first + i];
-  }
-}
-
-static void derive_detection(derivation* d, const model_item* item) {
-  derived_numbers* to = &d->finger->derived;
-  finger_settings* settings = &to->settings;
-  const double* values = d->values + item->first;
-  const size_t bytes = item->count * sizeof(double);
-  switch (item->kind) {
-    case ITEM_INNOVATION_TIME: settings->innovation_time = values[0]; break;
-    case ITEM_INNOVATION_THRESHOLD: memcpy(to->innovation_threshold, values, bytes); break;
-    case ITEM_INNOVATION_PER_FORCE: memcpy(to->innovation_per_force, values, bytes); break;
-    case ITEM_EVIDENCE_TIME: settings->evidence_time = values[0]; break;
-    case ITEM_STUCK_SHARE: settings->stuck_share = values[0]; break;
-    case ITEM_JUMP_SHARE: settings->jump_share = values[0]; break;
-    case ITEM_JUMP_TIME: settings->jump_rate = bounded_inverse(values[0]); break;
-    case ITEM_STUCK_TIME: settings->stuck_rate = values[0] > 0.0 ? bounded_inverse(values[0]) : -1.0; break;
-    case ITEM_UNCERTAINTY: derive_direction(d, item); break;
-    case ITEM_UNCERTAINTY_LEVEL: settings->uncertainty_level = values[0]; break;
-    case ITEM_DEVIATION: memcpy(to->deviation, values, bytes); break;
-    case ITEM_DEVIATION_PER_FORCE: memcpy(to->deviation_per_force, values, bytes); break;
-    case ITEM_RELEASE_RATIO: settings->release_ratio = values[0]; break;
-    case ITEM_HOLD_TIME: settings->hold_time = values[0]; break;
-    case ITEM_DRIFT_QUICK_TIME: settings->drift_quick_time = values[0]; break;
-    case ITEM_DRIFT_SLOW_TIME: settings->drift_slow_time = values[0]; break;
-    case ITEM_DRIFT_THRESHOLD: memcpy(to->drift_threshold, values, bytes); break;
-    case ITEM_DRIFT_PER_FORCE: memcpy(to->drift_per_force, values, bytes); break;
-    default: settings->release_time = values[0]; break;
-  }
-}
-
-static void derive_rest(derivation* d, const model_item* item) {
-  derived_numbers* to = &d->finger->derived;
-  finger_settings* settings = &to->settings;
-  const double* values = d->values + item->first;
-  const size_t bytes = item->count * sizeof(double);
-  switch (item->kind) {
-    case ITEM_REST_TRAVEL: settings->rest_travel = values[0]; break;
-    case ITEM_REST_SETTLE_TIME: settings->rest_settle_time = values[0]; break;
-    case ITEM_REST_AVERAGING_TIME:
-      settings->rest_averaging_rate = values[0] > 0.0 ? bounded_inverse(values[0]) : -1.0;
-      break;
-    case ITEM_REST_THRESHOLD: memcpy(to->rest_threshold, values, bytes); break;
-    case ITEM_REST_PER_FORCE: memcpy(to->rest_per_force, values, bytes); break;
-    case ITEM_REST_CREEP: memcpy(to->rest_creep, values, bytes); break;
-    case ITEM_REST_FALL_SHARE: settings->rest_fall_share = values[0]; break;
-    case ITEM_REST_INNOVATION_TIME: settings->rest_innovation_rate = bounded_inverse(values[0]); break;
-    default: memcpy(to->rest_innovation, values, bytes); break;
+static void derive_band(derivation* d, const model_item* item) {
+  const size_t number = item->kind - ITEM_BAND_NOISE;
+  for (size_t j = 0; j < item->count; ++j) {
+    const double value = d->values[item->first + j];
+    d->finger->derived.band_square[(j * BANDS + item->point) * BAND_NUMBERS + number] = value * value;
   }
 }
 
@@ -217,16 +170,14 @@ static int derive_item(void* context, const model_item* item) {
     derive_joint(d, item);
   } else if (item->kind <= ITEM_EDGE_FRICTION) {
     derive_tendon(d, item);
-  } else if (item->kind < ITEM_INNOVATION_TIME || item->kind >= ITEM_EXTENSION) {
+  } else if (item->kind >= ITEM_BAND_NOISE && item->kind <= ITEM_BAND_FRICTION_RESERVE) {
+    derive_band(d, item);
+  } else if (item->kind < ITEM_LINK_AXIS || item->kind >= ITEM_EXTENSION) {
     derive_finger(d, item);
   } else if (item->kind >= ITEM_FAULT_HOLD_TIME) {
     derive_sensors(d, item);
-  } else if (item->kind >= ITEM_LINK_AXIS) {
-    derive_link(d, item);
-  } else if (item->kind >= ITEM_REST_TRAVEL) {
-    derive_rest(d, item);
   } else {
-    derive_detection(d, item);
+    derive_link(d, item);
   }
   return 0;
 }
@@ -261,6 +212,9 @@ static void derive_routing(tendonfmu_finger* f) {
       rows[i * n + j] = f->derived.moment_arm[j * lanes + i];
     }
   }
+  for (size_t at = 0; f->derived.settings.has_bands && at < n * lanes; ++at) {
+    f->derived.load_arm[at] = f->derived.moment_arm[at] * f->derived.stiffness[at % lanes];
+  }
   pseudo_inverse(m, n, rows, inverse);
   for (size_t j = 0; j < n; ++j) {
     memcpy(f->derived.inverse_routing + j * lanes, inverse + j * m, m * sizeof(double));
@@ -290,19 +244,10 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   const uint32_t options = finger->shape.options;
   finger->derived.settings = (finger_settings){.initial_variance = -1.0,
                                                .noise_time = -1.0,
-                                               .evidence_time = -1.0,
-                                               .release_ratio = 1.0,
-                                               .release_time = -1.0,
-                                               .rest_innovation_rate = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
                                                .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
-                                               .has_start_share = (options & MODEL_HAS_START_SHARE) != 0,
-                                               .bounds_friction = (options & MODEL_HAS_FRICTION_BOUND) != 0,
-                                               .bounds_presliding = (options & MODEL_BOUNDS_PRESLIDING) != 0,
-                                               .knows_uncertainty = (options & MODEL_HAS_UNCERTAINTY) != 0,
-                                               .uses_innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0,
-                                               .watches_drift = (options & MODEL_HAS_DRIFT) != 0,
-                                               .watches_rest = (options & MODEL_HAS_REST) != 0,
+                                               .has_bands = (options & MODEL_DETECTS_BY_BANDS) != 0,
+                                               .watches_motors = (options & MODEL_WATCHES_MOTORS) != 0,
                                                .watches_sensors = (options & MODEL_HAS_SENSOR_FAULT) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);

@@ -164,8 +164,8 @@ int tendonfmu_has_links(const tendonfmu_finger* finger) {
   return finger && (finger->shape.options & MODEL_HAS_LINKS) != 0;
 }
 
-int tendonfmu_watches_rest(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_HAS_REST) != 0;
+int tendonfmu_watches_motors(const tendonfmu_finger* finger) {
+  return finger && (finger->shape.options & MODEL_WATCHES_MOTORS) != 0;
 }
 
 int tendonfmu_watches_sensors(const tendonfmu_finger* finger) {

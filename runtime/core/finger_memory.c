@@ -67,24 +67,16 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->contact_threshold = take_numbers(c, joints);
   d->contact_per_force = take_numbers(c, joints);
   d->initial_torque = take_numbers(c, joints);
-  d->innovation_threshold = take_numbers(c, joints);
-  d->innovation_per_force = take_numbers(c, joints);
   d->deviation = take_numbers(c, joints);
   d->deviation_per_force = take_numbers(c, joints);
-  const size_t drifting = f->shape.options & MODEL_HAS_DRIFT ? joints : 0;
-  d->drift_threshold = take_numbers(c, drifting);
-  d->drift_per_force = take_numbers(c, drifting);
-  const size_t resting = f->shape.options & MODEL_HAS_REST ? joints : 0;
-  d->rest_threshold = take_numbers(c, resting);
-  d->rest_per_force = take_numbers(c, resting);
-  d->rest_creep = take_numbers(c, resting);
-  d->rest_innovation = take_numbers(c, resting);
+  const size_t banded = f->shape.options & MODEL_DETECTS_BY_BANDS ? n : 0;
+  d->band_square = take_numbers(c, banded * BANDS * BAND_NUMBERS);
+  d->load_arm = take_numbers(c, banded * lanes);
   const size_t links = f->shape.options & MODEL_HAS_LINKS ? n : 0;
   d->links.axis = take_numbers(c, 3 * links);
   d->links.offset = take_numbers(c, 3 * links);
   d->links.tip = take_numbers(c, links ? 3 : 0);
   d->least_link = take(c, links * sizeof(int));
-  d->direction = take_numbers(c, model_direction_count(&f->shape) ? n * (f->tendons + MODEL_DIRECTION_SHARES) * 4 : 0);
 }
 
 static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
@@ -100,10 +92,7 @@ static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
     }
   }
   f->memory.sections = take_numbers(c, stretching);
-  double** const rows[] = {&s->travelled, &s->kept};
-  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
-    *rows[i] = take_numbers(c, slots);
-  }
+  s->travelled = take_numbers(c, slots);
   s->own_limit = take_numbers(c, slots ? f->joint_lanes : 0);
   s->element = take_numbers(c, f->shape.elements * 2 * slots);
   s->by_turning = take_numbers(c, 2 * slots);
@@ -118,8 +107,6 @@ static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   const size_t slots = f->shape.extension_count ? f->slots : 0;
   f->scratch.grip = take_numbers(c, slots);
   f->scratch.bias_grip = take_numbers(c, slots);
-  f->scratch.whole_edge = take_numbers(c, slots);
-  f->scratch.whole_pulley = take_numbers(c, slots);
   lay_out_memory(f, c);
 }
 
@@ -141,12 +128,7 @@ const state_row state_rows[] = {
     {AT(variance), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SQUARE), 1},
     {AT(gain), ROW_OF_JOINTS, 1, 0, UP_TO(1.0), 1},
     {AT(residual), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(innovation), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(tracked), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(stuck_friction), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
-    {AT(friction_jump), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
-    {AT(evidence), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_TIME), 0},
-    {AT(exceeded_at), ROW_OF_JOINTS, 1, 0, WITHIN(LARGEST_TIME), 0},
+    {AT(level), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
     {AT(total_variance), ROW_OF_JOINTS, 1, 0, UP_TO(DBL_MAX), 1},
     {AT(force), ROW_OF_TENDONS, 1, 0, ANYTHING, 0},
     {AT(slack), ROW_OF_TENDONS, 1, 0, FLAG, 0},
@@ -156,24 +138,8 @@ const state_row state_rows[] = {
     {AT(event), ROW_OF_SLOTS, 1, 0, SIGN, 0},
     {AT(stuck_since), ROW_OF_SLOTS, 1, 0, -LARGEST_TIME, LARGEST_SQUARE, 0, 1}, /* of time, or of absorption */
     {AT(last_stuck), ROW_OF_SLOTS, 1, 0, WITHIN(LARGEST_TIME), 1},
-    {AT(start_left), ROW_OF_SLOTS, 1, MODEL_HAS_START_SHARE, UP_TO(1.0), 0},
-    {AT(unlearned), ROW_OF_JOINTS, 1, MODEL_HAS_START_SHARE, UP_TO(LARGEST_SUM), 0},
-    {AT(part), ROW_OF_PARTS, 1, MODEL_HAS_UNCERTAINTY, ANYTHING, 1},
-    {AT(drift_of_late), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(drift_quick), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(drift_slow), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(learned), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(drift), ROW_OF_JOINTS, 1, MODEL_HAS_DRIFT, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(contact_change), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(rest_tracked), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(rest_contact), ROW_OF_JOINTS, 1, MODEL_HAS_REST, FLAG, 0},
-    {AT(rest_extreme), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(carried_load), ROW_OF_JOINTS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(smooth_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(mark_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(mark_position), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(recent_force), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
-    {AT(recent_position), ROW_OF_TENDONS, 1, MODEL_HAS_REST, WITHIN(LARGEST_SUM), 0},
+    {AT(jumped), ROW_OF_JOINTS, 1, MODEL_DETECTS_BY_BANDS, WITHIN(LARGEST_SUM), 0},
+    {AT(bands), ROW_OF_BANDS, 1, MODEL_DETECTS_BY_BANDS, WITHIN(2.0 * LARGEST_SUM), 1},
     {AT(sensor), ROW_OF_TENDONS, SENSOR_ROWS, MODEL_HAS_SENSOR_FAULT, ANYTHING, 1},
     {AT(watch), ROW_OF_JOINTS, 1, MODEL_HAS_SENSOR_FAULT, 0.0, JOINT_BEGINS_ANEW, 1, 0},
     {AT(element), ROW_OF_ELEMENTS, 2, 0, WITHIN(LARGEST_SUM), 1},
@@ -195,7 +161,7 @@ size_t state_row_length(const tendonfmu_finger* finger, const state_row* row) {
     case ROW_OF_MEMORY: return finger->shape.elements ? row->rows * finger->slots : 0;
     case ROW_OF_ELEMENTS: return finger->shape.elements * row->rows * finger->slots;
     case ROW_OF_CORDS: return finger->shape.elements && finger->shape.stretches ? row->rows * finger->slots : 0;
-    case ROW_OF_PARTS: return finger->joints * finger->tendon_lanes + 3 * finger->joint_lanes;
+    case ROW_OF_BANDS: return finger->joint_lanes * (sizeof(band_memory) / sizeof(double));
     default: return finger->shape.extension_memory;
   }
 }
@@ -218,10 +184,12 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   finger_scratch* s = &f->scratch;
   const size_t matrix = f->joints * f->tendon_lanes;
   double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
-  double** const joint_rows[] = {&s->angle,     &s->torque,         &s->friction,      &s->bias_step,
-                                 &s->load,      &s->joint_friction, &s->load_friction, &s->joint_bias,
-                                 &s->load_bias, &s->stuck_friction, &s->uncertainty,   &s->residual_variance};
-  double** const slot_rows[] = {&s->edge_stuck, &s->pulley_stuck};
+  double** const joint_rows[] = {&s->angle,     &s->torque,           &s->friction,      &s->bias_step,
+                                 &s->load,      &s->joint_friction,   &s->load_friction, &s->joint_bias,
+                                 &s->load_bias, &s->residual_variance};
+  double** const band_rows[] = {&s->slip_torque, &s->limit, &s->motor_load};
+  double** const limit_rows[] = {&s->edge_limit, &s->pulley_limit};
+  const int banded = (f->shape.options & MODEL_DETECTS_BY_BANDS) != 0;
   double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,
                                &s->edge_loss, &s->pulley_loss, &s->force_at,  &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
@@ -233,22 +201,12 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   for (size_t i = 0; i < sizeof matrices / sizeof matrices[0]; ++i) {
     *matrices[i] = take_numbers(c, matrix);
   }
-  for (size_t i = 0; i < sizeof slot_rows / sizeof slot_rows[0]; ++i) {
-    *slot_rows[i] = take_numbers(c, f->slots);
+  for (size_t i = 0; i < sizeof band_rows / sizeof band_rows[0]; ++i) {
+    *band_rows[i] = take_numbers(c, banded ? f->joint_lanes : 0);
   }
-  s->part = take_numbers(c, matrix + 3 * f->joint_lanes);
-  const int starts = (f->shape.options & MODEL_HAS_START_SHARE) != 0;
-  s->edge_turned = take_numbers(c, starts ? f->slots : 0);
-  s->pulley_turned = take_numbers(c, starts ? f->slots : 0);
-  s->start_left = take_numbers(c, starts ? f->slots : 0);
-  s->turned = take_numbers(c, starts ? f->joint_lanes : 0);
-  s->drift_share = take_numbers(c, f->shape.options & MODEL_HAS_DRIFT ? 4 : 0);
-  const int resting = (f->shape.options & MODEL_HAS_REST) != 0;
-  s->motor_position = take_numbers(c, resting ? f->tendon_lanes : 0);
-  s->force_change = take_numbers(c, resting ? f->tendon_lanes : 0);
-  s->rest_noise = take_numbers(c, resting ? f->joint_lanes : 0);
-  s->rest_bound = take_numbers(c, resting ? f->joint_lanes : 0);
-  s->rest_sudden_bound = take_numbers(c, resting ? f->joint_lanes : 0);
+  for (size_t i = 0; i < sizeof limit_rows / sizeof limit_rows[0]; ++i) {
+    *limit_rows[i] = take_numbers(c, banded ? f->slots : 0);
+  }
   const size_t sensors = f->shape.options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
   s->sensor = take_numbers(c, sensors * SENSOR_ROWS * f->tendon_lanes);
   s->watch = take_numbers(c, sensors * f->joint_lanes);

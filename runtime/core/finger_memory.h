@@ -7,6 +7,7 @@
  * together, so what fig. 5 remembers of an effect is kept once per slot. */
 #pragma once
 
+#include "detect/contact_bands.h"
 #include "friction_law.h"
 #include "link_geometry.h"
 #include "model_image.h"
@@ -31,25 +32,9 @@ typedef struct finger_settings {
   double drift_variance, noise_std, noise_std_per_force, forget_rate;
   double initial_variance; /* < 0: from the noise at the first sample */
   double noise_time;       /* < 0: noise per sample */
-  int has_start_share;
-  double start_share; /* of friction as it stood before the first sample */
   int has_initial_torque, has_tendon_zero;
   int forgets_by_absorption;
-  /* the detector */
-  int bounds_friction, bounds_presliding, knows_uncertainty, uses_innovation;
-  double innovation_time;
-  double evidence_time;                      /* < 0: not by CUSUM */
-  double stuck_share, jump_share, jump_rate; /* jump_rate: 1/T_J, 1/s */
-  double stuck_rate;                         /* 1/T_H, 1/s; < 0: H is that of the sample */
-  double uncertainty_level, release_ratio, hold_time;
-  double release_time; /* < 0: never */
-  int watches_drift;
-  double drift_quick_time, drift_slow_time; /* s */
-  int watches_rest;
-  double rest_travel, rest_settle_time, rest_fall_share; /* m, s, 1 */
-  double rest_innovation_rate;                           /* 1/T, 1/s; < 0: none */
-  double rest_averaging_rate;                            /* 1/s; < 0: none */
-  int watches_sensors;
+  int has_bands, watches_motors, watches_sensors;
   double fault_hold_time, recovery_time;                     /* s */
   double force_resolution, jump_margin, position_resolution; /* N, N, m */
 } finger_settings;
@@ -110,14 +95,12 @@ typedef struct derived_numbers {
   uint32_t* edge_record;   /* [n × M] first record of the edge; 0 holds zeros for edges without friction */
   double* joint_law;       /* [N × LAW_NUMBERS] T_jv0 */
   double* load_law;        /* [N × LAW_NUMBERS] T_jvf */
-  double *cover_stiffness, *cover_rest;                                   /* [N] */
-  double *contact_threshold, *contact_per_force;                          /* [N] */
-  double* initial_torque;                                                 /* [N] */
-  double *innovation_threshold, *innovation_per_force;                    /* [N] */
-  double *deviation, *deviation_per_force;                                /* [N] */
-  double *drift_threshold, *drift_per_force;                              /* [N] with contact.drift only */
-  double *rest_threshold, *rest_per_force, *rest_creep, *rest_innovation; /* [N] with contact.rest only */
-  double* direction;   /* [n × (m + 3) × 4] relative errors, the directions of a joint side by side */
+  double *cover_stiffness, *cover_rest;          /* [N] */
+  double *contact_threshold, *contact_per_force; /* [N] */
+  double* initial_torque;                        /* [N] */
+  double *deviation, *deviation_per_force;       /* [N] */
+  double* band_square; /* [n × BANDS × BAND_NUMBERS] squares of the numbers of contact.bands */
+  double* load_arm;    /* [n × M] r_ij·k_i; this and the one before with contact.bands only */
   link_geometry links; /* arrays NULL without links */
   int* least_link;     /* [n] of find_least_links() */
   double* axis_cosine; /* [n × n] between the axes of two joints, 1 without links; with extensions only */
@@ -131,18 +114,11 @@ enum {
   STATE_FIRST_SAMPLE,    /* 1 while the last sample is the first */
   STATE_VELOCITY_GAIN,   /* ∂v_k/∂q_k of the last sample, 1/s */
   STATE_CONTACT,         /* 0 or 1 */
-  STATE_CONTACT_SINCE,   /* s, first sample of the contact that lasts */
   STATE_ABSORBED,        /* Λ: Σ −ln(1 − K) over the updates of the bias */
   STATE_ABSORBED_BEFORE, /* the same before the last sample's update */
-  STATE_STANDING,        /* 1 in a rest of the motors; this and what follows: with contact.rest, else 0 */
-  STATE_MARKED_AT,       /* s, begin of the rest, or of the wait for one */
-  STATE_CONTACT_AT_REST, /* 0 or 1 */
-  STATE_RECENT_AT,       /* s, from which on motion counts as recent */
-  STATE_STARTED_AT,      /* s, first sample; with contact.drift, else 0 */
   STATE_UNWELL,          /* 1 where a sensor fails or a joint is not watched; with sensor_fault, else 0 */
-  STATE_START_OPEN,      /* 1 while there is anything to learn of the start; with bias.start_share, else 0 */
   STATE_STEP,            /* Δt of the last sample, s; 0 of the first */
-  STATE_SCALARS = 20     /* a multiple of 4: the rows stay aligned */
+  STATE_SCALARS = 12     /* a multiple of 4: the rows stay aligned */
 };
 
 /* Rows of tendons that sensor_fault remembers. */
@@ -175,14 +151,11 @@ typedef struct finger_state {
   double* scalar; /* [STATE_SCALARS] */
   /* [N] per joint */
   double *angle, *speed, *torque, *friction, *compensated, *bias, *joint_contact;
-  double* variance;                       /* P, (N·m)² */
-  double* gain;                           /* K; 0 where the bias is not updated */
-  double *residual, *innovation;          /* r before the update, y = r − m */
-  double* tracked;                        /* m, what the innovation is taken from */
-  double *stuck_friction, *friction_jump; /* H, J */
-  double* evidence;                       /* g of the CUSUM, s */
-  double* exceeded_at;                    /* s, last sample at which the joint exceeded; read in contact only */
-  double* total_variance;                 /* square of compensated_torque_std */
+  double* variance;       /* P, (N·m)² */
+  double* gain;           /* K; 0 where the bias is not updated */
+  double* residual;       /* r before the update */
+  double* level;          /* contact_level */
+  double* total_variance; /* square of compensated_torque_std */
   /* [M] per tendon */
   double *force, *slack;
   /* [n × M + N] per slot, fig. 5 */
@@ -191,21 +164,10 @@ typedef struct finger_state {
   double* side_before;              /* side before the last sample */
   double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
   double *stuck_since, *last_stuck; /* s */
-  double *start_left, *unlearned;   /* [n × M + N] share of how an effect stood at the start that motion has not turned
-                                       over, [N] V, N·m; with start_share only */
-  double* part; /* [n × M + 3N] torques of tendons; T_jv0, T_jvf·Σ f_B, T_jq; with uncertainty only */
-  /* [N] N·m, with contact.drift only: u, p, s, what the bias has learned since the start, d */
-  double *drift_of_late, *drift_quick, *drift_slow, *learned, *drift;
-  /* with contact.rest only */
-  double* contact_change; /* [N] c, N·m; 0 outside a rest */
-  double* rest_tracked;   /* [N] m, N·m, what y = c − m is taken from; 0 without innovation */
-  double* rest_contact;   /* [N] 1 or 0: in contact at rest */
-  double* rest_extreme;   /* [N] N·m, largest change of the contact at rest; 0 without */
-  double* carried_load;   /* [N] ± N·m, bound of a load from the rest before; 0: none */
-  double *smooth_force, *mark_force, *mark_position; /* [M] f̄, f̄ and x0 at the mark */
-  double *recent_force, *recent_position;            /* [M] f̄ and x0 at the recent mark */
-  double* sensor;                                    /* [SENSOR_ROWS × M]; this and the next with sensor_fault only */
-  double* watch;                                     /* [N] joint_watch of the last sample */
+  double* jumped;                   /* [N] Σ Δb, N·m; this and the next with contact.bands only */
+  double* bands;                    /* [N] band_memory */
+  double* sensor;                   /* [SENSOR_ROWS × M]; this and the next with sensor_fault only */
+  double* watch;                    /* [N] joint_watch of the last sample */
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
   double *by_turning, *by_limit; /* [2 × (n × M + N)] ∂F/∂c0, ∂F/∂lim of the last sample */
@@ -221,7 +183,7 @@ typedef enum row_lanes {
   ROW_OF_MEMORY, /* of slots, where friction has a memory */
   ROW_OF_ELEMENTS,
   ROW_OF_CORDS,
-  ROW_OF_PARTS,
+  ROW_OF_BANDS,
   ROW_OF_EXTENSIONS
 } row_lanes;
 
@@ -266,33 +228,26 @@ typedef struct finger_scratch {
   double* slack;      /* [M] */
   double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
-  double *edge_stuck, *pulley_stuck; /* [n × M + N] |F| where the effect sticks, 0 elsewhere; joints T_jv0, T_jvf */
-  double *edge_turned, *pulley_turned, *start_left; /* [n × M + N] |F| whose start this sample turns over, what is left
-                                                       of the start after it; with start_share only */
-  double* turned;                                   /* [N] G, N·m; with start_share only */
-  int start_remains;                                /* motion has not turned over all of the start */
-  double* drift_share;                   /* [4] of u, p, s: the weight of e in them; with contact.drift only */
-  double *stuck_friction, *uncertainty;  /* [N] H of what sticks now, u */
-  double* residual_variance;             /* [N] S, (N·m)²; of a guided sample only */
-  double* part;                          /* as in the state */
-  double *motor_position, *force_change; /* [M] x0 as it was given, f̄ less that of the mark; with contact.rest only */
-  double *rest_noise, *rest_bound, *rest_sudden_bound; /* [N] N, D, B; with contact.rest only */
+  /* with contact.bands only */
+  double *edge_limit, *pulley_limit; /* [n × M + N] |F| of the law, whether it acts or not; joints T_jv0, T_jvf */
+  double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
+  double* motor_load;                /* [N] x, N·m */
+  band_shares shares;                /* of the last step */
+  double* residual_variance;         /* [N] S, (N·m)²; of a guided sample only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
   double* watch;  /* [N] likewise */
-  double* inverse_routing;           /* [n × M] R⁺ of the rows in use */
-  double* leverage;                  /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;                /* [M] 1: the others determine the angles */
-  double* row_in_use;                /* [M] 1 or 0 */
-  double* angle_shift;               /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;             /* no row in use belongs to a failing sensor */
-  int unwell;                        /* as in the state, after this sample */
-  double* extension;                 /* the memory of the extensions after this sample */
-  double *edge_loss, *pulley_loss;   /* [n × M] N, what a tendon loses there */
-  double *grip, *bias_grip;          /* [n × M + N] what friction rows make of F and b; with extensions only */
-  double *whole_edge, *whole_pulley; /* [n × M + N] grip·|F| of the law; with extensions only */
-  double* own_limit;                 /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
-  double *travelled, *kept;          /* [n × M + N] Δ; the share left of what was held before this sample; this and
-                                      * the next with a memory only */
+  double* inverse_routing;         /* [n × M] R⁺ of the rows in use */
+  double* leverage;                /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;              /* [M] 1: the others determine the angles */
+  double* row_in_use;              /* [M] 1 or 0 */
+  double* angle_shift;             /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;           /* no row in use belongs to a failing sensor */
+  int unwell;                      /* as in the state, after this sample */
+  double* extension;               /* the memory of the extensions after this sample */
+  double *edge_loss, *pulley_loss; /* [n × M] N, what a tendon loses there */
+  double *grip, *bias_grip;        /* [n × M + N] what friction rows make of F and b; with extensions only */
+  double* own_limit;               /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
+  double* travelled;               /* [n × M + N] Δ; this and the next with a memory only */
   double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
   effect_sample sample;                              /* as the extensions see it */
 } finger_scratch;
@@ -327,9 +282,9 @@ struct tendonfmu_finger {
   char error[ERROR_BYTES];
 };
 
-/* 1 while there is anything to learn of how friction stood at the start */
-static inline int start_is_open(const tendonfmu_finger* finger) {
-  return finger->remembered.scalar[STATE_START_OPEN] != 0.0;
+/* What a joint's bands remember. */
+static inline band_memory* bands_of(const tendonfmu_finger* finger, size_t joint) {
+  return (band_memory*)(void*)finger->remembered.bands + joint;
 }
 
 /* Row of the sensors in memory. */

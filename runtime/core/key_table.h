@@ -8,7 +8,7 @@ enum {
   MODEL_MAX_JOINTS = 16,
   MODEL_MAX_TENDONS = 64,
   MODEL_MAX_POINTS = 256,
-  MODEL_MAX_DIRECTIONS = 4,
+  MODEL_MAX_BANDS = 4,
   MODEL_MAX_EXTENSIONS = 1024
 };
 
@@ -33,37 +33,16 @@ typedef enum model_item_kind {
   ITEM_FORGET_RATE, /* bias.forget_rate */
   ITEM_INITIAL_TORQUE, /* bias.initial_torque[j] */
   ITEM_NOISE_TIME, /* bias.noise_time */
-  ITEM_START_SHARE, /* bias.start_share */
   ITEM_CONTACT_THRESHOLD, /* contact.threshold[j] */
   ITEM_CONTACT_PER_FORCE, /* contact.threshold_per_force[j] */
-  ITEM_INNOVATION_TIME, /* contact.innovation.time */
-  ITEM_INNOVATION_THRESHOLD, /* contact.innovation.threshold[j] */
-  ITEM_INNOVATION_PER_FORCE, /* contact.innovation.threshold_per_force[j] */
-  ITEM_EVIDENCE_TIME, /* contact.innovation.evidence_time */
-  ITEM_STUCK_SHARE, /* contact.friction_bound.stuck_share */
-  ITEM_JUMP_SHARE, /* contact.friction_bound.jump_share */
-  ITEM_JUMP_TIME, /* contact.friction_bound.jump_time */
-  ITEM_STUCK_TIME, /* contact.friction_bound.stuck_time */
-  ITEM_UNCERTAINTY, /* contact.uncertainty[j,d,k] */
-  ITEM_UNCERTAINTY_LEVEL, /* contact.uncertainty_level */
+  ITEM_BAND_NOISE, /* contact.bands[d].noise[j] */
+  ITEM_BAND_FRICTION, /* contact.bands[d].friction[j] */
+  ITEM_BAND_FRICTION_LIMIT, /* contact.bands[d].friction_limit[j] */
+  ITEM_BAND_MOTOR_LOAD, /* contact.bands[d].motor_load[j] */
+  ITEM_BAND_FRICTION_CHANGE, /* contact.bands[d].friction_change[j] */
+  ITEM_BAND_FRICTION_RESERVE, /* contact.bands[d].friction_reserve[j] */
   ITEM_DEVIATION, /* contact.deviation[j] */
   ITEM_DEVIATION_PER_FORCE, /* contact.deviation_per_force[j] */
-  ITEM_RELEASE_RATIO, /* contact.release_ratio */
-  ITEM_HOLD_TIME, /* contact.hold_time */
-  ITEM_RELEASE_TIME, /* contact.release_time */
-  ITEM_DRIFT_QUICK_TIME, /* contact.drift.quick_time */
-  ITEM_DRIFT_SLOW_TIME, /* contact.drift.slow_time */
-  ITEM_DRIFT_THRESHOLD, /* contact.drift.threshold[j] */
-  ITEM_DRIFT_PER_FORCE, /* contact.drift.threshold_per_force[j] */
-  ITEM_REST_TRAVEL, /* contact.rest.travel */
-  ITEM_REST_SETTLE_TIME, /* contact.rest.settle_time */
-  ITEM_REST_AVERAGING_TIME, /* contact.rest.averaging_time */
-  ITEM_REST_THRESHOLD, /* contact.rest.threshold[j] */
-  ITEM_REST_PER_FORCE, /* contact.rest.threshold_per_force[j] */
-  ITEM_REST_CREEP, /* contact.rest.creep[j] */
-  ITEM_REST_FALL_SHARE, /* contact.rest.fall_share */
-  ITEM_REST_INNOVATION_TIME, /* contact.rest.innovation.time */
-  ITEM_REST_INNOVATION_THRESHOLD, /* contact.rest.innovation.threshold[j] */
   ITEM_LINK_AXIS, /* links[j].axis[c] */
   ITEM_LINK_OFFSET, /* links[j].offset[c] */
   ITEM_TIP, /* tip[c] */
@@ -76,9 +55,9 @@ typedef enum model_item_kind {
 } model_item_kind;
 
 /* Numbers of an item whose shape is in no shape word. */
-typedef enum key_count { KEY_ONE, KEY_PER_JOINT, KEY_PER_PART, KEY_THREE } key_count; /* parts: m + 3, of friction */
+typedef enum key_count { KEY_ONE, KEY_PER_JOINT, KEY_THREE } key_count;
 
-/* A number of the finger description. In its path %i is the tendon, %j the joint, %d the direction and %k the number
+/* A number of the finger description. In its path %i is the tendon, %j the joint, %d the band and %k the number
  * within its item, all from 1; %@ is .laws[…] where an edge has working points, %~ the side of an asymmetric law. */
 typedef struct key_row {
   const char* path;

@@ -68,15 +68,9 @@ static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* wor
   return word;
 }
 
-uint32_t model_direction_count(const model_shape* shape) {
-  return (shape->options & MODEL_UNCERTAINTY_DIRECTIONS) >> 10;
-}
-
-static void walk_directions(walk* w, uint32_t count) {
-  for (uint32_t j = 0; j < w->shape->joints; ++j) {
-    for (uint32_t d = 0; d < model_direction_count(w->shape); ++d) {
-      emit(w, (model_item){.kind = ITEM_UNCERTAINTY, .joint = j, .point = d}, count);
-    }
+static void walk_bands(walk* w, model_item_kind kind, uint32_t count) {
+  for (uint32_t k = 0; count && k < MODEL_MAX_BANDS; ++k) {
+    emit(w, (model_item){.kind = kind, .point = k}, count);
   }
 }
 
@@ -95,7 +89,6 @@ static uint32_t count_of(const model_shape* shape, model_item_kind kind) {
   }
   switch (row->count) {
     case KEY_PER_JOINT: return shape->joints;
-    case KEY_PER_PART: return shape->tendons + MODEL_DIRECTION_SHARES;
     case KEY_THREE: return 3;
     default: return 1;
   }
@@ -104,11 +97,12 @@ static uint32_t count_of(const model_shape* shape, model_item_kind kind) {
 static void walk_finger(walk* w) {
   for (int kind = ITEM_EDGE_FRICTION + 1; kind < ITEM_EXTENSION; ++kind) {
     const uint32_t count = count_of(w->shape, (model_item_kind)kind);
-    switch (kind) {
-      case ITEM_UNCERTAINTY: walk_directions(w, count); break;
-      case ITEM_LINK_AXIS: walk_links(w, count); break;
-      case ITEM_LINK_OFFSET: break; /* with the axes */
-      default: emit(w, (model_item){.kind = (model_item_kind)kind}, count); break;
+    if (kind >= ITEM_BAND_NOISE && kind <= ITEM_BAND_FRICTION_RESERVE) {
+      walk_bands(w, (model_item_kind)kind, count);
+    } else if (kind == ITEM_LINK_AXIS) {
+      walk_links(w, count); /* the offsets with them */
+    } else if (kind != ITEM_LINK_OFFSET) {
+      emit(w, (model_item){.kind = (model_item_kind)kind}, count);
     }
   }
 }
@@ -193,12 +187,8 @@ static uint64_t values_offset(const model_shape* shape) {
 
 /* −1 where one option needs another that is missing */
 static int check_options(const model_shape* shape) {
-  const uint32_t options = shape->options, directions = model_direction_count(shape);
-  const int cusum = (options & MODEL_DETECTS_BY_CUSUM) != 0, innovation = (options & MODEL_DETECTS_BY_INNOVATION) != 0;
-  const int uncertain = (options & MODEL_HAS_UNCERTAINTY) != 0;
-  const int alone = ((options & MODEL_HAS_REST_INNOVATION) && !(options & MODEL_HAS_REST)) ||
-                    ((options & MODEL_BOUNDS_PRESLIDING) && !(options & MODEL_HAS_FRICTION_BOUND));
-  return directions > MODEL_MAX_DIRECTIONS || (directions && !uncertain) || (cusum && !innovation) || alone ? -1 : 0;
+  const uint32_t both = MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS;
+  return (shape->options & both) == MODEL_WATCHES_MOTORS ? -1 : 0;
 }
 
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {

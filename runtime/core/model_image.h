@@ -33,8 +33,7 @@ enum {
   MODEL_VERSION = 1,
   MODEL_HEADER_BYTES = 56,
   MODEL_EXTENSION_WORDS = 4,
-  MODEL_MAX_ELEMENTS = 2,    /* rows of presliding at one place */
-  MODEL_DIRECTION_SHARES = 3 /* of a direction of uncertainty, beyond one a tendon */
+  MODEL_MAX_ELEMENTS = 2 /* rows of presliding at one place */
 };
 
 #define MODEL_EDGE_HAS_ANGLES 0x80000000u
@@ -61,7 +60,7 @@ typedef struct model_item {
   uint32_t first, count; /* parameter indices first .. first + count − 1 */
   uint32_t joint;        /* 0-based; of pulleys and edges: the position in the list */
   uint32_t tendon;       /* 0-based */
-  uint32_t point;        /* working point or direction, 0-based */
+  uint32_t point;        /* working point or band, 0-based */
   int has_angles;        /* the edge is a list of working points */
   law_kind law;          /* of laws */
   uint32_t extension;    /* 0-based */
@@ -75,9 +74,6 @@ int model_visit(const model_shape* shape, int (*visit)(void* context, const mode
 /* Where row `index` of the extensions acts, and how many numbers an effect remembers there. */
 effect_place model_extension_place(const model_shape* shape, uint32_t index);
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place);
-
-/* Directions of uncertainty that every joint has room for; joints with fewer have zeros there. */
-uint32_t model_direction_count(const model_shape* shape);
 
 /* Numbers of a law of this kind: 0, 4 or 8. */
 uint32_t model_law_count(law_kind kind);

@@ -19,14 +19,15 @@ typedef struct input_row {
   double* to;
 } input_row;
 
-/* the rows that the kinematics source, contact.rest and sensor_fault use; returns how many */
+/* the rows that the kinematics source, contact.watches_motors and sensor_fault use; returns how many */
 static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[MOST_ROWS]) {
   const finger_scratch* s = &f->scratch;
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
   const size_t m = f->tendons, n = f->joints;
   size_t count = 0;
   rows[count++] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
-  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest || f->derived.settings.watches_sensors) {
+  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_motors ||
+      f->derived.settings.watches_sensors) {
     rows[count++] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
   }
   if (source != TENDONFMU_TENDON_POSITIONS) {
@@ -65,7 +66,7 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
   for (size_t k = 0; k < count; ++k) {
     if (!rows[k].values) {
       message_start(message, rows[k].name);
-      message_text(message, " is missing: this kinematics source, or contact.rest or sensor_fault, needs it");
+      message_text(message, " is missing: this kinematics source, or contact.watches_motors or sensor_fault, needs it");
       return -1;
     }
     memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
@@ -112,39 +113,18 @@ static void give_deviations(double* to, const double* variance, size_t count, si
   }
 }
 
-/* the lanes of a finger without gaps: m tendons, then T_jv0, T_jvf·Σ f_B, T_jq of each joint */
-static void give_parts(double* to, const tendonfmu_finger* f, size_t row) {
-  const size_t n = f->joints, m = f->tendons, width = m + MODEL_DIRECTION_SHARES;
-  const double* part = f->derived.settings.knows_uncertainty ? f->remembered.part : NULL;
+/* 0 without contact.bands */
+static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
+  const size_t width = BANDS * BAND_TERMS, n = f->joints;
   for (size_t j = 0; to && j < n; ++j) {
-    double* place = to + (row * n + j) * width;
-    for (size_t i = 0; i < m; ++i) {
-      place[i] = part ? part[j * f->tendon_lanes + i] : 0.0;
+    for (size_t k = 0; k < BANDS; ++k) {
+      double* terms = to + (row * n + j) * width + k * BAND_TERMS;
+      if (f->derived.settings.has_bands) {
+        band_terms(bands_of(f, j), k, terms);
+      } else {
+        memset(terms, 0, BAND_TERMS * sizeof *terms);
+      }
     }
-    for (size_t k = 0; k < MODEL_DIRECTION_SHARES; ++k) {
-      place[m + k] = part ? part[n * f->tendon_lanes + k * f->joint_lanes + j] : 0.0;
-    }
-  }
-}
-
-/* 0 without contact.drift */
-static void give_drift(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  if (finger->derived.settings.watches_drift) {
-    give_numbers(outputs->drift, finger->remembered.drift, finger->joints, row);
-  } else if (outputs->drift) {
-    memset(outputs->drift + row * finger->joints, 0, finger->joints * sizeof(double));
-  }
-}
-
-/* contact at rest; 0 without contact.rest */
-static void give_rest(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  const finger_state* s = &finger->remembered;
-  const size_t n = finger->joints;
-  give_flags(outputs->contact_at_rest, s->scalar + STATE_CONTACT_AT_REST, 1, row);
-  if (outputs->contact_change && finger->derived.settings.watches_rest) {
-    give_numbers(outputs->contact_change, s->contact_change, n, row);
-  } else if (outputs->contact_change) {
-    memset(outputs->contact_change + row * n, 0, n * sizeof(double));
   }
 }
 
@@ -193,13 +173,9 @@ void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_output
   give_flags(outputs->slack, s->slack, finger->tendons, row);
   give_deviations(outputs->compensated_torque_std, s->total_variance, n, row);
   give_numbers(outputs->residual, s->residual, n, row);
-  give_numbers(outputs->innovation, s->innovation, n, row);
-  give_numbers(outputs->stuck_friction, s->stuck_friction, n, row);
-  give_numbers(outputs->friction_jump, s->friction_jump, n, row);
-  give_drift(finger, outputs, row);
-  give_parts(outputs->friction_parts, finger, row);
+  give_numbers(outputs->contact_level, s->level, n, row);
+  give_terms(outputs->contact_terms, finger, row);
   give_place(finger, outputs, row);
-  give_rest(finger, outputs, row);
   give_sensors(finger, outputs, row);
 }
 

@@ -194,74 +194,25 @@ std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
          (word_of(bias.member("forgetting"), words_of("bias.forgetting")) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u);
 }
 
+/* bands, and what else the method needs or does not take */
 std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
-  const std::size_t method = word_of(contact.member("method"), words_of("contact.method"));
-  const json_node innovation = contact.member("innovation");
-  if (method == 0) {
-    if (!innovation.absent()) {
-      throw description_error(
-          innovation.path() +
-          ": not allowed with contact.method \"threshold\"; it belongs to \"innovation\" and \"cusum\"");
-    }
+  if (word_of(contact.member("method"), words_of("contact.method")) == 0) {
+    expect_none(contact, {"bands", "watches_motors"}, "contact.method \"paper\"; it belongs to \"bands\"");
     return 0u;
   }
-  if (innovation.absent()) {
-    innovation.refuse("an object with time and threshold, which contact.method needs");
+  const json_node bands = contact.member("bands"), motors = contact.member("watches_motors");
+  bands.expect_list(MODEL_MAX_BANDS, MODEL_MAX_BANDS, "objects with the numbers of each band");
+  for (std::size_t k = 0; k < MODEL_MAX_BANDS; ++k) {
+    check_lists(bands.element(k).expect_keys(keys_of("contact.bands")), "contact.bands", joints);
   }
-  innovation.expect_keys(keys_of("contact.innovation"));
-  check_lists(innovation, "contact.innovation", joints);
-  if (method == 1) {
-    expect_none(innovation, {"evidence_time"}, "contact.method \"innovation\"; it belongs to \"cusum\"");
-    return MODEL_DETECTS_BY_INNOVATION;
-  }
-  return unsigned{MODEL_DETECTS_BY_INNOVATION} | unsigned{MODEL_DETECTS_BY_CUSUM};
+  return unsigned{MODEL_DETECTS_BY_BANDS} |
+         (!motors.absent() && motors.boolean() ? unsigned{MODEL_WATCHES_MOTORS} : 0u);
 }
 
-std::uint32_t read_uncertainty(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
-  const json_node uncertainty = contact.member("uncertainty");
-  std::uint32_t most = 0;
-  if (uncertainty.absent()) {
-    const json_node level = contact.member("uncertainty_level");
-    if (!level.absent()) {
-      throw description_error(level.path() + ": not allowed without contact.uncertainty");
-    }
-    return 0u;
-  }
-  uncertainty.expect_list(joints, joints, "lists of directions, one per joint");
-  for (std::uint32_t j = 0; j < joints; ++j) {
-    const json_node directions = uncertainty.element(j);
-    if (directions.absent()) {
-      continue;
-    }
-    directions.expect_list(0, MODEL_MAX_DIRECTIONS, "directions");
-    for (std::size_t d = 0; d < directions.size(); ++d) {
-      const std::uint32_t shares = tendons + MODEL_DIRECTION_SHARES;
-      directions.element(d).expect_list(shares, shares,
-                                        "relative errors: of the tendons, joint friction, load friction, cover");
-    }
-    most = std::max(most, static_cast<std::uint32_t>(directions.size()));
-  }
-  return unsigned{MODEL_HAS_UNCERTAINTY} | most << 10;
-}
-
-std::uint32_t read_rest(const json_node& rest, std::uint32_t joints) {
-  return read_object(rest, "contact.rest", joints, MODEL_HAS_REST) |
-         read_object(rest.member("innovation"), "contact.rest.innovation", joints, MODEL_HAS_REST_INNOVATION);
-}
-
-std::uint32_t read_friction_bound(const json_node& bound, std::uint32_t joints) {
-  const std::uint32_t options = read_object(bound, "contact.friction_bound", joints, MODEL_HAS_FRICTION_BOUND);
-  const json_node presliding = bound.member("stuck_presliding");
-  return options | (!presliding.absent() && presliding.boolean() ? unsigned{MODEL_BOUNDS_PRESLIDING} : 0u);
-}
-
-std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints, std::uint32_t tendons) {
+std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints) {
   contact.expect_keys(keys_of("contact"));
   check_lists(contact, "contact", joints);
-  return read_method(contact, joints) | read_uncertainty(contact, joints, tendons) |
-         read_friction_bound(contact.member("friction_bound"), joints) | given_options(contact, "contact") |
-         read_object(contact.member("drift"), "contact.drift", joints, MODEL_HAS_DRIFT) |
-         read_rest(contact.member("rest"), joints);
+  return read_method(contact, joints) | given_options(contact, "contact");
 }
 
 std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
@@ -301,7 +252,10 @@ void check_estimated(const json_node& estimated) {
 }
 
 void refuse_dropped(const json_node& document) {
-  for (const char* key : {"position_filter", "bias.entry_load", "velocity_threshold.hysteresis"}) {
+  for (const char* key :
+       {"position_filter", "velocity_threshold.hysteresis", "bias.entry_load", "bias.start_share", "contact.innovation",
+        "contact.friction_bound", "contact.uncertainty", "contact.uncertainty_level", "contact.release_ratio",
+        "contact.hold_time", "contact.release_time", "contact.drift", "contact.rest"}) {
     if (!document.find(key).absent()) {
       throw description_error(std::string(key) + ": no longer a key; leave it out, or calibrate again");
     }
@@ -343,7 +297,7 @@ finger_shape read_shape(const json_node& document) {
   }
   finger.shape.options |=
       read_bias_options(document.member("bias"), finger.shape.joints) |
-      read_contact_options(document.member("contact"), finger.shape.joints, finger.shape.tendons) |
+      read_contact_options(document.member("contact"), finger.shape.joints) |
       given_options(document.member("velocity_threshold"), "velocity_threshold") |
       read_links(document, finger.shape.joints) |
       read_object(document.member("sensor_fault"), "sensor_fault", finger.shape.joints, MODEL_HAS_SENSOR_FAULT);

@@ -23,7 +23,7 @@ void free_finger::set(const std::vector<double>& numbers) {
   model_visit(
       &finger_->shape,
       [](void* context, const model_item* item) {
-        if (item->kind == ITEM_CONTACT_THRESHOLD || item->kind == ITEM_INNOVATION_THRESHOLD) {
+        if (item->kind == ITEM_CONTACT_THRESHOLD || item->kind == ITEM_BAND_NOISE) {
           const double highest = parameter_range_of(item, item->first).maximum;
           std::fill_n(static_cast<double*>(context) + item->first, item->count, highest);
         }

@@ -88,9 +88,8 @@ size_t tendonfmu_tendon_count(const tendonfmu_finger* finger);
 /* 1 when the description has links, so that outputs from fingertip_force on mean something. */
 int tendonfmu_has_links(const tendonfmu_finger* finger);
 
-/* 1 when the description has contact.rest, so that contact_change and contact_at_rest mean something; tendon_position
- * is then needed with every kinematics source. */
-int tendonfmu_watches_rest(const tendonfmu_finger* finger);
+/* 1 when the description has contact.watches_motors: tendon_position is then needed with every kinematics source. */
+int tendonfmu_watches_motors(const tendonfmu_finger* finger);
 
 /* 1 when the description has sensor_fault, so that sensor_fault and contact_observable mean something; tendon_position
  * is then needed with every kinematics source. */
@@ -125,8 +124,8 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
 /* Takes `samples` samples in one call: initialises with the first where the finger is not initialised yet.
  *   time          [samples] s, increasing
  *   inputs        arrays of [samples × m] and [samples × n]
- *   outputs       arrays of [samples × n], [samples × m], contact and others of [1] [samples], friction_parts
- *                 [samples × n × (m + 3)], fingertip_force and its std [samples × 3]; NULL arrays are not wanted
+ *   outputs       arrays of [samples × n], [samples × m], contact and others of [1] [samples], contact_terms
+ *                 [samples × n × 4 × 8], fingertip_force and its std [samples × 3]; NULL arrays are not wanted
  *   done          receives the number of samples taken (may be NULL); on an error it is the row that was refused,
  *                 and the outputs of the rows before it are written */
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,

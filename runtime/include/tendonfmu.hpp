@@ -144,8 +144,8 @@ class finger {
   bool has_links() const noexcept {
     return tendonfmu_has_links(handle_) != 0;
   }
-  bool watches_rest() const noexcept {
-    return tendonfmu_watches_rest(handle_) != 0;
+  bool watches_motors() const noexcept {
+    return tendonfmu_watches_motors(handle_) != 0;
   }
   bool watches_sensors() const noexcept {
     return tendonfmu_watches_sensors(handle_) != 0;

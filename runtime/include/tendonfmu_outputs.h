@@ -27,16 +27,6 @@ typedef struct tendonfmu_outputs {
   unsigned char* slack;
   /* [n] N·m: Standard deviation of the compensated torque of joint i as an estimate of the external torque */
   double* compensated_torque_std;
-  /* [n] N·m: Torque of the tendons at joint i less the modelled friction, before the bias is updated */
-  double* residual;
-  /* [n] N·m: What the residual of joint i has of late beyond its slow part; 0 with method threshold */
-  double* innovation;
-  /* [n] N·m: Friction H of joint i that stiction can hold; 0 without contact.friction_bound */
-  double* stuck_friction;
-  /* [n] N·m: Jump J of the modelled friction of joint i of late; 0 without contact.friction_bound */
-  double* friction_jump;
-  /* [n × (m + 3)] N·m: Friction of joint i by its m + 3 parts: each tendon, T_jv0, T_jvf times the sum of f_B, T_jq; of fingers with contact.uncertainty */
-  double* friction_parts;
   /* [3] N: Force on the fingertip from outside that explains the compensated torques best, base frame, axis i; 0 along directions that they do not tell; of fingers with links, else 0; computed when one of them is asked for */
   double* fingertip_force;
   /* [3] N: Standard deviation of the force at the tip, base frame, axis i, of the directions that the torques tell; 0 where their own is not known; of fingers with links, else 0; computed when one of them is asked for */
@@ -47,16 +37,16 @@ typedef struct tendonfmu_outputs {
   double* fingertip_force_misfit;
   /* [1]: Contact is on this link, counted from 1, or beyond it; 0 no contact, -1 contact of which the torques do not tell the link; of fingers with links, else 0; computed when one of them is asked for */
   int* contact_link;
-  /* [n] N·m: Change of the torque of the tendons at joint i since the motors came to rest; 0 while they do not stand; of fingers with contact.rest, else 0 */
-  double* contact_change;
-  /* [1]: True when the motors stand and the torque of a joint has changed by more than noise and creep; of fingers with contact.rest, else 0 */
-  unsigned char* contact_at_rest;
-  /* [n] N·m: How far a slow load may have come at joint i; 0 without contact.drift */
-  double* drift;
   /* [m]: True when the force or the position of tendon i contradicts its spring: a sensor fails; of fingers with sensor_fault, else 0 */
   unsigned char* sensor_fault;
   /* [1]: False while a failing sensor keeps contact at some joint from being seen; of fingers with sensor_fault, else 0 */
   unsigned char* contact_observable;
+  /* [n] N·m: Torque of the tendons at joint i less the modelled friction, before the bias is updated */
+  double* residual;
+  /* [n]: How near joint i is to contact: what changes there over its bound; contact begins above 1 */
+  double* contact_level;
+  /* [n × 4 × 8] N·m: What the bounds of joint i are learned from, by band: change, that of it which counts, 1, and five torques in the order of contact.bands; of fingers with contact.bands, else 0 */
+  double* contact_terms;
 } tendonfmu_outputs;
 
 #endif

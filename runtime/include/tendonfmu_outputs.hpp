@@ -20,21 +20,16 @@ struct outputs {
   span<unsigned char> contact = {};
   span<unsigned char> slack = {};
   span<double> compensated_torque_std = {};
-  span<double> residual = {};
-  span<double> innovation = {};
-  span<double> stuck_friction = {};
-  span<double> friction_jump = {};
-  span<double> friction_parts = {};
   span<double> fingertip_force = {};
   span<double> fingertip_force_std = {};
   span<unsigned char> fingertip_force_observable = {};
   span<double> fingertip_force_misfit = {};
   span<int> contact_link = {};
-  span<double> contact_change = {};
-  span<unsigned char> contact_at_rest = {};
-  span<double> drift = {};
   span<unsigned char> sensor_fault = {};
   span<unsigned char> contact_observable = {};
+  span<double> residual = {};
+  span<double> contact_level = {};
+  span<double> contact_terms = {};
 };
 
 namespace detail {
@@ -53,21 +48,16 @@ void for_each_output(const outputs& arrays, tendonfmu_outputs& c, std::size_t jo
   visit("contact", arrays.contact, c.contact, 1);
   visit("slack", arrays.slack, c.slack, tendons);
   visit("compensated_torque_std", arrays.compensated_torque_std, c.compensated_torque_std, joints);
-  visit("residual", arrays.residual, c.residual, joints);
-  visit("innovation", arrays.innovation, c.innovation, joints);
-  visit("stuck_friction", arrays.stuck_friction, c.stuck_friction, joints);
-  visit("friction_jump", arrays.friction_jump, c.friction_jump, joints);
-  visit("friction_parts", arrays.friction_parts, c.friction_parts, joints * (tendons + 3));
   visit("fingertip_force", arrays.fingertip_force, c.fingertip_force, 3);
   visit("fingertip_force_std", arrays.fingertip_force_std, c.fingertip_force_std, 3);
   visit("fingertip_force_observable", arrays.fingertip_force_observable, c.fingertip_force_observable, 1);
   visit("fingertip_force_misfit", arrays.fingertip_force_misfit, c.fingertip_force_misfit, 1);
   visit("contact_link", arrays.contact_link, c.contact_link, 1);
-  visit("contact_change", arrays.contact_change, c.contact_change, joints);
-  visit("contact_at_rest", arrays.contact_at_rest, c.contact_at_rest, 1);
-  visit("drift", arrays.drift, c.drift, joints);
   visit("sensor_fault", arrays.sensor_fault, c.sensor_fault, tendons);
   visit("contact_observable", arrays.contact_observable, c.contact_observable, 1);
+  visit("residual", arrays.residual, c.residual, joints);
+  visit("contact_level", arrays.contact_level, c.contact_level, joints);
+  visit("contact_terms", arrays.contact_terms, c.contact_terms, joints * 32);
 }
 
 }  // namespace detail

@@ -14,23 +14,10 @@ NULL: Schema = {"type": "null"}
 LAW = "F(v) = sgn(v)·(coulomb + (static − coulomb)·exp(−|v|/stribeck_velocity) + viscous·|v|), static >= coulomb"
 
 # What must hold between keys; the reader in runtime/description/shape_reader.cpp has the same in C++.
-_NEEDS_INNOVATION = {
-    "if": {"properties": {"method": {"enum": ["innovation", "cusum"]}}, "required": ["method"]},
-    "then": {"required": ["innovation"], "properties": {"innovation": {"type": "object"}}},
-    "else": {"properties": {"innovation": NULL}},
-}
-_NEEDS_EVIDENCE = {
-    "if": {"properties": {"method": {"const": "cusum"}}, "required": ["method"]},
-    "then": {
-        "properties": {
-            "innovation": {"required": ["evidence_time"], "properties": {"evidence_time": {"type": "number"}}}
-        }
-    },
-    "else": {"properties": {"innovation": {"properties": {"evidence_time": NULL}}}},
-}
-_LEVEL_NEEDS_UNCERTAINTY = {
-    "if": {"properties": {"uncertainty": {"type": "array"}}, "required": ["uncertainty"]},
-    "else": {"properties": {"uncertainty_level": NULL}},
+_NEEDS_BANDS = {
+    "if": {"properties": {"method": {"const": "bands"}}, "required": ["method"]},
+    "then": {"required": ["bands"], "properties": {"bands": {"type": "array"}}},
+    "else": {"properties": {"bands": NULL, "watches_motors": NULL}},
 }
 RULES: Mapping[str, Schema] = {
     "": {
@@ -38,7 +25,7 @@ RULES: Mapping[str, Schema] = {
         "then": {"required": ["tip"], "properties": {"tip": {"type": "array"}}},
         "else": {"properties": {"tip": NULL}},
     },
-    "contact": {"allOf": [_NEEDS_INNOVATION, _NEEDS_EVIDENCE, _LEVEL_NEEDS_UNCERTAINTY]},
+    "contact": _NEEDS_BANDS,
 }
 PLACES: Mapping[str, Schema] = {
     "exactly one": {"oneOf": [{"$ref": "#/$defs/at_joint"}, {"$ref": "#/$defs/at_tendon"}]},
@@ -106,10 +93,6 @@ def _of_number(facts: Facts, row: Row) -> Schema:
         default = {"default": row["default"]} if "default" in row else {}
         return described | _number(row, optional) | default
     item = _number(row, "default" in row)
-    if row["item"] == "UNCERTAINTY":
-        shares = _list((4, limits["tendons"] + 3), item, nullable=False)
-        directions = {"type": ["array", "null"], "maxItems": limits["directions"], "items": shares}
-        return described | _list((1, limits["joints"]), directions, optional)
     if row["path"].endswith("[c]"):
         some = {"contains": {"not": {"const": 0}}} if row["item"] == "LINK_AXIS" else {}
         return described | _list((3, 3), item, optional) | some
@@ -126,8 +109,10 @@ def _of_key(facts: Facts, row: Row) -> Schema:
     if kind == "object":
         return _object(facts, row)
     if kind == "list":
-        most = limits["tendons" if row["path"] == "tendons" else "joints"]
-        return described | _list((1, most), {"$ref": f"#/$defs/{row['path'][:-1]}"}, "required" not in row)
+        name = last(row["path"])
+        most = limits.get(name, limits["joints"])
+        items = {"$ref": f"#/$defs/{row['path'][:-1]}"}
+        return described | _list((most if name == "bands" else 1, most), items, "required" not in row)
     if kind == "word":
         return {"enum": [*row["words"], None]} | described | {"default": row["words"][0]}
     if kind == "flag":

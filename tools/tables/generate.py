@@ -81,9 +81,7 @@ def _law_rows(facts: Facts, place: Row) -> list[dict[str, Any]]:
 def _key_row(row: Row, facts: Facts) -> dict[str, Any]:
     path = row["path"]
     count = "KEY_ONE"
-    if row["item"] == "UNCERTAINTY":
-        count = "KEY_PER_PART"
-    elif row["path"].endswith("[c]"):
+    if row["path"].endswith("[c]"):
         count = "KEY_THREE"
     elif is_list(row) and row["item"] != "EDGE_ANGLES":
         count = "KEY_PER_JOINT"

@@ -43,6 +43,7 @@ from tendonfmu.statistics import MEMORY, bounded
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
+LASTING = 0.2  # s, for which an error of the model lasts, about
 LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
 STEP = 1e-3  # of a coordinate, for derivatives
 FARTHEST = 10.0  # times its expected magnitude, that a step moves a number
@@ -128,7 +129,7 @@ class _Problem:
     def __init__(self, structure: Structure, samples: Samples) -> None:
         estimator = Estimator(structure.start.image, structure.group, structure.scale)
         self.fit = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
-        self.fit.blocks = self.fit.blocks / MEMORY
+        self.fit.blocks = self.fit.blocks * (samples.grid.step / LASTING / MEMORY)
         self.fit.mean, self.fit.known = guess_prior(self.fit)
         self.keys = [key_of(structure.start.data, name) for name in unknown_names(estimator)]
         self._unit = np.where(self.fit.scale.log, 1.0, self.fit.scale.size)  # of a coordinate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import re
 import shutil
 import stat
 import struct
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError, OutputError
 from tendonfmu.files import counted
-from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS, inputs_used
+from tendonfmu.model import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS, inputs_used
 from tendonfmu.recordings import Recording
 
 Progress = Callable[[int], None]
@@ -242,8 +243,8 @@ class _Run:
         if slave is None or description.coSimulation is None:
             raise InputError(f"{path}: FMI {description.fmiVersion}; expected a co-simulation FMU of FMI 2.0 or 3.0")
         self._all = {variable.name: variable for variable in description.modelVariables}
-        wanted = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS)
-        optional = (*OPTIONAL_NUMBERS, *PLACE, *REST, *SENSORS)
+        wanted = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *SENSORS)
+        optional = (*OPTIONAL_NUMBERS, *PLACE, *SENSORS)
         self._outputs = {name: self._group(name) for name in wanted if name not in optional or self._has(name)}
         self._inputs = {group: self._group(group) for group in INPUTS}
         before = Path.cwd()
@@ -272,7 +273,12 @@ class _Run:
 
     def inputs(self, source: int) -> tuple[str, ...]:
         """Return the groups of inputs that the FMU uses."""
-        return inputs_used(source, self._has(REST[-1]) or self._has(SENSORS[-1]))
+        return inputs_used(source, self._watches_motors() or self._has(SENSORS[-1]))
+
+    def _watches_motors(self) -> bool:
+        """Return whether the load of the motors counts in a bound of contact."""
+        number = re.compile(r"contact\.bands\[\d\]\.(motor_load|friction_change|friction_reserve)\[\d+\]")
+        return any(float(each.start or 0) > 0.0 for name, each in self._all.items() if number.fullmatch(name))
 
     def _has(self, group: str) -> bool:
         return group in self._all or f"{group}[1]" in self._all

@@ -57,7 +57,7 @@ def describe_model(description: Finger, table: VariableTable) -> dict[str, Any]:
     """Return the template's context, except what belongs to the package: identifier, GUID, version, sources."""
     finger = native.Instance(description.image)
     sizes = group_sizes(finger.joints, finger.tendons)
-    has = {"links": finger.has_links, "rest": finger.watches_rest, "sensor_fault": finger.watches_sensors}
+    has = {"links": finger.has_links, "sensor_fault": finger.watches_sensors}
     groups = present_groups(table, {need for need, given in has.items() if given})
     variables = [variable for group in groups for variable in elements(group, sizes)]
     variables += _parameters(finger.parameters(), table, description.data)

@@ -19,7 +19,6 @@ from tendonfmu.model import (
     NUMBERS,
     OPTIONAL_NUMBERS,
     PLACE,
-    REST,
     SENSORS,
     Finger,
     FingerSource,
@@ -113,6 +112,6 @@ def _run_native(finger: Finger, recording: Recording, source: int) -> Outputs:
         results = native.Instance(finger.image, source).run(recording.arrays())
     except native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
-    names = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *REST, *SENSORS)
+    names = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *SENSORS)
     outputs = {name: results[name] for name in names if name in results}
     return {"time": recording.time, **outputs}

@@ -65,7 +65,7 @@ if TYPE_CHECKING:
         structure_of,
         watches_motors,
     )
-    from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, REST, SENSORS
+    from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
     from .routing_geometry import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing, finger_drawing
     from .routing_svg import Mark, finger_svg

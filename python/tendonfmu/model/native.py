@@ -91,9 +91,9 @@ class Instance:
         return self._finger.has_links
 
     @property
-    def watches_rest(self) -> bool:
-        """Whether the description has contact.rest. It needs tendon positions with every source."""
-        return self._finger.watches_rest
+    def watches_motors(self) -> bool:
+        """Whether the description has contact.watches_motors. It needs tendon positions with every source."""
+        return self._finger.watches_motors
 
     @property
     def watches_sensors(self) -> bool:
@@ -155,10 +155,10 @@ class Instance:
         with _refusals():
             self._finger.restore_state(state)
 
-    def run(self, recording: Mapping[str, Array], parts: bool = False) -> dict[str, Array]:
+    def run(self, recording: Mapping[str, Array], terms: bool = False) -> dict[str, Array]:
         """Take all samples of a recording in one call, and return all outputs of the FMU."""
-        # recording: [N] (s); parts: [N, n, m + 3] (N·m); returns [N, n] [N, m] (N·m)
-        return self._run(recording, parts, None, None)
+        # recording: [N] (s); terms: with contact_terms [N, n, 4, 8] (N·m); returns [N, n] [N, m] (N·m)
+        return self._run(recording, terms, None, None)
 
     def run_guided(self, recording: Mapping[str, Array], learns: Array, known_torque: Array | None) -> dict[str, Array]:
         """Return the same and `residual_variance`, S, with a bias that learns from some samples, not by contact."""
@@ -167,7 +167,7 @@ class Instance:
         return self._run(recording, False, np.ascontiguousarray(learns, dtype=np.uint8), known)
 
     def _run(
-        self, recording: Mapping[str, Array], parts: bool, learns: Array | None, known: Array | None
+        self, recording: Mapping[str, Array], terms: bool, learns: Array | None, known: Array | None
     ) -> dict[str, Array]:
         inputs = [
             None if recording.get(name) is None else np.ascontiguousarray(recording[name], dtype=np.float64)
@@ -176,7 +176,7 @@ class Instance:
         with _refusals():
             time = np.ascontiguousarray(recording["time"], dtype=np.float64)
             outputs: dict[str, Array] = self._finger.run(
-                time, inputs[0], inputs[1], inputs[2], inputs[3], parts, learns, known
+                time, inputs[0], inputs[1], inputs[2], inputs[3], terms, learns, known
             )
         flags = (name for name in outputs if outputs[name].dtype == np.uint8)
         return outputs | {name: outputs[name].view(bool) for name in flags}

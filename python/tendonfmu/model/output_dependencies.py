@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu.model import native
 from tendonfmu.model.description import Finger
 from tendonfmu.model.description_numbers import extension_rows
-from tendonfmu.model.output_names import PLACE, REST, SENSORS, VECTORS
+from tendonfmu.model.output_names import PLACE, SENSORS, VECTORS
 
 # Extensions whose torque at their joint follows from its angle, or from its velocity.
 BY_OWN_ANGLE = frozenset({"cover_hardening", "moment_arm_variation", "pulley_eccentricity"})
@@ -42,7 +42,7 @@ def inputs_used(source: int, watches_motors: bool) -> tuple[str, ...]:
 
 def watches_motors(data: Mapping[str, Any]) -> bool:
     """Return whether a finger needs tendon positions with every kinematics source."""
-    return (data.get("contact") or {}).get("rest") is not None or data.get("sensor_fault") is not None
+    return bool((data.get("contact") or {}).get("watches_motors")) or data.get("sensor_fault") is not None
 
 
 @dataclass
@@ -110,22 +110,17 @@ def dependencies(structure: Structure) -> Dependencies:
         everything.add(Motion(angles=set(range(n))))  # all angles turn the force at the tip
         place = _inputs(structure, everything, set(range(m)))
         result |= {name: [place] * (3 if name in VECTORS else 1) for name in PLACE}
-    for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "joint_contact"):
+    for name in ("compensated_torque", "compensated_torque_std", "friction_torque", "bias_torque", "residual"):
         result[name] = by_joint
-    result |= _at_rest(structure, result)
+    result |= _of_contact(structure, result)
     return result | _with_sensors(structure, result)
 
 
-def _at_rest(structure: Structure, others: Dependencies) -> Dependencies:
-    """Add, with contact.rest, all motors and forces to contact: they decide whether the finger rests."""
-    if (structure.data.get("contact") or {}).get("rest") is None:
-        return {}
-    tendons = list(range(structure.tendons))
-    watched = {"tendon_force": tendons, "tendon_position": tendons}
-    contacts: Dependencies = {
-        name: [element | watched for element in others[name]] for name in ("joint_contact", "contact")
-    }
-    return contacts | {name: [watched] * (structure.joints if name == REST[0] else 1) for name in REST}
+def _of_contact(structure: Structure, others: Dependencies) -> Dependencies:
+    """Add, with contact.bands, all motors to the contact of each joint: their load says what friction may do."""
+    motors = {"tendon_position": list(range(structure.tendons))} if watches_motors(structure.data) else {}
+    names = {"joint_contact": "residual", "contact_level": "residual", "contact": "contact"}
+    return {name: [element | motors for element in others[other]] for name, other in names.items()}
 
 
 def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
@@ -137,7 +132,7 @@ def _with_sensors(structure: Structure, others: Dependencies) -> Dependencies:
     extended: Dependencies = {
         name: [element | watched for element in elements]
         for name, elements in others.items()
-        if name in ("joint_contact", "contact", *PLACE, *REST)
+        if name in ("joint_contact", "contact", "contact_level", *PLACE)
     }
     return extended | {SENSORS[0]: [watched] * structure.tendons, SENSORS[1]: [watched]}
 

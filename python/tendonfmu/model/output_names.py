@@ -28,7 +28,11 @@ FLAGS = (
 )
 
 # numbers without a derivative; FMUs of older versions lack them
-OPTIONAL_NUMBERS = ("compensated_torque_std",)
+OPTIONAL_NUMBERS = (
+    "compensated_torque_std",
+    "residual",
+    "contact_level",
+)
 
 # of fingers with links, and of their FMUs
 PLACE = (
@@ -37,12 +41,6 @@ PLACE = (
     "fingertip_force_observable",
     "fingertip_force_misfit",
     "contact_link",
-)
-
-# of fingers with contact.rest, and of their FMUs
-REST = (
-    "contact_change",
-    "contact_at_rest",
 )
 
 # of fingers with sensor_fault, and of their FMUs

@@ -185,18 +185,7 @@ HOT_INLINE double noise_variance(const finger_settings* settings, double mean_fo
   return noise * noise * scale;
 }
 
-#define LEAST_UNLEARNED 1e-12 /* N·m: less of V counts as none */
-
-/* P⁻ + V²/3, four joints: what of the start is not learned counts as evenly distributed */
-HOT_INLINE quad with_unlearned(const tendonfmu_finger* f, size_t j, quad variance) {
-  if (!start_is_open(f)) {
-    return variance;
-  }
-  const quad unlearned = quad_load(f->remembered.unlearned + j);
-  return quad_add(variance, quad_mul(quad_mul(unlearned, unlearned), quad_set(1.0 / 3.0)));
-}
-
-/* Λ: what the filter absorbs, counted without what is not learned of the start */
+/* Λ: what the filter absorbs */
 HOT_INLINE void count_absorbed(tendonfmu_finger* f, double left) {
   const double absorbed = left > 0.0 ? -log(left) : 700.0;
   f->remembered.scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
@@ -215,7 +204,7 @@ COLD_STATIC void predict_residual(tendonfmu_finger* f, double step, double noise
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
-    quad_store(f->scratch.residual_variance + j, quad_add(with_unlearned(f, j, predicted), quad_set(noise)));
+    quad_store(f->scratch.residual_variance + j, quad_add(predicted, quad_set(noise)));
     if (!f->guide.learns) {
       quad_store(s->variance + j, predicted);
       quad_store(s->gain + j, quad_set(0.0));
@@ -223,30 +212,29 @@ COLD_STATIC void predict_residual(tendonfmu_finger* f, double step, double noise
   }
 }
 
-/* one Kalman step per joint on the residual r = τ − T_eff; friction and bias take their share of it */
+/* friction and bias take a share of the residual, four joints */
+HOT_INLINE void learn_share(tendonfmu_finger* f, size_t j, quad gain) {
+  const finger_state* s = &f->remembered;
+  const quad correction = quad_mul(gain, quad_load(s->residual + j));
+  quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
+  quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
+  quad_store(s->gain + j, gain);
+}
+
+/* one Kalman step per joint on the residual r = τ − T_eff */
 HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0), noise_variance = quad_set(noise);
-  _Alignas(32) double own_gain[4] = {0.0}; /* without V: the same at all joints */
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
+  _Alignas(32) double gains[4] = {0.0}; /* the same at all joints */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
-    const quad own = kalman_gain(predicted, noise_variance);
-    quad gain = own;
-    if (start_is_open(f)) {
-      gain = kalman_gain(with_unlearned(f, j, predicted), noise_variance);
-      double* unlearned = s->unlearned + j;
-      const quad left = quad_mul(quad_sub(one, gain), quad_load(unlearned));
-      quad_store(unlearned, quad_keep(quad_greater(left, quad_set(LEAST_UNLEARNED)), left));
-    }
-    const quad correction = quad_mul(gain, quad_load(s->residual + j));
-    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
-    quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
-    quad_store(s->variance + j, quad_mul(quad_sub(one, own), predicted));
-    quad_store(s->gain + j, gain);
-    quad_store(own_gain, own);
+    const quad gain = kalman_gain(predicted, noise_variance);
+    learn_share(f, j, gain);
+    quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
+    quad_store(gains, gain);
   }
   if (f->derived.settings.forgets_by_absorption) {
-    count_absorbed(f, 1.0 - own_gain[0]);
+    count_absorbed(f, 1.0 - gains[0]);
   }
 }

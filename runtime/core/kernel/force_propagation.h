@@ -79,33 +79,19 @@ HOT_INLINE quad acting_friction(const tendonfmu_finger* f, size_t slot, quad_mas
   return quad_mul(quad_load(f->scratch.grip + slot), quad_select(slides_at(f, slot), magnitude, by_motion));
 }
 
-/* |F| of the lanes that stick, which is what stiction can hold */
-HOT_INLINE void keep_stuck(const tendonfmu_finger* f, double* to, size_t slot, quad_mask moving, quad magnitude) {
-  quad stuck = quad_drop(moving, magnitude);
-  if (f->extensions.gripped) {
-    const quad_mask slides = slides_at(f, slot);
-    const quad held = quad_mul(quad_load(f->scratch.grip + slot), stuck);
-    stuck = f->derived.settings.bounds_presliding ? held : quad_drop(slides, held);
-  }
-  quad_store(to + slot, stuck);
-}
-
-/* what friction_bound.h and unlearned_friction.h read of one effect at four slots */
-HOT_INLINE void keep_magnitude(const tendonfmu_finger* f, double* stuck, double* whole, size_t slot, quad_mask moving,
-                               quad magnitude) {
-  if (f->derived.settings.bounds_friction) {
-    keep_stuck(f, stuck, slot, moving, magnitude);
-  }
-  if (f->extensions.gripped && f->derived.settings.has_start_share) {
-    quad_store(whole + slot, quad_mul(quad_load(f->scratch.grip + slot), magnitude));
+/* |F| of one effect at four slots for the bands, whether it acts or not */
+HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot, quad magnitude) {
+  if (f->derived.settings.has_bands) {
+    const int gripped = f->extensions.gripped;
+    quad_store(limit + slot, gripped ? quad_mul(quad_load(f->scratch.grip + slot), magnitude) : magnitude);
   }
 }
 
-/* whether F of four slots is 0 without a look at the laws: nothing moves, now or before, or slides; where
- * friction_bound.h needs |F| of what sticks, only where it can hold no joint */
+/* whether F of four slots is 0 without a look at the laws: nothing moves, now or before, or slides; for the
+ * bands, which need |F| of what sticks, only where it can hold no joint */
 HOT_INLINE int nothing_acts(const tendonfmu_finger* f, size_t slot, quad_mask moving) {
   int acts = quad_mask_bits(quad_either(moving, moved_before(f, slot)));
-  if (f->derived.settings.bounds_friction) {
+  if (f->derived.settings.has_bands) {
     acts |= f->derived.can_hold[slot / 4];
   }
   return !(acts | quad_mask_bits(slides_at(f, slot)));
@@ -126,11 +112,11 @@ HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
   const slot_view* view = view_at(f, at, v, moving, before);
   const quad edge = edges_magnitude(view, quad_set(before), speed);
   quad_store(s->edge + at, acting_friction(f, at, moving, edge, v));
-  keep_magnitude(f, s->edge_stuck, s->whole_edge, at, moving, edge);
+  keep_limit(f, s->edge_limit, at, edge);
   if (j > 0) { /* before the first joint there is no pulley */
     const quad pulley = laws_magnitude(view->other, speed);
     quad_store(s->pulley + at, acting_friction(f, at, moving, pulley, v));
-    keep_magnitude(f, s->pulley_stuck, s->whole_pulley, at, moving, pulley);
+    keep_limit(f, s->pulley_limit, at, pulley);
   }
   return transition_bits(f, at, moving);
 }
@@ -145,8 +131,8 @@ HOT_INLINE int friction_of_joints(tendonfmu_finger* f, size_t j) {
   const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
   quad_store(s->joint_friction + j, acting_friction(f, at, moving, own, v));
   quad_store(s->load_friction + j, acting_friction(f, at, moving, load, v));
-  keep_magnitude(f, s->edge_stuck, s->whole_edge, at, moving, own);
-  keep_magnitude(f, s->pulley_stuck, s->whole_pulley, at, moving, load);
+  keep_limit(f, s->edge_limit, at, own);
+  keep_limit(f, s->pulley_limit, at, load);
   return transition_bits(f, at, moving);
 }
 
@@ -270,6 +256,37 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);
     const quad sum = quad_sums(load + j), joint_friction = own_friction(f, j, sum);
     quad_store(s->load + j, sum);
-    quad_store(s->friction + j, quad_add(quad_add(quad_sums(tendon_friction + j), joint_friction), cover));
+    const quad slips = quad_add(quad_sums(tendon_friction + j), joint_friction);
+    if (f->derived.settings.has_bands) {
+      quad_store(s->slip_torque + j, slips);
+    }
+    quad_store(s->friction + j, quad_add(slips, cover));
+  }
+}
+
+/* B: all that friction can hold, Σ |r_ij|·Σ f·|F| with the forces already propagated, and the joint's own; into limit
+ * [n] */
+HOT_INLINE void friction_limits(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  const size_t n = f->joints, lanes = f->tendon_lanes, joint_row = n * lanes;
+  quad total[MODEL_MAX_JOINTS];
+  for (size_t j = 0; j < n; ++j) {
+    total[j] = quad_set(0.0);
+  }
+  for (size_t i = 0; i < lanes; i += 4) {
+    quad held = quad_set(0.0);
+    for (size_t at = i, j = 0; j < n; at += lanes, ++j) {
+      held = quad_add(held, quad_mul(quad_load(s->force_at + at), quad_load(s->edge_limit + at)));
+      if (j + 1 < n) {
+        held = quad_add(held, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley_limit + at + lanes)));
+      }
+      total[j] = quad_add(total[j], quad_mul(quad_abs(quad_load(f->derived.moment_arm + at)), held));
+    }
+  }
+  for (size_t j = 0; j < n; ++j) {
+    const double own = f->memory.elements ? s->own_limit[j] : 0.0;
+    const double limit =
+        quad_sum(total[j]) + (s->edge_limit[joint_row + j] + s->pulley_limit[joint_row + j] * s->load[j]);
+    s->limit[j] = limit + own;
   }
 }

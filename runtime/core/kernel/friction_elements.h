@@ -30,9 +30,6 @@ HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
     quad_store(s->own_limit + j, quad_set(0.0));
   }
   relative_velocities(f, s->travelled);
-  for (size_t slot = 0; slot < f->slots && f->derived.settings.has_start_share; slot += 4) {
-    quad_store(s->kept + slot, quad_set(0.0));
-  }
   f->memory.stretch = first ? 0.0 : f->memory.compliance;
   if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
     find_decay(f, first ? 0.0 : step);
@@ -49,14 +46,6 @@ typedef struct places {
 
 HOT_INLINE quad limit_of(quad friction) {
   return quad_max(quad_set(0.0), quad_min(quad_set(LARGEST_LIMIT), friction));
-}
-
-/* the share left of what was held before this sample, where it decides what is known of the start */
-HOT_INLINE void keep_share(const tendonfmu_finger* f, size_t slot, quad_mask free, size_t e) {
-  if (f->derived.settings.has_start_share) {
-    double* kept = f->scratch.kept + slot;
-    quad_store(kept, quad_max(quad_load(kept), quad_keep(free, quad_load(f->memory.element[e].kept + slot))));
-  }
 }
 
 /* One of their elements before it is clipped. */
@@ -122,7 +111,6 @@ HOT_INLINE quad step_alone(tendonfmu_finger* f, const places* p) {
   quad_store(s->element + p->at, force);
   quad_store(s->by_turning + p->at, quad_keep(free, quad_add(stiff, quad_mul(soft, limit))));
   quad_store(s->by_limit + p->at, quad_select(free, by_limit, quad_with_sign(quad_set(1.0), trial)));
-  keep_share(f, p->slot, free, 0);
   return force;
 }
 
@@ -146,7 +134,6 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
     quad_store(s->element + e * 2 * f->slots + p->at, force);
     sum = quad_add(sum, force);
     by_turning = quad_add(by_turning, quad_keep(t[e].free, t[e].rate));
-    keep_share(f, p->slot, t[e].free, e);
   }
   const quad turned = quad_sub(p->turned, quad_mul(sum, p->compliance)); /* c */
   for (size_t e = 0; e < f->memory.elements; ++e) {

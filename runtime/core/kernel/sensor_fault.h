@@ -386,21 +386,12 @@ COLD_STATIC void begin_bias_anew(tendonfmu_finger* f) {
   }
 }
 
-/* after T_eff: joints that are not watched have no residual, and nothing that the detector has gathered */
+/* after T_eff: joints that are not watched have no residual and no contact */
 COLD_STATIC void forget_unwatched(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joints; ++j) {
     if (s->watch[j] != JOINT_WATCHED) {
-      s->residual[j] = s->innovation[j] = s->tracked[j] = s->evidence[j] = s->joint_contact[j] = 0.0;
-      if (f->derived.settings.watches_rest) {
-        s->carried_load[j] = 0.0;
-      }
-      if (f->derived.settings.has_start_share) {
-        s->unlearned[j] = 0.0;
-      }
-      if (f->derived.settings.watches_drift) {
-        s->drift_of_late[j] = s->drift_quick[j] = s->drift_slow[j] = s->learned[j] = 0.0;
-      }
+      s->residual[j] = s->level[j] = s->joint_contact[j] = 0.0;
     }
   }
 }

@@ -9,7 +9,6 @@
 #include "kernel_choice.h"
 #include "kinematics.h"
 #include "sensor_fault.h"
-#include "unlearned_friction.h"
 
 HOT_INLINE int is_first(const tendonfmu_finger* f) {
   return f->remembered.scalar[STATE_INITIALISED] == 0.0;
@@ -25,7 +24,7 @@ HOT_INLINE int row_in_range(const double* row, size_t lanes) {
 }
 
 HOT_INLINE int uses_positions(const tendonfmu_finger* f) {
-  return (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_rest ||
+  return (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_motors ||
          f->derived.settings.watches_sensors;
 }
 
@@ -48,6 +47,13 @@ HOT_INLINE void take_zeros(tendonfmu_finger* f) {
   double* position = f->scratch.position;
   for (size_t i = 0; i < f->tendon_lanes; i += 4) {
     quad_store(position + i, quad_sub(quad_load(position + i), quad_load(f->derived.tendon_zero + i)));
+  }
+}
+
+/* x: the load that the motors drive, as if the joints stood */
+COLD_STATIC void motor_loads(tendonfmu_finger* f) {
+  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    quad_store(f->scratch.motor_load + j, tendon_sums(f, f->derived.load_arm, f->scratch.position, j));
   }
 }
 
@@ -129,10 +135,10 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad torques = quad_add(quad_abs(quad_load(s->torque + j)), quad_abs(quad_load(s->friction + j)));
     const quad biases = quad_add(quad_abs(quad_load(s->bias_step + j)), quad_abs(quad_load(f->remembered.bias + j)));
-    quad sum =
-        quad_add(quad_add(torques, biases), quad_add(quad_load(s->stuck_friction + j), quad_load(s->uncertainty + j)));
-    if (start_is_open(f)) {
-      sum = quad_add(sum, quad_load(s->turned + j));
+    quad sum = quad_add(torques, biases);
+    if (f->derived.settings.has_bands) {
+      const quad detected = quad_add(quad_abs(quad_load(s->motor_load + j)), quad_load(s->limit + j));
+      sum = quad_add(sum, quad_add(detected, quad_abs(quad_load(f->remembered.jumped + j))));
     }
     const quad motion =
         quad_add(quad_mul(zero, quad_load(s->angle + j)), quad_mul(zero, quad_load(joint_velocity + j)));
@@ -156,12 +162,8 @@ HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
   }
 }
 
-/* the residual, and how it has jumped */
-HOT_INLINE void leave_residual(tendonfmu_finger* f, double step) {
+HOT_INLINE void leave_residual(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
-  if (f->derived.settings.bounds_friction) {
-    remember_jumps(f, s->friction, step);
-  }
   effective_friction(f, s->friction); /* scratch.friction remains T: the estimation reads it */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->residual + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
@@ -185,15 +187,6 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   copy_row(s->torque, f->scratch.torque, f->joint_lanes);
   copy_row(s->force, f->scratch.force, f->tendon_lanes);
   copy_row(s->slack, f->scratch.slack, f->tendon_lanes);
-  if (f->derived.settings.bounds_friction) {
-    remember_stuck(f, is_first(f) ? 0.0 : time - s->scalar[STATE_TIME]);
-  }
-  if (start_is_open(f) || (f->derived.settings.has_start_share && is_first(f))) {
-    copy_row(s->start_left, f->scratch.start_left, f->slots);
-  }
-  if (f->derived.settings.knows_uncertainty) {
-    copy_row(s->part, f->scratch.part, f->joints * f->tendon_lanes + 3 * f->joint_lanes);
-  }
   if (f->derived.settings.watches_sensors) {
     remember_sensors(f);
   }
@@ -237,12 +230,10 @@ HOT_INLINE void begin_tracking(tendonfmu_finger* f, double time, double mean_for
   for (size_t j = 0; j < f->joints; ++j) {
     s->joint_contact[j] = 0.0;
   }
-  if (settings->watches_rest) {
-    begin_rest(f, time);
+  for (size_t j = 0; settings->has_bands && j < f->joints; ++j) {
+    begin_bands(f, j, time);
   }
   begin_bias(f, mean_force);
-  s->scalar[STATE_STARTED_AT] = settings->watches_drift ? time : 0.0;
-  s->scalar[STATE_START_OPEN] = settings->has_start_share ? 1.0 : 0.0;
   s->scalar[STATE_INITIALISED] = 1.0;
   s->scalar[STATE_FIRST_SAMPLE] = 1.0;
   s->scalar[STATE_CONTACT] = 0.0;
@@ -260,6 +251,9 @@ HOT_INLINE void jump_bias(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
+    if (f->derived.settings.has_bands) {
+      quad_store(s->jumped + j, quad_add(quad_load(s->jumped + j), quad_load(f->scratch.bias_step + j)));
+    }
   }
 }
 
@@ -268,22 +262,13 @@ COLD_STATIC void track_guided(tendonfmu_finger* f, double step, double mean_forc
   const finger_state* s = &f->remembered;
   const double noise = noise_of_step(f, step, mean_force);
   jump_bias(f);
-  leave_residual(f, step);
-  if (start_is_open(f)) {
-    add_unlearned(f);
-  }
+  leave_residual(f);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
   predict_residual(f, step, noise);
   if (f->guide.begins) {
     begin_bias(f, mean_force);
-    for (size_t j = 0; start_is_open(f) && j < f->joints; ++j) {
-      s->unlearned[j] = 0.0;
-    }
   } else if (f->guide.learns) {
     track_bias(f, step, noise);
-  }
-  if (start_is_open(f)) {
-    close_start(f);
   }
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
 }
@@ -297,43 +282,19 @@ HOT_INLINE void track_sample(tendonfmu_finger* f, double time, double step, doub
   if (unwell) {
     begin_bias_anew(f);
   }
-  leave_residual(f, step);
-  if (start_is_open(f)) {
-    add_unlearned(f);
-  }
+  leave_residual(f);
   if (unwell) {
     forget_unwatched(f);
   }
-  if (settings->watches_rest && !unwell) {
-    watch_rest(f, mean_force, time, step);
-  } else if (settings->watches_rest) {
-    begin_rest(f, time); /* no rest while a sensor fails */
-  }
-  if (settings->watches_drift) {
-    watch_drift(f, time, step);
-  }
   const int contact = detect_contact(f, mean_force, time, step);
   s->scalar[STATE_ABSORBED_BEFORE] = s->scalar[STATE_ABSORBED];
-  if (bias_is_updated(f, contact, time, step)) {
-    const double noise = noise_of_step(f, step, mean_force);
-    if (settings->watches_drift) {
-      follow_drift(f, contact, step, noise);
-    }
-    track_bias(f, step, noise);
-    if (settings->uses_innovation) {
-      follow_residual(f, step);
-    }
+  if (contact) {
+    hold_bias(f, time);
+  } else {
+    track_bias(f, step, noise_of_step(f, step, mean_force));
     if (unwell) {
       leave_unwatched(f);
     }
-  } else {
-    restart_rest(f, time);
-    for (size_t j = 0; j < f->joints; ++j) {
-      s->gain[j] = 0.0;
-    }
-  }
-  if (start_is_open(f)) {
-    close_start(f);
   }
   s->scalar[STATE_FIRST_SAMPLE] = 0.0;
   s->scalar[STATE_CONTACT] = contact ? 1.0 : 0.0;
@@ -351,8 +312,8 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (f->derived.settings.has_tendon_zero && uses_positions(f)) {
     take_zeros(f);
   }
-  if (f->derived.settings.watches_rest) {
-    copy_row(f->scratch.motor_position, f->scratch.position, f->tendon_lanes);
+  if (f->derived.settings.watches_motors) {
+    motor_loads(f);
   }
   if (f->extensions.signals) {
     shape_signals(f, time, 0);
@@ -376,9 +337,8 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
     take_known_torque(f);
   }
   const double mean_force = mean_tendon_force(f);
-  bound_friction(f);
-  if (f->derived.settings.has_start_share && (first || start_is_open(f))) {
-    turned_friction(f, first);
+  if (f->derived.settings.has_bands) {
+    friction_limits(f);
   }
   if (transitions && !first) {
     bias_steps(f);

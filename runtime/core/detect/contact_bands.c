@@ -1,0 +1,155 @@
+#include "floating_point.h"
+
+#include "contact_bands.h"
+
+#include <math.h>
+
+#include "friction_law.h"
+
+static const double mean_time[BANDS] = {0.004, 0.02, 0.06, 0.5};    /* A, s */
+static const double reference_time[BANDS] = {0.05, 0.3, 1.0, 10.0}; /* M, s */
+
+#define HELD_TIME    10.0  /* s, H: with which references follow in contact */
+#define HOME_TIME    3.0   /* s */
+#define UNKNOWN_TIME 1.0   /* s */
+#define SHORTEST     0.02  /* s, of a contact */
+#define HIGHEST      1e150 /* level */
+#define END          0.4   /* of its peak, below which a contact has ended */
+
+enum { HOME_BAND = 1, END_BAND = 2, RESERVE_BAND = 2 };
+
+static double larger(double a, double b) {
+  return a > b ? a : b;
+}
+
+static double smaller(double a, double b) {
+  return a < b ? a : b;
+}
+
+static double share_of(double step, double time) {
+  return law_one_minus_exponential(step / time);
+}
+
+void band_find_shares(band_shares* shares, double step) {
+  if (shares->step == step) {
+    return;
+  }
+  shares->step = step;
+  for (size_t k = 0; k < BANDS; ++k) {
+    shares->mean[k] = share_of(step, mean_time[k]);
+    shares->reference[k] = share_of(step, reference_time[k]);
+    shares->held[k] = share_of(step, larger(HELD_TIME, reference_time[k]));
+    shares->kept[k] = 1.0 - shares->reference[k];
+  }
+  shares->home = share_of(step, HOME_TIME);
+  shares->unknown = 1.0 - share_of(step, UNKNOWN_TIME);
+}
+
+double band_bias_share(const band_shares* shares) {
+  return shares->held[0];
+}
+
+void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first) {
+  for (size_t k = 0; k < BANDS; ++k) {
+    joint->mean[k] = joint->reference[k] = sample->residual;
+    joint->load[k] = joint->load_reference[k] = sample->load;
+    joint->torque[k] = joint->torque_reference[k] = sample->torque;
+    joint->driven[k] = 0.0;
+    joint->reserve[k] = first ? 0.0 : joint->reserve[k];
+  }
+  joint->home = first ? sample->residual : joint->home;
+  joint->unknown = unknown;
+  joint->begun_at = time;
+  joint->band = joint->sign = joint->peak = joint->touched_at = 0.0;
+  joint->friction = fabs(sample->torque);
+  joint->limit = sample->limit;
+}
+
+/* σ: a mean of what there has been since the joint began anew */
+static double share_since(double step, double time, double age, double share) {
+  return age < time ? share_of(step, age) : share;
+}
+
+static double follow(double* mean, double value, double share) {
+  return *mean += share * (value - *mean);
+}
+
+static void follow_band(band_memory* joint, const band_sample* sample, const band_shares* shares, size_t k, double age,
+                        int any) {
+  const double quick = share_since(shares->step, mean_time[k], age, shares->mean[k]);
+  const double slow = share_since(shares->step, reference_time[k], age, shares->reference[k]);
+  const double mean = follow(&joint->mean[k], sample->residual, quick);
+  const double load = follow(&joint->load[k], sample->load, quick);
+  const double torque = follow(&joint->torque[k], sample->torque, quick);
+  follow(&joint->reference[k], mean, any ? shares->held[k] : slow);
+  follow(&joint->torque_reference[k], torque, slow);
+  const double driven = fabs(load - follow(&joint->load_reference[k], load, slow));
+  joint->driven[k] = larger(joint->driven[k] * shares->kept[k], driven);
+  joint->reserve[k] = larger(joint->reserve[k] * shares->kept[k], sample->reserve);
+}
+
+void band_terms(const band_memory* joint, size_t band, double* terms) {
+  const double mean = joint->mean[band], change = mean - joint->reference[band];
+  const double from_home = change < 0.0 ? joint->home - mean : mean - joint->home;
+  const double size = larger(0.0, smaller(fabs(change), from_home));
+  const double turned = fabs(joint->torque[band] - joint->torque_reference[band]);
+  terms[0] = change;
+  terms[1] = copysign(size, change);
+  terms[2] = 1.0;
+  terms[3] = joint->friction;
+  terms[4] = joint->limit;
+  terms[5] = joint->driven[band];
+  terms[6] = smaller(turned, joint->driven[band]);
+  terms[7] = smaller(joint->reserve[band], joint->driven[RESERVE_BAND]);
+}
+
+static double level_of(const band_memory* joint, size_t band, const double squares[BAND_NUMBERS]) {
+  double terms[BAND_TERMS], square = joint->unknown * joint->unknown;
+  band_terms(joint, band, terms);
+  for (size_t i = 0; i < BAND_NUMBERS; ++i) {
+    square += squares[i] * (terms[2 + i] * terms[2 + i]);
+  }
+  const double size = fabs(terms[1]);
+  return square > 0.0 ? smaller(size / sqrt(square), HIGHEST) : size > 0.0 ? HIGHEST : 0.0;
+}
+
+double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
+                 const double squares[BANDS * BAND_NUMBERS], double time, int any, size_t* band) {
+  double largest = -1.0;
+  joint->unknown *= shares->unknown;
+  for (size_t k = 0; k < BANDS; ++k) {
+    follow_band(joint, sample, shares, k, time - joint->begun_at, any);
+  }
+  follow(&joint->home, joint->mean[HOME_BAND], shares->home);
+  joint->friction = fabs(sample->torque);
+  joint->limit = sample->limit;
+  for (size_t k = 0; k < BANDS; ++k) {
+    const double level = level_of(joint, k, squares + k * BAND_NUMBERS);
+    if (level > largest) {
+      largest = level;
+      *band = k;
+    }
+  }
+  return largest;
+}
+
+int band_decide(band_memory* joint, const band_sample* sample, double time, double rounding, int before, double level,
+                size_t band) {
+  if (!before) {
+    if (!(level > 1.0)) {
+      return 0;
+    }
+    joint->band = (double)band;
+    joint->sign = joint->mean[band] < joint->reference[band] ? -1.0 : 1.0;
+    joint->peak = 0.0;
+    joint->touched_at = time;
+    return 1;
+  }
+  const double now = (joint->mean[END_BAND] - joint->reference[(size_t)joint->band]) * joint->sign;
+  joint->peak = larger(joint->peak, now);
+  if (time - joint->touched_at > SHORTEST + rounding && now < END * joint->peak) {
+    band_begin(joint, sample, time, joint->peak, 0);
+    return 0;
+  }
+  return 1;
+}

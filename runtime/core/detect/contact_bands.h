@@ -1,0 +1,63 @@
+/* The detector of method "bands": what changes within four times, over bounds learned from free motion
+ * (docs/reference/semantics/detection.md). Scalar code, compiled once. */
+#pragma once
+
+#include <stddef.h>
+
+enum {
+  BANDS = 4,        /* 4 ms, 20 ms, 60 ms, 0.5 s */
+  BAND_NUMBERS = 6, /* of a band and joint: contact.bands */
+  BAND_TERMS = 8    /* change, what of it counts, and what each number is multiplied by */
+};
+
+/* What a joint remembers: doubles alone, since it is a part of the saved state. */
+typedef struct band_memory {
+  double mean[BANDS], reference[BANDS];          /* a, m of e: N·m */
+  double load[BANDS], load_reference[BANDS];     /* the same of x: N·m */
+  double torque[BANDS], torque_reference[BANDS]; /* the same of T: N·m */
+  double driven[BANDS], reserve[BANDS];          /* D, S: N·m */
+  double home;                                   /* h, N·m */
+  double unknown;                                /* V: what friction holds since a touch is not known, N·m */
+  double begun_at, touched_at;                   /* t_0, begin of the contact: s */
+  double band, sign, peak;                       /* of the contact: 0 to 3, ±1, N·m */
+  double friction, limit;                        /* |T|, B of the last sample: N·m */
+  double spare[3];                               /* to a multiple of 4 */
+} band_memory;
+
+/* A joint at one sample, N·m. */
+typedef struct band_sample {
+  double residual; /* e */
+  double load;     /* x */
+  double torque;   /* T */
+  double limit;    /* B */
+  double reserve;  /* U */
+} band_sample;
+
+/* What depends on the step alone. */
+typedef struct band_shares {
+  double step;                          /* s */
+  double mean[BANDS], reference[BANDS]; /* of a new value */
+  double held[BANDS];                   /* the same of a reference in contact */
+  double kept[BANDS];                   /* of D and S */
+  double home, unknown;
+} band_shares;
+
+/* Fills the shares unless they are those of this step. */
+void band_find_shares(band_shares* shares, double step);
+
+/* A joint begins anew; unknown: V. First: at the first sample, and where it was not watched. */
+void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first);
+
+/* Takes a sample; any: whether any joint was in contact at the one before. Returns the level. */
+double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
+                 const double squares[BANDS * BAND_NUMBERS], double time, int any, size_t* band);
+
+/* Whether a joint is in contact now, from whether it was, its level and the band that has it. */
+int band_decide(band_memory* joint, const band_sample* sample, double time, double step, int before, double level,
+                size_t band);
+
+/* The terms of a band [BAND_TERMS]. */
+void band_terms(const band_memory* joint, size_t band, double* terms);
+
+/* Share of contact that the bias takes in a step: it follows with the time of a held reference. */
+double band_bias_share(const band_shares* shares);
