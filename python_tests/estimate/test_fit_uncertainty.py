@@ -28,7 +28,7 @@ def fitted(finger: dict[str, Any], recording: Any, **options: Any) -> FrictionFi
 
 def parts_of(data: dict[str, Any], recording: Any) -> Numbers:
     arrays = {name: values[::10] for name, values in recording.arrays().items()}
-    return native.Instance.from_description(data, 3).run(arrays, parts=True)["friction_parts"]
+    return native.Instance.from_description(data, 3).run(arrays, terms=True)["friction_parts"]
 
 
 # --- directions -------------------------------------------------------------------------------------------------------

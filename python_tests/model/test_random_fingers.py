@@ -112,7 +112,7 @@ def of_kernel(kernel: str) -> Callable[..., dict[str, Any]]:
             finger.kernel = kernel
         except native.NativeError as refused:
             pytest.skip(f"SKIPPED: no such kernel on this machine ({refused})")
-        outputs: dict[str, Any] = finger.run(recording, parts=True)
+        outputs: dict[str, Any] = finger.run(recording, terms=True)
         return outputs
 
     return run
@@ -168,7 +168,7 @@ def test_kernels_give_the_same_bits(name: str) -> None:
                 finger.kernel = kernel
             except native.NativeError:  # not on this machine
                 continue
-            found.append((finger.run(recording, parts=True), finger.save_state()))
+            found.append((finger.run(recording, terms=True), finger.save_state()))
         for outputs, state in found[1:]:
             assert state == found[0][1], seed
             for output, series in outputs.items():
