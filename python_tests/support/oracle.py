@@ -37,7 +37,7 @@ class FingerOracle:
         self.branches: Counter[str] = Counter()
         self._read_structure(description)
         self._read_settings(description)
-        self.detector = Detector(description, self.R, kinematics_source, self.branches)
+        self.detector = Detector(description, self.R, self.branches)
         self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
         watches = given(description, "sensor_fault", None) is not None
         self.sensors = SensorWatch(description, self.R, kinematics_source, self.branches) if watches else None
@@ -373,7 +373,7 @@ class FingerOracle:
 
     def _driven(self, x0: Array | None) -> Array:
         """x [n] N·m: what the motors load. x0: tendon positions less their zeros."""
-        if not self.detector.uses_positions:
+        if not self.detector.watches_motors:
             return np.zeros(self.n)
         k = np.array([tendon.stiffness for tendon in self.tendons])
         return np.asarray(self.R.T @ (k * x0))
