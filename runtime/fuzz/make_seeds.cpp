@@ -94,8 +94,8 @@ int main(int count, char** arguments) {
       add_smaller_rigs(documents, json_tree(documents.back()));
     }
   }
-  std::set<std::string> words = {"\"innovation\"", "\"time\"",      "\"threshold\"",   "null", "true",
-                                 "\"positive\":",  "\"negative\":", "\"noise_time\":", "1e999"};
+  std::set<std::string> words = {"\"bands\"",     "\"noise\"",     "\"threshold\"",   "null", "true",
+                                 "\"positive\":", "\"negative\":", "\"noise_time\":", "1e999"};
   for (std::size_t i = 0; i < documents.size(); ++i) {
     const std::string name = "document" + std::to_string(i), text = documents[i].dump();
     collect(documents[i], words);

@@ -142,9 +142,9 @@ TEST(CppFinger, AnotherSizeIsRefusedByName) {
   tendonfmu::outputs wanted;
   wanted.compensated_torque = two;
   EXPECT_EQ(finger.get_outputs(wanted), status::ok);
-  wanted.friction_parts = three;
+  wanted.contact_terms = three;
   EXPECT_EQ(finger.get_outputs(wanted), status::bad_argument);
-  EXPECT_STREQ(finger.last_error(), "friction_parts: 3 values, expected 12");
+  EXPECT_STREQ(finger.last_error(), "contact_terms: 3 values, expected 64");
 
   std::size_t done = 9;
   EXPECT_EQ(finger.run(motion.time, {motion.force, motion.position}, wanted, done), status::bad_argument);

@@ -165,7 +165,7 @@ TEST_P(EveryFinger, RefusesBadSamplesByNameAndGoesOnAsIfTheyHadNotBeen) {
     }
     Motion broken = motion();
     broken.position[100 * tendons + 2] = broken.angle[100 * joints + 1] = bad;
-    const bool by_tendons = source() == 1 || std::get<0>(GetParam()) == test_finger::watching;
+    const bool by_tendons = source() == 1 || tendonfmu_watches_motors(finger);
     refused(0.1, broken.row(100), by_tendons ? "tendon_position[3]" : "joint_position[2]");
   }
   for (const double time : {nan, inf, 0.0989, -1.0}) {
@@ -188,7 +188,7 @@ TEST(Motion, MovesRestsTouchesReversesAndLetsEveryKeyAct) {
     EXPECT_GT(count(outputs->flag.at("contact"), 1), samples / 50);
     EXPECT_LT(count(outputs->flag.at("contact"), 1), samples / 2);
   }
-  for (const char* name : {"stuck_friction", "friction_jump", "innovation", "drift", "fingertip_force_std"}) {
+  for (const char* name : {"residual", "contact_level", "fingertip_force_std"}) {
     EXPECT_GT(*std::max_element(o.real.at(name).begin(), o.real.at(name).end()), 1e-3) << name;
   }
   EXPECT_GT(count(o.whole.at("contact_link"), 0), 1000u);
@@ -377,28 +377,6 @@ TEST(SlotSegment, CountsTheWorkingPointsAtOrBelowTheAngle) {
   }
 }
 
-// --- detection ------------------------------------------------------------------------------------------------------
-
-TEST(Detection, ReleaseTimeWrittenInContactCountsFromItsBeginning) {
-  const Outputs whole = Finger(image_of(test_finger::detecting)).run(motion());
-  const std::vector<unsigned char>& contact = whole.flag.at("contact");
-  std::size_t start = 1;
-  while (start + 60 < samples && !(contact[start] && contact[start + 59] && !contact[start - 1])) {
-    ++start;
-  }
-  ASSERT_LT(start + 60, samples);
-  Finger finger(image_of(test_finger::detecting));
-  finger.run(motion(), 0, start + 40);
-  const auto bytes = finger.saved();
-  for (const bool released : {true, false}) {
-    ASSERT_EQ(restore(finger, bytes), TENDONFMU_OK);
-    set(finger, "contact.release_time", released ? 0.0395 : 0.0405);
-    Outputs next = finger.run(motion(), start + 40, start + 41);
-    // no update: T_eff is as it was
-    EXPECT_EQ(next.view().compensated_torque[0] != next.view().residual[0], released);
-  }
-}
-
 // --- saved states and images under a checksum that fits -------------------------------------------------------------
 
 struct Damage {
@@ -431,22 +409,18 @@ TEST(SavedState, WithANumberThatCannotBeIsRefused) {
                           {"half a contact", s.joint_contact, 0.5},
                           {"contact without a joint", s.joint_contact + joints, 1.0},
                           {"residual without a joint", s.bias + joints, 1.0},
-                          {"negative H", s.stuck_friction, -1.0},
-                          {"negative J", s.friction_jump, -1.0},
-                          {"J that overflows", s.friction_jump, 1e200},
-                          {"negative evidence", s.evidence, -1e-3},
-                          {"exceeded in no time", s.exceeded_at, 1e16},
-                          {"contact since no time", s.scalar + STATE_CONTACT_SINCE, -1e300},
+                          {"negative level", s.level, -1.0},
+                          {"fifth band", &bands_of(finger.handle, 1)->band, 4.0},
+                          {"half a band", &bands_of(finger.handle, 0)->band, 0.5},
+                          {"begun in the future", &bands_of(finger.handle, 0)->begun_at, 1e6},
+                          {"touched in the future", &bands_of(finger.handle, 0)->touched_at, 1e6},
+                          {"change that overflows", bands_of(finger.handle, 0)->mean, 1e200},
                           {"negative absorption", s.scalar + STATE_ABSORBED, -1.0},
                           {"more absorbed before", s.scalar + STATE_ABSORBED_BEFORE, s.scalar[STATE_ABSORBED] + 1.0},
                           {"rest that begins after it ends", s.stuck_since, s.scalar[STATE_ABSORBED] + 1.0},
                           {"third side", s.side, 2.0},
                           {"side without a tendon", s.side + tendons, 1.0},
-                          {"half an open start", s.scalar + STATE_START_OPEN, 0.5},
-                          {"negative V", s.unlearned, -1e-3},
-                          {"more of the start than all", s.start_left, 1.5},
-                          {"drift that overflows", s.drift, 1e200},
-                          {"infinite part", s.part, inf}});
+                          {"jumps that overflow", s.jumped, 1e200}});
 }
 
 TEST(SavedState, OfWatchedSensorsWithANumberThatCannotBeIsRefused) {
@@ -472,7 +446,6 @@ std::vector<unsigned char> with_options(std::uint32_t bits) {
 
 TEST(Options, ThatDoNotGoTogetherAreRefused) {
   const std::uint32_t options = Model(image_of(test_finger::detecting)).shape.options;
-  ASSERT_EQ(options & MODEL_UNCERTAINTY_DIRECTIONS, 2u << 10);
   const auto refused_with = [&](std::uint32_t bits) {
     const auto image = with_options(bits);
     tendonfmu_finger* made = tendonfmu_create(image.data(), image.size(), nullptr, 0);
@@ -480,14 +453,11 @@ TEST(Options, ThatDoNotGoTogetherAreRefused) {
     return made == nullptr;
   };
   EXPECT_FALSE(refused_with(options));
-  EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_HAS_UNCERTAINTY}));
-  EXPECT_TRUE(refused_with(options | MODEL_UNCERTAINTY_DIRECTIONS)); /* seven directions */
-  EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_DETECTS_BY_INNOVATION}));
-  EXPECT_TRUE(refused_with(options | std::uint32_t{MODEL_HAS_REST_INNOVATION})); /* without rest */
+  EXPECT_TRUE(refused_with(options & ~std::uint32_t{MODEL_DETECTS_BY_BANDS})); /* watches motors for nothing */
   EXPECT_TRUE(refused_with(options | (MODEL_OPTION_BITS + 1u)));
   // every bit: refused where the numbers do not fit, or a finger that takes samples
   for (unsigned bit = 0; bit < 32; ++bit) {
-    const bool only_a_word = bit == 4 || bit == 5; /* forgetting, stuck_presliding */
+    const bool only_a_word = bit == 4 || bit == 6; /* forgetting, watches_motors */
     EXPECT_EQ(refused_with(options ^ 1u << bit), !only_a_word) << bit;
     if (only_a_word) {
       Finger(with_options(options ^ 1u << bit)).run(motion(), 0, 1500);

@@ -44,18 +44,16 @@ inline void put(std::string& text, const std::string& after, const std::string& 
   text.insert(text.find(after) + after.size(), added);
 }
 
-// The same with every optional key of the detection. Two joints in contact by turns, released after a while; what
-// is not known of the friction differs between them.
+// The same with every optional key of the detection. Two joints in contact by turns.
 inline std::string every_key() {
   std::string text = json;
-  put(text, "\"bias\": {", R"("forgetting": "absorption", "start_share": 0.5, )");
-  put(text, "\"contact\": {", R"("method": "cusum",
-    "innovation": {"time": 0.4, "threshold": [0.03, 0.03], "threshold_per_force": [1e-4, 1e-4], "evidence_time": 0.01},
-    "friction_bound": {"stuck_share": 0.4, "stuck_time": 0.03, "jump_share": 0.5, "jump_time": 0.05},
-    "uncertainty": [[[0.1, 0.05, -0.1, 0.2, 0.3, 0.1], [0, 0.1, 0, 0, 0, 0.2]], [[0.1, 0.1, 0.1, 0.1, 0, 0]]],
-    "uncertainty_level": 2, "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5],
-    "release_ratio": 0.6, "hold_time": 0.02, "release_time": 0.15,
-    "drift": {"quick_time": 0.05, "slow_time": 0.4, "threshold": [0.05, 0.04], "threshold_per_force": [1e-4, 2e-4]}, )");
+  const std::string band = R"({"noise": [0.03, 0.02], "friction": [0.05, 0.02], "friction_limit": [0.1, 0.1],
+    "motor_load": [1e-3, 2e-3], "friction_change": [0.1, 0.2], "friction_reserve": [0.1, 0.3]})";
+  put(text, "\"bias\": {", R"("forgetting": "absorption", )");
+  put(text, "\"contact\": {",
+      R"("method": "bands", "watches_motors": true, "bands": [)" + band + ", " + band + ", " + band + ", " + band +
+          R"(],
+    "deviation": [0.002, 0.003], "deviation_per_force": [1e-5, 2e-5], )");
   put(text, name, R"("links": [{"axis": [0, 0, 2]}, {"axis": [0, 1, 0.2], "offset": [0.05, 0, 0]}],
     "tip": [0.03, 0, 0.004],)");
   return text;

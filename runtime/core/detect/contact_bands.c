@@ -65,27 +65,37 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
   joint->limit = sample->limit;
 }
 
-/* σ: a mean of what there has been since the joint began anew */
-static double share_since(double step, double time, double age, double share) {
-  return age < time ? share_of(step, age) : share;
+/* σ of the means and the references of a joint that began `age` ago: means of what there has been since */
+static void find_shares_since(const band_shares* shares, double age, double* quick, double* slow) {
+  for (size_t k = 0; k < BANDS; ++k) {
+    quick[k] = age < mean_time[k] ? share_of(shares->step, age) : shares->mean[k];
+    slow[k] = age < reference_time[k] ? share_of(shares->step, age) : shares->reference[k];
+  }
 }
 
-static double follow(double* mean, double value, double share) {
-  return *mean += share * (value - *mean);
+/* four means of a value, and the means of those */
+static void follow(double* mean, double* reference, double value, const double* quick, const double* slow) {
+  for (size_t k = 0; k < BANDS; ++k) {
+    mean[k] += quick[k] * (value - mean[k]);
+    reference[k] += slow[k] * (mean[k] - reference[k]);
+  }
 }
 
-static void follow_band(band_memory* joint, const band_sample* sample, const band_shares* shares, size_t k, double age,
-                        int any) {
-  const double quick = share_since(shares->step, mean_time[k], age, shares->mean[k]);
-  const double slow = share_since(shares->step, reference_time[k], age, shares->reference[k]);
-  const double mean = follow(&joint->mean[k], sample->residual, quick);
-  const double load = follow(&joint->load[k], sample->load, quick);
-  const double torque = follow(&joint->torque[k], sample->torque, quick);
-  follow(&joint->reference[k], mean, any ? shares->held[k] : slow);
-  follow(&joint->torque_reference[k], torque, slow);
-  const double driven = fabs(load - follow(&joint->load_reference[k], load, slow));
-  joint->driven[k] = larger(joint->driven[k] * shares->kept[k], driven);
-  joint->reserve[k] = larger(joint->reserve[k] * shares->kept[k], sample->reserve);
+static void follow_sample(band_memory* joint, const band_sample* sample, const band_shares* shares, double age,
+                          int any) {
+  double quick[BANDS], slow[BANDS];
+  find_shares_since(shares, age, quick, slow);
+  follow(joint->mean, joint->reference, sample->residual, quick, any ? shares->held : slow);
+  follow(joint->load, joint->load_reference, sample->load, quick, slow);
+  follow(joint->torque, joint->torque_reference, sample->torque, quick, slow);
+  for (size_t k = 0; k < BANDS; ++k) {
+    joint->driven[k] = larger(joint->driven[k] * shares->kept[k], fabs(joint->load[k] - joint->load_reference[k]));
+    joint->reserve[k] = larger(joint->reserve[k] * shares->kept[k], sample->reserve);
+  }
+  joint->home += shares->home * (joint->mean[HOME_BAND] - joint->home);
+  joint->unknown *= shares->unknown;
+  joint->friction = fabs(sample->torque);
+  joint->limit = sample->limit;
 }
 
 void band_terms(const band_memory* joint, size_t band, double* terms) {
@@ -103,34 +113,33 @@ void band_terms(const band_memory* joint, size_t band, double* terms) {
   terms[7] = smaller(joint->reserve[band], joint->driven[RESERVE_BAND]);
 }
 
-static double level_of(const band_memory* joint, size_t band, const double squares[BAND_NUMBERS]) {
-  double terms[BAND_TERMS], square = joint->unknown * joint->unknown;
+/* what counts of a band's change, squared, and its bound, squared */
+static void find_squares(const band_memory* joint, size_t band, const double numbers[BAND_NUMBERS], double* size,
+                         double* bound) {
+  double terms[BAND_TERMS];
   band_terms(joint, band, terms);
+  *bound = joint->unknown * joint->unknown;
   for (size_t i = 0; i < BAND_NUMBERS; ++i) {
-    square += squares[i] * (terms[2 + i] * terms[2 + i]);
+    *bound += numbers[i] * (terms[2 + i] * terms[2 + i]);
   }
-  const double size = fabs(terms[1]);
-  return square > 0.0 ? smaller(size / sqrt(square), HIGHEST) : size > 0.0 ? HIGHEST : 0.0;
+  *size = terms[1] * terms[1];
 }
 
 double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
                  const double squares[BANDS * BAND_NUMBERS], double time, int any, size_t* band) {
-  double largest = -1.0;
-  joint->unknown *= shares->unknown;
+  double most = 0.0, bound_of_most = 1.0;
+  *band = 0;
+  follow_sample(joint, sample, shares, time - joint->begun_at, any);
   for (size_t k = 0; k < BANDS; ++k) {
-    follow_band(joint, sample, shares, k, time - joint->begun_at, any);
-  }
-  follow(&joint->home, joint->mean[HOME_BAND], shares->home);
-  joint->friction = fabs(sample->torque);
-  joint->limit = sample->limit;
-  for (size_t k = 0; k < BANDS; ++k) {
-    const double level = level_of(joint, k, squares + k * BAND_NUMBERS);
-    if (level > largest) {
-      largest = level;
+    double size, bound;
+    find_squares(joint, k, squares + k * BAND_NUMBERS, &size, &bound);
+    if (size * bound_of_most > most * bound) { /* one division for all bands */
+      most = size;
+      bound_of_most = bound;
       *band = k;
     }
   }
-  return largest;
+  return sqrt(smaller(most / bound_of_most, HIGHEST));
 }
 
 int band_decide(band_memory* joint, const band_sample* sample, double time, double rounding, int before, double level,

@@ -53,7 +53,7 @@ COLD_STATIC void begin_bands(tendonfmu_finger* f, size_t j, double time) {
 }
 
 /* The same by the bands. */
-COLD_STATIC int exceed_bands(tendonfmu_finger* f, double time, double step) {
+HOT_INLINE int exceed_bands(tendonfmu_finger* f, double time, double step) {
   const finger_state* s = &f->remembered;
   const int before = s->scalar[STATE_CONTACT] != 0.0;
   int any = 0;

@@ -51,7 +51,7 @@ HOT_INLINE void take_zeros(tendonfmu_finger* f) {
 }
 
 /* x: the load that the motors drive, as if the joints stood */
-COLD_STATIC void motor_loads(tendonfmu_finger* f) {
+HOT_INLINE void motor_loads(tendonfmu_finger* f) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     quad_store(f->scratch.motor_load + j, tendon_sums(f, f->derived.load_arm, f->scratch.position, j));
   }
