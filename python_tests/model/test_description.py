@@ -301,4 +301,5 @@ def test_an_earlier_key_of_detection_is_refused_with_what_to_do(key: str) -> Non
     table = "bias" if key == "start_share" else "contact"
     description = FINGER | {table: FINGER.get(table, {}) | {key: 1.0}}
     refused = accepted(description)
-    assert refused and re.search(rf"{table}\.{key}: no longer a key; leave it out, or calibrate again", refused) and "\n" not in refused
+    expected = rf"{table}\.{key}: no longer a key; leave it out, or calibrate again"
+    assert refused and re.search(expected, refused) and "\n" not in refused
