@@ -369,7 +369,7 @@ class FingerOracle:
     def _held_at_most(self, products: Places) -> Array:
         """B [n] N·m, of the products |F|·f."""
         own = [self.extensions.own_limit(j) if self._remembers("joint", (j,)) else 0.0 for j in range(self.n)]
-        return self._at_joints(products, np.abs(self.R)) + np.array(own)
+        return np.asarray(self._at_joints(products, np.abs(self.R)) + np.array(own))
 
     def _driven(self, x0: Array | None) -> Array:
         """x [n] N·m: what the motors load. x0: tendon positions less their zeros."""
