@@ -1,7 +1,7 @@
 """Runs parts of the evidence, keeps their results, and checks that the pages say what was measured.
 
     python -m evidence --list
-    python -m evidence fit.recalibration logs.faults -o FOLDER [--workers N] [--keep]
+    python -m evidence fit.paper logs.faults -o FOLDER [--workers N] [--keep]
     python -m evidence --check
 
 A part prints one JSON: its figures, command, commit, processor and seconds of processor time. It works in FOLDER/PART,

@@ -1,6 +1,6 @@
 """A part of the evidence: what is measured, what it needs, what is reported about it.
 
-Each file of evidence/ asks one question and has PARTS, by name. `python -m evidence fit.recalibration` runs one.
+Each file of evidence/ asks one question and has PARTS, by name. `python -m evidence fit.paper` runs one.
 """
 
 from __future__ import annotations

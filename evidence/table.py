@@ -1,6 +1,6 @@
 """Tables of Markdown, their cells (numbers, shares and rates with 95 % intervals), and their places in the pages.
 
-A page has `<!-- fit.recalibration: jaw -->`, the table `jaw` of that part, and `<!-- end -->`.
+A page has `<!-- fit.paper: contact -->`, the table `contact` of that part, and `<!-- end -->`.
 """
 
 from __future__ import annotations

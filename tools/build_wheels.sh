@@ -45,7 +45,7 @@ find_pythons() {
   done
 }
 
-# Compilers that CMake calls: zig for GLIBC 2.17. Its target leaves out a part of AVX-512 that -mavx512f has elsewhere.
+# Compilers that CMake calls: zig for GLIBC 2.17.
 make_compilers() {
   local zig name machine
   # Debian's Python.h includes <x86_64-linux-gnu/python3.11/pyconfig.h>, and zig does not look into /usr/include.
@@ -56,9 +56,6 @@ make_compilers() {
   for name in cc c++; do
     cat >"$output/$name" <<EOF
 #!/bin/sh
-for argument in "\$@"; do
-  if [ "\$argument" = -mavx512f ]; then set -- "\$@" -mevex512; fi
-done
 exec "$zig" $name -target x86_64-linux-gnu.$glibc "\$@" -isystem "$output/headers"
 EOF
     chmod +x "$output/$name"

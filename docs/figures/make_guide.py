@@ -2,7 +2,7 @@
 
     python docs/figures/make_guide.py [-o FOLDER]      some 4 min of one core; needs tendonfmu, Pillow and Chromium
 
-Pages are photographed in a headless Chromium, figures are those that the commands write; both become small PNGs.
+The pages that the commands write are photographed in a headless Chromium, and become small PNGs.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def main() -> None:
         tendonfmu(folder, *DIAGNOSE)
         keep(photograph(folder / "diagnosis" / "diagnosis.html", 1130), output / "diagnose.png")
         tendonfmu(folder, *FIT)
-        keep(folder / "fitted" / "torque_2.png", output / "fit.png")
+        keep(photograph(folder / "fitted" / "report.html", 1130, "torque_2"), output / "fit.png")
         tendonfmu(folder, *SCORE)
-        keep(folder / "score" / "contacts.png", output / "detect.png")
+        keep(photograph(folder / "score" / "score.html", 1130, "contacts"), output / "detect.png")
         servo_history(folder)
-        keep(folder / "history" / "history.png", output / "change.png")
+        keep(photograph(folder / "history" / "history.html", 980), output / "change.png")
 
 
 def servo_history(folder: Path) -> None:
@@ -73,8 +73,8 @@ def tendonfmu(folder: Path, *words: str | Path) -> None:
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
-def photograph(page: Path, height: int) -> Path:
-    """The first `height` pixels of a page, 1280 pixels wide."""
+def photograph(page: Path, height: int, place: str = "") -> Path:
+    """`height` pixels of a page, 1280 pixels wide, from its top, or of the element with an id alone."""
     picture = page.with_suffix(".png")
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
@@ -82,7 +82,13 @@ def photograph(page: Path, height: int) -> Path:
     # figures are drawn after the page has loaded
     options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
     options.append(f"--window-size=1280,{height}")
-    subprocess.run([browser, *options, f"--screenshot={picture}", page.as_uri()], check=True, stderr=subprocess.DEVNULL)
+    if place:  # a page that is scrolled is photographed white, so all else is hidden
+        shown = ", ".join(f"#{each}, #{each} *" for each in (place, "js-plotly-tester"))  # which measures texts
+        others = f"<style>body *:not(:has(#{place}), {shown}) {{ display: none !important }}</style>"
+        page = page.with_stem(place)
+        page.write_text(picture.with_suffix(".html").read_text("utf-8") + others, encoding="utf-8")
+    command = [browser, *options, f"--screenshot={picture}", page.as_uri()]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     return picture
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from evidence.diagnosis.judge import Cause, Truth, is_at_place, places
-from evidence.families.finger import Finger, Hidden
+from evidence.families.finger import Finger, Hidden, true_arms
 
 # Last key of the number in a description that says how large an effect is.
 NUMBERS = {
@@ -16,7 +16,6 @@ NUMBERS = {
     "cover_hardening": "stiffness",
     "joint_coupling": "stiffness",
     "force_gain": "correction",
-    "moment_arm": "correction",
     "time_delay": "delay",
     "tendon_nonlinearity": "hardening",
     "joint_load_friction": "coulomb",
@@ -33,6 +32,11 @@ def true_numbers(made: Finger, hidden: Hidden) -> dict[str, float]:
         return {"sine": size * float(np.cos(hidden.second)), "cosine": size * float(np.sin(hidden.second))}
     if hidden.effect == "cover_stiffness":  # the description has none at all
         size += float(made.cover[hidden.j])
+    if hidden.effect == "moment_arm":  # as a sensor's correction, or as an arm of the description
+        return {
+            "correction": size,
+            f"moment_arms[{hidden.j + 1}]": float(true_arms(made.arms, hidden)[hidden.i, hidden.j]),
+        }
     return {NUMBERS[hidden.effect]: size} if hidden.effect in NUMBERS else {}
 
 

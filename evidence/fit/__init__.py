@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 from evidence.cases import EXAMPLES
-from evidence.fit import memory, paper_figures, recalibration
+from evidence.fit import memory, paper_figures
 from evidence.part import Figures, Part
 from evidence.table import of_cells, table
 
 HAND = ("excite, 10 N", "excite, 40 N", "strokes, 10 N", "strokes, 40 N")
-RATIOS = ("after/before: median", "90 %", "worst", "above 1.05")
 
 
 def virtual_hand(folder: Path, workers: int) -> Figures:
@@ -51,16 +50,6 @@ def prediction_table(figures: Figures) -> str:
 
 
 PARTS = {
-    "recalibration": Part(
-        recalibration.measure,
-        minutes=2.0,
-        needs=("../shared/data",),
-        headlines={"jaw.above": (0, 12), "jaw.worst": (0.95, 1.2), "fingers.worst": (0.9, recalibration.LIMIT)},
-        tables={
-            "jaw": of_cells("jaw.lines", ["numbers", "factor", *RATIOS], 2),
-            "fingers": of_cells("fingers.lines", ["pretension", "judged", *RATIOS], 2),
-        },
-    ),
     "virtual_hand": Part(
         virtual_hand,
         headlines={"left.0": (10, 20), "left.1": (10, 25), "left.2": (10, 20), "left.3": (10, 25)},

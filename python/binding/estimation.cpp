@@ -82,14 +82,15 @@ class bound_estimator : bound_handle<tendonfmu_estimator, tendonfmu_estimator_de
     return nb::make_tuple(cost, gradient, information);
   }
 
-  nb::tuple jacobian(std::size_t recording, const number_row& z, std::size_t first, std::size_t count) const {
+  nb::tuple jacobian(std::size_t recording, const number_row& z, std::size_t first, std::size_t count,
+                     std::size_t length) const {
     expect_unknowns(z);
     const std::size_t u = unknowns(), n = joints();
     auto [torque, torques] = new_array<double>({count, n});
     auto [jump, jumps] = new_array<double>({count, n});
     auto [torque_derivative, torque_slopes] = new_array<double>({count, n, u});
     auto [jump_derivative, jump_slopes] = new_array<double>({count, n, u});
-    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, torques, jumps, torque_slopes,
+    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, length, torques, jumps, torque_slopes,
                                         jump_slopes));
     return nb::make_tuple(torque, jump, torque_derivative, jump_derivative);
   }

@@ -25,6 +25,7 @@ from tendonfmu.diagnosis.extension_fit import (
     cause_parameters,
     fit_extended,
     fit_numbers,
+    intervals_of,
 )
 from tendonfmu.diagnosis.gain import Unseen, measure_gain, require_unseen
 from tendonfmu.diagnosis.samples import Samples
@@ -149,6 +150,10 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     value, unit = parameters[0]["extensions[1].stiffness"]
     assert value == pytest.approx(1.0, rel=0.2) and unit == "N.m/rad3"
     assert list(parameters[1]) == ["extensions[2].inertia"]
+    intervals = intervals_of(found, samples, settings)
+    for path, true in (("extensions[1].stiffness", 1.0), ("extensions[2].inertia", 0.0)):
+        assert intervals[path].low <= true <= intervals[path].high
+    assert intervals["extensions[1].stiffness"].high < 3.0
     without = [fit_extended(before, [other], samples, settings).data for other in causes[::-1]]
     result = measure_gain(before.data, found.data, [training], [test], between=[without[1]])
     unseen = Unseen(before.data, [training], [test])

@@ -1,10 +1,11 @@
-"""Panels as Plotly figures and as PNG: what is drawn is where it belongs, in numbers with units; names are text."""
+"""Panels as Plotly figures: what is drawn is where it belongs, in numbers with units; names are text."""
 
 from __future__ import annotations
 
 import io
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,13 @@ import plotly.graph_objects as go
 import pytest
 from matplotlib.image import imread
 
-from repetitions import repeated
+from real_browser import Elements, needs_nothing_else
 from repository_paths import ROOT
 from tendonfmu.drawing import draw_finger
-from tendonfmu.drawing.figures import figure_of, figures_json, pooled, thinned
+from tendonfmu.drawing.figures import figure_of, figures_json, thinned
 from tendonfmu.drawing.panel import DIVERGING, Band, Bars, Curve, Dots, Heat, Panel, Sheet
-from tendonfmu.drawing.png import write_sheet
 from tendonfmu.model import finger_drawing
+from tendonfmu.report import write_figures
 
 X = np.linspace(0.0, 10.0, 5)
 PANEL = Panel(title="title", alt="what it shows", x_label="time (s)", y_label="torque (mN·m)", x_limits=(0.0, 10.0))
@@ -36,7 +37,6 @@ EVERYTHING = replace(
 MATRIX = Panel(
     *("m", "what", "the same order", ""),
     heat=Heat((100 * np.eye(4)).astype(np.int8), tuple("abcd"), tuple("abcd"), DIVERGING, -100, 100, "%"),
-    borders=(2.5,),
     x_limits=(-0.5, 3.5),
     y_limits=(3.5, -0.5),
     y_ticks=((1.0, "one"), (3.0, "two")),
@@ -60,20 +60,6 @@ def test_plotly_knows_all_names_and_values(panel: Panel) -> None:
     (drawn,) = json.loads(text)["figures"]
     known = go.Figure(data=drawn["data"], layout={**drawn["layout"], "template": json.loads(text)["template"]})
     assert len(known.data) == len(figure.data) > 0
-
-
-@pytest.mark.parametrize("panel", repeated(KINDS, 0, 3))
-def test_a_png_has_ink_at_its_size_and_the_same_bytes_again(panel: Panel) -> None:
-    sheet = Sheet("", "name", "heading", (("before", "a key"),), (panel, panel))
-    made = []
-    for _ in range(2):
-        file = io.BytesIO()
-        write_sheet(sheet, [figure_of(panel, NAMES)] * 2, file)
-        made.append(file.getvalue())
-    image = imread(io.BytesIO(made[0]))[:, :, :3]
-    assert made[0] == made[1]
-    assert image.shape[1] == 2 * panel.extent[0] * 3 // 2 and image.shape[0] > panel.extent[1] * 3 // 2
-    assert 0.005 < np.mean(image < 0.98) < 0.6
 
 
 def test_a_curve_has_its_numbers_and_its_gaps() -> None:
@@ -103,13 +89,6 @@ def test_many_points_are_thinned_and_none_that_stands_out_is_lost() -> None:
     np.testing.assert_array_equal(one.y, first[one.x.astype(int)])
 
 
-def test_the_strongest_of_many_stays_visible() -> None:
-    matrix = np.full((1001, 1001), 10, np.int8)
-    matrix[998, 3] = -90
-    drawn, every = pooled(matrix, (400, 400))
-    assert every == (3, 3) and drawn.shape == (334, 334) and drawn[332, 1] == -90 and drawn[0, 0] == 10
-
-
 def test_names_are_text() -> None:
     hostile = "<script>alert('x')</script><b>$\\frac{指"
     named = replace(
@@ -122,9 +101,16 @@ def test_names_are_text() -> None:
     assert "<" not in text
     figures = json.dumps(json.loads(text)["figures"])
     assert "<script>" not in figures and "&lt;script&gt;" in figures
-    file = io.BytesIO()  # a PNG takes it as well, and names without a glyph
-    write_sheet(Sheet("", "", hostile, (("before", hostile),), (named,)), [drawn[0][1]], file)
-    assert file.getvalue()
+
+
+def test_a_page_of_figures_needs_nothing_else_and_takes_any_name(tmp_path: Path) -> None:
+    hostile = "<script>alert('x')</script>指"
+    sheets = [Sheet("", name, hostile, (("before", hostile),), (PANEL, EVERYTHING)) for name in ("one", "other")]
+    write_figures(tmp_path / "new" / "page.html", "kind", hostile, sheets)
+    page = (tmp_path / "new" / "page.html").read_text("utf-8")
+    needs_nothing_else(page)
+    assert "<script>alert" not in page and page.count('<div class="plot"') == 4
+    assert [section["id"] for section in Elements(page).all("section")] == ["one", "other"]
 
 
 def test_the_picture_of_a_finger_marks_edges_and_takes_any_name() -> None:

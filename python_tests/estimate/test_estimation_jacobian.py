@@ -101,3 +101,14 @@ def test_any_part_of_a_recording() -> None:
     for wrong in ((0, each.z, 0, SAMPLES + 1), (1, each.z, 0, 1), (0, each.z[:-1], 0, 1), (0, not_a_number, 0, 1)):
         with pytest.raises((InputError, IndexError, ValueError)):
             each.estimator.jacobian(*wrong)
+
+
+@pytest.mark.parametrize(("start", "stop", "length"), [(0, 100, 4), (13, 97, 7), (40, 50, 10), (3, 100, 25)])
+def test_means_over_blocks(start: int, stop: int, length: int) -> None:
+    """Samples beyond the last whole block are not there."""
+    each = case(2)
+    blocks = (stop - start) // length
+    for found, whole in zip(each.estimator.jacobian(0, each.z, start, stop, length), each.rows, strict=True):
+        rows = whole[start : start + blocks * length]
+        expected = rows.reshape(blocks, length, *rows.shape[1:]).mean(axis=1)
+        assert found.shape == expected.shape and excess(found, expected) < 1e-12

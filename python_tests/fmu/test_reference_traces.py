@@ -100,12 +100,6 @@ def test_fmpy_yields_the_reference_trace(fmus: Path, name: str, fmi: int) -> Non
 # --- examples/ci_reference_check --------------------------------------------------------------------------------------
 
 
-@pytest.fixture(autouse=True)
-def beside_the_script(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The script imports a file of its folder, as it does when Python runs it."""
-    monkeypatch.syspath_prepend(EXAMPLE)
-
-
 def check(fmu: Path, *more: Path | str) -> Answer:
     return run_script(EXAMPLE / "check_reference.py", fmu, *more)
 
@@ -289,24 +283,13 @@ def test_the_fmu_agrees_with_what_it_carries(tmp_path: Path, fmi: int) -> None:
     assert done.status == 1 and re.search(r"compensated_torque\[\d\] .* DIFFERS", done.out)
 
 
-# The manifest of the Reference FMUs: a result alone, without the description of the standard.
-RESULT_ALONE = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest"
-    fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-alpha.1">
-    <Related type="text/csv" source="SOURCE" role="result" description="Output of the default experiment"/>
-</fmiReferences>
-"""
-
-
 def test_the_forms_of_other_tools_are_read(fmu: Path, tmp_path: Path) -> None:
     def alone(files: dict[str, bytes]) -> None:
-        """Only the result is listed: inputs and options lie beside it."""
-        files[MANIFEST] = RESULT_ALONE.replace("SOURCE", "cable_loop_ref.csv").encode()
+        """As in the Reference FMUs: a result alone, with inputs and options beside it."""
         files.pop(EXPERIMENT)
 
     def without_options(files: dict[str, bytes]) -> None:
         files.pop(OPTIONS)
-        files[MANIFEST] = re.sub(rb"<Related [^>]*ref\.opt[^>]*>", b"", files[MANIFEST])
 
     largest = np.abs(table(members(fmu)[RESULT])["compensated_torque[1]"]).max()
     for edit, arguments, allowed in (
@@ -319,13 +302,11 @@ def test_the_forms_of_other_tools_are_read(fmu: Path, tmp_path: Path) -> None:
         assert float(done.out.splitlines()[1].split()[2]) == pytest.approx(allowed, rel=1e-3)
 
 
-ELSEWHERE = b'<fmiReferences><Related source="https://example.org/a.csv" role="result"/></fmiReferences>'
 MISSING: dict[str, tuple[str, bytes | None, str]] = {
-    "no manifest": (MANIFEST, None, "no extra/.* in it; expected reference results in the FMU, or FOLDER/NAME"),
-    "no XML": (MANIFEST, b"<a>", "manifest.xml: .*; expected XML"),
-    "nothing to compare": (MANIFEST, b"<fmiReferences/>", "no experiment with references and no result"),
-    "result missing": (RESULT, None, r"cable_loop_ref\.csv: not in the FMU"),
-    "file elsewhere": (MANIFEST, ELSEWHERE, "expected a relative path in the FMU"),
+    "no result": (RESULT, None, "no extra/.* in it; expected reference results there, or FOLDER/NAME"),
+    "no inputs": (STIMULI, None, "cable_loop_in.csv: cannot be read; expected the inputs of the FMU"),
+    "no table": (RESULT, b"time\n1,2\n", "cable_loop_ref.csv: expected `time` first"),
+    "no stop time": (OPTIONS, b"StartTime,0", "StopTime, StepSize missing"),
 }
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from command import Call
-from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.calibration.calibration import Options, _read
 from tendonfmu.files import write_table
@@ -43,8 +42,21 @@ def changed(finger: Finger, **numbers: float) -> Finger:
     return finger_from_data(data)
 
 
+def turned_round(travel: np.ndarray[Any, Any], distance: float) -> np.ndarray[Any, Any]:
+    """Which way friction points, -1 to 1: it turns round over a distance."""
+    state = np.zeros_like(travel)
+    for k in range(1, len(travel)):
+        state[k] = np.clip(state[k - 1] + (travel[k] - travel[k - 1]) / distance, -1.0, 1.0)
+    return state
+
+
 def made_up(
-    seed: int, encoder: float = 1e-4, curved: float = 0.0, still: bool = False, stiff: float = 1.0
+    seed: int,
+    encoder: float = 1e-4,
+    curved: float = 0.0,
+    still: bool = False,
+    stiff: float = 1.0,
+    rubbing: float = 0.0,
 ) -> tuple[Finger, Recording]:
     """A minute at 100 Hz of a finger that shares no code with the rest, and its true description."""
     draws = np.random.default_rng(seed)
@@ -63,6 +75,8 @@ def made_up(
     force += 2.0 * np.sign(np.gradient(angle[:, :1], axis=0))  # friction that turns round
     position = angle @ ARMS.T + force / (stiff * STIFFNESS) + ZEROS
     position[:, 0] += curved * angle[:, 0] ** 2
+    for j in range(2) if rubbing else ():  # behind each level a cord bears a share less, or more where it is let out
+        position -= rubbing * force * turned_round(angle[:, j:] @ ARMS[:, j:].T, 3e-5) / STIFFNESS
     groups = {
         "tendon_force": force + 0.05 * draws.standard_normal(force.shape),
         "tendon_position": STEP * np.round(position / STEP),
@@ -91,6 +105,17 @@ def test_intervals_cover_the_truth(encoder: float) -> None:
         assert len(numbers) == 12 and all(number.is_known for number in numbers)
         covered += [abs(number.value - number.described) <= number.half for number in numbers]
     assert 0.90 <= np.mean(covered) <= 0.99
+
+
+def test_friction_along_a_cord_is_no_other_spring() -> None:
+    """A cord that stretches less behind its pulleys, by a share that turns round with its motion."""
+    off, covered = [], []
+    for seed in range(8):
+        finger, recording = made_up(seed, rubbing=0.03)
+        for each in learn_routing(finger, [recording]):
+            off += [abs(number.value / number.described - 1.0) for number in (each.stiffness, *each.arms.values())]
+            covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
+    assert max(off) < 0.008 and np.mean(covered) > 0.7  # without regard to it: 0.037
 
 
 def test_a_finger_begun_wrong_gets_its_routing_back(index: tuple[Finger, Recording]) -> None:
@@ -226,32 +251,28 @@ def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:
 
 
 @pytest.mark.long
-def test_intervals_cover_on_fingers_of_an_other_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two MuJoCo fingers, one with spatial tendons: arms within 1 %, stiffness within 5 %, zeros within 3 steps."""
-    require("mujoco")
-    from evidence.contact import mujoco_pushes
+def test_intervals_cover_on_fingers_by_seed() -> None:
+    """Four fingers that share no code with the product: arms within 1 %, stiffness within 5 %, zeros within 3 steps."""
+    from evidence.families import cases
 
-    monkeypatch.setitem(mujoco_pushes.SECONDS, "free", 130.0)
     off, covered, alone = [], [], []
-    for number in (3, 19):
-        mujoco_pushes.make(tmp_path, number, ("free",))
-        finger = read_finger(mujoco_pushes.description_file(tmp_path, number))
-        for pretension in mujoco_pushes.PRETENSIONS:
-            whole = read_recording(mujoco_pushes.place(tmp_path, number, "free", pretension))
-            for begin in (0.0, 65.0):
-                for each in learn_routing(finger, [whole[begin : begin + 60.0]]):
-                    covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
-                    off += [
-                        *(abs(arm.value / arm.described - 1.0) / 0.01 for arm in each.arms.values()),
-                        abs(each.stiffness.value / each.stiffness.described - 1.0) / 0.05,
-                        abs(each.zero.value) / (3.0 * STEP),
-                    ]
-                part = whole[begin : begin + 60.0]
-                part.groups.pop("joint_position")
-                alone += [each.stiffness for each in learn_routing(finger, [part]) if each.stiffness.is_known]
+    for seed in (1, 3, 5, 7):
+        case = cases.make("dahl", seed, "none")
+        finger = finger_from_data(case.nominal)
+        for table in case.recordings.values():
+            part = Recording.from_frame(table)[0.0:60.0]
+            for each in learn_routing(finger, [part]):
+                covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
+                off += [
+                    *(abs(arm.value / arm.described - 1.0) / 0.01 for arm in each.arms.values()),
+                    abs(each.stiffness.value / each.stiffness.described - 1.0) / 0.05,
+                    abs(each.zero.value) / (3.0 * STEP),
+                ]
+            part.groups.pop("joint_position")
+            alone += [each.stiffness for each in learn_routing(finger, [part]) if each.stiffness.is_known]
     assert len(covered) > 100 and 0.88 <= np.mean(covered) <= 1.0 and max(off) < 1.0
-    assert len(alone) == 36 and max(abs(each.value / each.described - 1.0) for each in alone) < 0.014
-    assert sum(abs(each.value - each.described) <= each.half for each in alone) == 35
+    assert len(alone) == 32 and max(abs(each.value / each.described - 1.0) for each in alone) < 0.02
+    assert sum(abs(each.value - each.described) <= each.half for each in alone) >= 31
 
 
 def test_a_rigid_drive_has_no_stiffness_to_learn() -> None:

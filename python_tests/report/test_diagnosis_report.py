@@ -54,6 +54,10 @@ def test_the_report_is_as_contract_and_schema_say(name: str) -> None:
         assert tuple(entry[key] for key in ("effect", "joint", "tendon")) == tuple(vars(cause.where).values())
         assert entry["parameters"] == {path: value for path, (value, _) in cause.parameters.items()}
         assert entry["parameters"] == {path: v for place in entry["places"] for path, v in place["parameters"].items()}
+        assert entry["intervals"] == {path: [size.low, size.high] for path, size in cause.intervals.items()}
+        assert entry["intervals"] == {
+            path: ends for place in entry["places"] for path, ends in place["intervals"].items()
+        }
         places = [(place["joint"], place["tendon"]) for place in entry["places"]]
         assert places == [(place.joint, place.tendon) for place in cause.places]
         rivals = [other["effect"] for other in entry["confusable_with"]]

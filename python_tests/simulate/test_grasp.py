@@ -1,4 +1,4 @@
-"""examples/grasp: a short grasp with compensation and without, and the same loop in libcosim from its SSP package."""
+"""examples/grasp: a short grasp with compensation and without."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optional_parts import require
 from plant_rigs import needs_plant
 from repository_paths import ROOT
 from tendonfmu.simulate.ssp import build_ssp
@@ -62,12 +61,3 @@ def test_compensation_stops_gently_and_holds_the_force(example: Any, package: Pa
     spread = math.sqrt(without["rms_error_1N"] ** 2 - without["mean_error_1N"] ** 2)
     assert without["rms_error_1N"] > 2.0 * ours["rms_error_1N"]
     assert spread > 1.5 * ours["rms_error_1N"], "even with the best offset"
-
-
-def test_libcosim_runs_the_same_grasp(example: Any, package: Path) -> None:
-    require("libcosim")
-    task = example("controller").Task(speed=0.8, way=(0.8,), touch=0.2, forces=(1.0,), hold=0.1)
-    found, expected = example("ssp_masters").run("libcosim", package, task)[0], run(example, package, task)[0]
-    assert expected["force"].max() > 0.5
-    for name, values in expected.items():
-        np.testing.assert_allclose(found[name], values, rtol=0, atol=1e-9, err_msg=name)

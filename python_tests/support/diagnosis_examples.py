@@ -117,6 +117,7 @@ LOAD_FRICTION = Cause(
     gain=Interval(0.14, 0.11, 0.17),
     confusable_with=(),
     parameters={"extensions[2].coulomb": (2.3e-4, "m"), "extensions[3].coulomb": (1.1e-4, "m")},
+    intervals={"extensions[2].coulomb": Interval(2.3e-4, 2.0e-4, 2.6e-4)},
     places=(
         CausePlace(1, 3, {"extensions[2].coulomb": (2.3e-4, "m")}),
         CausePlace(1, 4, {"extensions[3].coulomb": (1.1e-4, "m")}),

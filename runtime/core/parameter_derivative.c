@@ -9,6 +9,8 @@
 
 enum { NO_LAW = 0xffffffffu, LAWS_OF_PLACE = 2, SIDES_OF_JUMP = 2 };
 
+#define NEARLY_SLIPS 1e-9 /* of a limit: rounding */
+
 /* --- where things are -----------------------------------------------------------------------------------------------
  */
 
@@ -31,7 +33,8 @@ size_t parameter_derivative_size(const tendonfmu_finger* finger) {
   const sizes s = sizes_of(finger);
   const size_t words = 2 * (s.records + s.rows + 2 * s.joints);
   return (words + 1) / 2 * 2 * sizeof(uint32_t) + (s.friction + s.bias) * sizeof(law_term) +
-         s.plain * sizeof(plain_term) + (3 * s.places * finger->joints + 4 * finger->joints) * sizeof(double);
+         s.plain * sizeof(plain_term) +
+         ((3 * finger->joints + MODEL_MAX_ELEMENTS) * s.places + 4 * finger->joints) * sizeof(double);
 }
 
 typedef struct law_search {
@@ -100,6 +103,7 @@ void parameter_derivative_place(const tendonfmu_finger* finger, void* memory, pa
   derivative->torque_factor = take(&from, matrix);
   derivative->jump_factor = take(&from, matrix);
   derivative->bias_factor = take(&from, matrix);
+  derivative->by_limit = take(&from, MODEL_MAX_ELEMENTS * s.places * sizeof(double));
   derivative->moved = take(&from, 2 * n * sizeof(double));
   derivative->jumped = take(&from, 2 * n * sizeof(double));
   derivative->friction = take(&from, s.friction * sizeof(law_term));
@@ -158,15 +162,64 @@ static double add_magnitude(const place_laws* p, int negative, double speed, dou
   return value;
 }
 
-/* F where the place moves, 0 where it sticks */
-static double read_friction(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
+/* |F| of the law, with its slopes */
+static double read_magnitude(const tendonfmu_finger* f, const place_laws* p, parameter_derivative* d) {
   const double v = f->scratch.velocity[p->slot], speed = v < 0.0 ? -v : v;
   const double grip = f->extensions.friction ? f->scratch.grip[p->slot] : 1.0;
-  if (f->remembered.moving[p->slot] == 0.0) {
+  return grip * add_magnitude(p, v < 0.0, speed, grip, d->friction, &d->friction_count);
+}
+
+/* slopes of |F| to those of F: the terms from `first` on */
+static void scale_slopes(parameter_derivative* d, size_t first, double share) {
+  for (law_term* term = d->friction + first; term < d->friction + d->friction_count; ++term) {
+    for (size_t k = 0; k < LAW_SIDE_NUMBERS; ++k) {
+      term->slope[k] *= share;
+    }
+  }
+}
+
+/* whether the friction of a slot remembers (docs/reference/semantics/presliding.md) */
+static int remembers(const tendonfmu_finger* f, size_t slot) {
+  return f->memory.elements && f->memory.remembers[slot] != 0.0;
+}
+
+/* slope of what a slot's elements hold by its limit: what slips has its sign, and what is free keeps what it had; in
+ * the relative form all that is held is in proportion to the limit */
+static double slope_by_limit(const tendonfmu_finger* f, parameter_derivative* d, size_t slot, uint32_t place,
+                             double limit) {
+  double slope = 0.0;
+  const int tendon = place < 2 * f->joints * f->tendons;
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    const friction_element* element = &f->memory.element[e];
+    const size_t row = 2 * e + (tendon ? place % 2 : 0); /* edges, pulleys */
+    const double held = f->remembered.element[row * f->slots + slot], most = element->share[slot] * limit;
+    const double size = held < 0.0 ? -held : held, sign = held < 0.0 ? -1.0 : 1.0;
+    double* own = d->by_limit + e * d->places + place;
+    if (size >= (1.0 - NEARLY_SLIPS) * most) {
+      *own = most > 0.0 ? sign : 0.0;
+    } else if (element->stiffness[slot] == 0.0) {
+      *own = held / most;
+    } else {
+      const double yield =
+          tendon && f->memory.stretch > 0.0 ? element->stiff[slot] * f->memory.sections[slot] * f->memory.stretch : 0.0;
+      *own *= (element->kept[slot] + yield) / (1.0 + yield);
+    }
+    slope += element->share[slot] * *own;
+  }
+  return slope;
+}
+
+/* F of an edge or a pulley where the acting force is known: 0 where it sticks; by its laws, if it remembers */
+static double read_friction(const tendonfmu_finger* f, const place_laws* p, double acting, parameter_derivative* d) {
+  const size_t first = d->friction_count;
+  const int held = remembers(f, p->slot);
+  if (f->remembered.moving[p->slot] == 0.0 && !held) {
     return 0.0;
   }
-  const double sign = v < 0.0 ? -1.0 : 1.0;
-  return grip * sign * add_magnitude(p, v < 0.0, speed, grip * sign, d->friction, &d->friction_count);
+  const double most = read_magnitude(f, p, d), sign = f->scratch.velocity[p->slot] < 0.0 ? -1.0 : 1.0;
+  const double share = held ? slope_by_limit(f, d, p->slot, p->place, acting * most) : sign;
+  scale_slopes(d, first, share);
+  return share * most;
 }
 
 /* b of fig. 5 where a place comes to rest */
@@ -191,7 +244,7 @@ static double read_jump(const tendonfmu_finger* f, const place_laws* p, paramete
   const finger_state* s = &f->remembered;
   const double before = s->side_before[p->slot], now = s->side[p->slot], event = s->event[p->slot];
   const double grip = f->extensions.friction ? f->scratch.bias_grip[p->slot] : 1.0;
-  if (event == 0.0 || grip == 0.0 || (event > 0.0 && before == 0.0)) {
+  if (event == 0.0 || grip == 0.0 || remembers(f, p->slot) || (event > 0.0 && before == 0.0)) {
     return 0.0;
   }
   const double jump = event > 0.0 ? read_stop(p, before, grip, d) : read_start(f, p, before, now, grip, d);
@@ -240,11 +293,13 @@ static void act(const tendonfmu_finger* f, size_t i, double* force, double* acti
   *acting = *force < 0.0 ? -*force : *force;
 }
 
-static void follow_forces(const tendonfmu_finger* f, size_t i, const double* moved, tendon_forces* t) {
+static void follow_forces(const tendonfmu_finger* f, size_t i, tendon_forces* t) {
+  const finger_scratch* s = &f->scratch;
   double force = f->remembered.force[i];
   for (size_t k = 0; k < 2 * f->joints; ++k) {
+    const size_t at = k / 2 * f->tendon_lanes + i;
     act(f, i, &force, &t->acting[k], &t->by_force[k]);
-    force -= t->acting[k] * moved[k];
+    force -= k % 2 == 0 ? s->edge_loss[at] : k + 1 < 2 * f->joints ? s->pulley_loss[at + f->tendon_lanes] : 0.0;
   }
   act(f, i, &force, &t->acting[2 * f->joints], &t->by_force[2 * f->joints]);
 }
@@ -286,26 +341,27 @@ static void follow_change(const tendonfmu_finger* f, parameter_derivative* d, si
 
 static void read_tendon(const tendonfmu_finger* f, parameter_derivative* d, size_t i) {
   const size_t n = f->joints, lanes = f->tendon_lanes;
+  const finger_scratch* s = &f->scratch;
   int present[2 * MODEL_MAX_JOINTS] = {0};
   tendon_forces forces;
   for (size_t j = 0; j < n; ++j) {
     const place_laws edge = edge_at(f, d, i, j);
-    const size_t behind = (j + 1) * lanes + i;
+    const size_t at = j * lanes + i, behind = at + lanes;
     d->moved[2 * j] = d->jumped[2 * j] = d->moved[2 * j + 1] = d->jumped[2 * j + 1] = 0.0;
     if (*edge.below_side[0] != NO_LAW) {
       present[2 * j] = 1;
-      d->moved[2 * j] = read_friction(f, &edge, d);
+      d->moved[2 * j] = read_friction(f, &edge, s->force_at[at], d);
       d->jumped[2 * j] = read_jump(f, &edge, d);
     }
     if (j + 1 < n && d->pulley_side[0][behind] != NO_LAW) {
       place_laws pulley = single_law(edge.place + 1, behind, f->derived.settings.tendon_threshold,
                                      f->derived.pulley_law + behind * LAW_NUMBERS, d->pulley_side, behind);
       present[2 * j + 1] = 1;
-      d->moved[2 * j + 1] = read_friction(f, &pulley, d);
+      d->moved[2 * j + 1] = read_friction(f, &pulley, s->force_between[at], d);
       d->jumped[2 * j + 1] = read_jump(f, &pulley, d);
     }
   }
-  follow_forces(f, i, d->moved, &forces);
+  follow_forces(f, i, &forces);
   for (size_t k = 0; k + 1 < 2 * n; ++k) {
     if (present[k]) {
       follow_change(f, d, i, k, &forces);
@@ -317,7 +373,9 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
   const size_t n = f->joints, slot = n * f->tendon_lanes + j;
   const uint32_t place = (uint32_t)(2 * n * f->tendons + 2 * j);
   const double threshold = f->derived.settings.joint_threshold;
-  const double load = f->scratch.load[j];
+  const double load = f->scratch.load[j], factor[2] = {1.0, load};
+  const size_t first = d->friction_count;
+  double limit = f->scratch.own_limit[j];
   for (int loaded = 0; loaded < 2; ++loaded) {
     uint32_t* const* side = loaded ? d->load_side : d->joint_side;
     const double* laws = loaded ? f->derived.load_law : f->derived.joint_law;
@@ -326,13 +384,17 @@ static void read_joint(const tendonfmu_finger* f, parameter_derivative* d, size_
       continue;
     }
     place_laws own = single_law(place + (uint32_t)loaded, slot, threshold, laws + j * LAW_NUMBERS, side, j);
-    read_friction(f, &own, d);
+    if (f->remembered.moving[slot] != 0.0 || remembers(f, slot)) {
+      limit += factor[loaded] * read_magnitude(f, &own, d);
+    }
     read_jump(f, &own, d);
     for (size_t other = 0; other < n; ++other) {
       d->torque_factor[row + other] = d->jump_factor[row + other] = d->bias_factor[row + other] = 0.0;
     }
-    d->torque_factor[row + j] = d->bias_factor[row + j] = loaded ? load : 1.0;
+    d->torque_factor[row + j] = d->bias_factor[row + j] = factor[loaded];
   }
+  const double sign = f->scratch.velocity[slot] < 0.0 ? -1.0 : 1.0;
+  scale_slopes(d, first, remembers(f, slot) ? slope_by_limit(f, d, slot, place, limit) : sign);
 }
 
 static void read_covers(const tendonfmu_finger* f, parameter_derivative* d) {

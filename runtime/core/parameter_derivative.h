@@ -45,6 +45,8 @@ typedef struct parameter_derivative {
   plain_term* plain;                                 /* of T alone */
   double *torque_factor, *jump_factor, *bias_factor; /* [places × n]; rows of places without a term mean nothing */
   double *moved, *jumped;                            /* [2n] F and b along the tendon being read */
+  /* [elements × places] of the samples before: what an element holds, by its limit; 0 where nothing remembers */
+  double* by_limit;
 } parameter_derivative;
 
 /* Bytes of memory that the derivative of this finger needs. */

@@ -36,8 +36,8 @@ class free_finger {
   std::vector<double> free_; /* numbers with thresholds that nothing reaches */
 };
 
-/* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction. The
- * states kept with a recording, which are those of the start, are then found anew. */
+/* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction, or of
+ * friction with a memory. The states kept with a recording, which are those of the start, are then found anew. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
 /* The finger's state at the beginning of each segment of a recording. */
@@ -64,7 +64,6 @@ class recording_track {
   double time(std::size_t row) const { return time_[row]; }
   tendonfmu_inputs inputs(std::size_t row) const;
   bool used(std::size_t row) const { return use_[row] != 0; }
-  std::size_t used_count() const { return used_count_; }
   double external_torque(std::size_t row, std::size_t joint) const {
     return external_.empty() ? 0.0 : external_[row * joints_ + joint];
   }

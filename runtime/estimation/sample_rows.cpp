@@ -6,14 +6,15 @@
 
 namespace tendonfmu::estimation {
 
-sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger)
+sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger, derivatives wanted)
     : unknowns_(unknowns),
       finger_(finger),
       memory_((parameter_derivative_size(finger) + sizeof(double) - 1) / sizeof(double)) {
-  if (finger->memory.elements > 0) {
+  const bool exact = wanted == derivatives::exact;
+  if (exact && finger->memory.elements > 0) {
     throw refused("friction with a memory (presliding): its derivative by the numbers is not known here");
   }
-  for (std::uint32_t p = 0; p < finger->shape.parameter_count; ++p) {
+  for (std::uint32_t p = 0; exact && p < finger->shape.parameter_count; ++p) {
     if (unknowns.plain(p) >= 0 && parameter_item(&finger->shape, p).kind == ITEM_EXTENSION) {
       throw refused("extensions: the derivative by their numbers is not known here");
     }
@@ -74,11 +75,16 @@ void sample_rows::read() {
 }
 
 void sample_rows::dense(double* torque_rows, double* jump_rows) const {
-  const std::size_t n = joints(), p = unknowns_.count();
-  std::fill_n(torque_rows, n * p, 0.0);
-  if (jump_rows) {
-    std::fill_n(jump_rows, n * p, 0.0);
+  for (double* rows : {torque_rows, jump_rows}) {
+    if (rows) {
+      std::fill_n(rows, joints() * unknowns_.count(), 0.0);
+    }
   }
+  add_dense(torque_rows, jump_rows, 1.0);
+}
+
+void sample_rows::add_dense(double* torque_rows, double* jump_rows, double share) const {
+  const std::size_t n = joints(), p = unknowns_.count();
   for (const sensitivity_term& term : terms_) {
     for (std::size_t k = 0; k < 4; ++k) {
       if (term.column[k] < 0) {
@@ -86,18 +92,19 @@ void sample_rows::dense(double* torque_rows, double* jump_rows) const {
       }
       for (std::size_t j = 0; j < n; ++j) {
         const std::size_t at = j * p + static_cast<std::size_t>(term.column[k]);
-        if (term.torque) {
-          torque_rows[at] += term.slope[k] * term.torque[j];
+        if (torque_rows && term.torque) {
+          torque_rows[at] += share * term.slope[k] * term.torque[j];
         }
         if (jump_rows && term.jump) {
-          jump_rows[at] += term.slope[k] * term.jump[j];
+          jump_rows[at] += share * term.slope[k] * term.jump[j];
         }
       }
     }
   }
   for (const plain_slope& term : plain_) {
-    const std::size_t at = term.joint * p + static_cast<std::size_t>(term.column);
-    torque_rows[at] += term.slope;
+    if (torque_rows) {
+      torque_rows[term.joint * p + static_cast<std::size_t>(term.column)] += share * term.slope;
+    }
   }
 }
 

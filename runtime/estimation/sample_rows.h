@@ -30,10 +30,14 @@ struct plain_slope {
   double slope;
 };
 
+/* Whether derivatives that are not exact will do: those of friction with a memory (parameter_derivative.h), and none
+ * by numbers of extensions. Else a finger that has them is refused. */
+enum class derivatives { exact, nearly };
+
 class sample_rows {
  public:
   /* both must outlive the rows */
-  sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger);
+  sample_rows(const unknown_list& unknowns, const tendonfmu_finger* finger, derivatives wanted = derivatives::exact);
 
   /* the sample that the finger last took, by a step */
   void read();
@@ -49,6 +53,8 @@ class sample_rows {
 
   /* ∂T_j/∂z and ∂Δb_j/∂z: [joints × unknowns], rows; jump_rows may be nullptr */
   void dense(double* torque_rows, double* jump_rows) const;
+  /* adds a share of them; either may be nullptr */
+  void add_dense(double* torque_rows, double* jump_rows, double share) const;
 
  private:
   void add(const law_term& from, bool is_jump);

@@ -6,14 +6,11 @@ namespace tendonfmu::estimation {
 namespace {
 
 struct update_choice {
-  symmetric_update list[4] = {};
+  symmetric_update list[3] = {};
 
   update_choice() {
     std::size_t count = 0;
 #if defined(TENDONFMU_ESTIMATION_AVX2)
-    if (has_avx512f()) {
-      list[count++] = avx512_symmetric_update;
-    }
     if (has_avx2_and_fma()) {
       list[count++] = avx2_symmetric_update;
     }
@@ -27,10 +24,6 @@ struct update_choice {
 const symmetric_update* symmetric_updates() {
   static const update_choice choice;
   return choice.list;
-}
-
-const char* symmetric_update_name() {
-  return symmetric_updates()->name;
 }
 
 void add_outer_products(double* lower, std::size_t p, const double* rows, std::size_t k, std::size_t stride,

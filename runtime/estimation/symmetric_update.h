@@ -37,11 +37,8 @@ void multiply_transposed(double* product, std::size_t product_stride, const doub
                          std::size_t left_stride, const double* right, std::size_t b, std::size_t right_stride,
                          std::size_t p);
 
-/* Which implementation the calls take on this processor: "avx512", "avx2" or "portable". The first two round a product
- * and its sum once and give the same bits; the portable one rounds twice. */
-const char* symmetric_update_name();
-
-/* One implementation; `name` NULL ends the list. For the dispatch, and for tests and measurements of each. */
+/* One implementation: "avx2", which rounds a product and its sum once, or "portable", which rounds twice; `name` NULL
+ * ends the list. For the dispatch, and for tests and measurements of each. */
 struct symmetric_update {
   const char* name;
   decltype(&tendonfmu::estimation::add_outer_products) add_outer_products;
@@ -50,13 +47,12 @@ struct symmetric_update {
   decltype(&tendonfmu::estimation::multiply_transposed) multiply_transposed;
 };
 
-/* Those that run on this processor, the fastest first; [4], the last one with name NULL. */
+/* Those that run on this processor, the fastest first; [3], the last one with name NULL. */
 const symmetric_update* symmetric_updates();
 
 extern const symmetric_update portable_symmetric_update;
 #if defined(TENDONFMU_ESTIMATION_AVX2)
 extern const symmetric_update avx2_symmetric_update;
-extern const symmetric_update avx512_symmetric_update;
 #endif
 
 }  // namespace tendonfmu::estimation

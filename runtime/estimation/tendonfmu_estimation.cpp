@@ -100,7 +100,11 @@ void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::ve
   }
   const std::size_t segment = first / r.segment_length();
   const std::vector<double> numbers = problem.unknowns.write(z.data());
-  finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
+  if (segment > 0) {
+    finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
+  } else {
+    finger->begin(numbers, r.kinematics_source());
+  }
   for (std::size_t k = segment * r.segment_length(); k < first + count; ++k) {
     finger->step(k, r.time(k), r.inputs(k));
     if (k >= first) {
@@ -249,30 +253,38 @@ tendonfmu_status tendonfmu_estimator_evaluate(tendonfmu_estimator* estimator, co
 }
 
 tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, size_t recording, const double* z,
-                                              size_t first, size_t count, double* torque, double* jump,
+                                              size_t first, size_t blocks, size_t length, double* torque, double* jump,
                                               double* torque_derivative, double* jump_derivative) {
-  if (!estimator || !z) {
+  if (!estimator || !z || length == 0) {
     return fail(estimator, TENDONFMU_BAD_ARGUMENT, missing);
   }
   return guarded(estimator, TENDONFMU_BAD_ARGUMENT, [&] {
     const fit_problem& problem = estimator->problem;
     const std::size_t n = problem.joints(), row = n * problem.unknowns.count();
+    const double share = 1.0 / static_cast<double>(length);
+    const std::size_t count = blocks > SIZE_MAX / length ? SIZE_MAX : blocks * length;
     free_finger finger(problem.image.data(), problem.image.size());
-    sample_rows rows(problem.unknowns, finger.get());
-    std::vector<double> by_torque(row), by_jump(row);
+    sample_rows rows(problem.unknowns, finger.get(), derivatives::nearly);
+    const auto at = [](double* to, std::size_t offset) { return to ? to + offset : nullptr; };
     replay(estimator, recording, checked(problem, z), first, count, &finger,
            [&](const recording_track&, std::size_t k) {
+             const std::size_t block = (k - first) / length;
+             const bool begins = (k - first) % length == 0;
+             for (const auto& [to, width] :
+                  {std::pair(torque, n), {jump, n}, {torque_derivative, row}, {jump_derivative, row}}) {
+               if (to && begins) {
+                 std::fill_n(to + block * width, width, 0.0);
+               }
+             }
              rows.read();
-             rows.dense(by_torque.data(), by_jump.data());
+             rows.add_dense(at(torque_derivative, block * row), at(jump_derivative, block * row), share);
              for (std::size_t j = 0; j < n; ++j) {
-               put(torque, (k - first) * n + j, rows.torque(j));
-               put(jump, (k - first) * n + j, rows.jump(j));
-             }
-             if (torque_derivative) {
-               std::copy(by_torque.begin(), by_torque.end(), torque_derivative + (k - first) * row);
-             }
-             if (jump_derivative) {
-               std::copy(by_jump.begin(), by_jump.end(), jump_derivative + (k - first) * row);
+               if (torque) {
+                 torque[block * n + j] += share * rows.torque(j);
+               }
+               if (jump) {
+                 jump[block * n + j] += share * rows.jump(j);
+               }
              }
            });
   });
@@ -290,7 +302,6 @@ tendonfmu_status tendonfmu_estimator_innovations(tendonfmu_estimator* estimator,
     const std::size_t n = problem.joints(),
                       samples = recording < problem.recordings.size() ? problem.recordings[recording].samples() : 0;
     free_finger finger(problem.image.data(), problem.image.size());
-    sample_rows rows(problem.unknowns, finger.get());
     std::vector<bias_filter> filters(n);
     std::vector<double> gain, weight;
     if (samples > 0) {

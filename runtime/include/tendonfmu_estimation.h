@@ -106,10 +106,12 @@ typedef int (*tendonfmu_fit_watch)(void* context, const tendonfmu_fit_progress* 
 tendonfmu_status tendonfmu_estimator_evaluate(tendonfmu_estimator* estimator, const double* z, size_t stride,
                                               unsigned threads, double* cost, double* gradient, double* information);
 
-/* Torque and jumps of samples first .. first + count − 1, with their exact derivatives: torque, jump [count × n],
- * torque_derivative, jump_derivative [count × n × u]; NULL: not wanted. */
+/* Torque and jumps from sample `first` on, as means over `blocks` blocks of `length` samples, with their derivatives:
+ * torque, jump [blocks × n], torque_derivative, jump_derivative [blocks × n × u]; NULL: not wanted. The derivatives are
+ * exact but for friction with a memory, where the share of its limit that a place holds is taken as constant, and for
+ * numbers of extensions, where they are 0. */
 tendonfmu_status tendonfmu_estimator_jacobian(tendonfmu_estimator* estimator, size_t recording, const double* z,
-                                              size_t first, size_t count, double* torque, double* jump,
+                                              size_t first, size_t blocks, size_t length, double* torque, double* jump,
                                               double* torque_derivative, double* jump_derivative);
 
 /* Residuals before the bias update, e [samples × n] (τ − T_eff), and their variances S [samples].

@@ -256,7 +256,7 @@ TEST(Estimator, RefusesArgumentsInOneLineThatSaysWhy) {
   tendonfmu_unknown unknown;
   said(tendonfmu_estimator_get_unknown(e.get(), start.size(), &unknown));
   const auto rows = [&](std::size_t first, std::size_t count) {
-    return tendonfmu_estimator_jacobian(e.get(), 0, start.data(), first, count, nullptr, nullptr, nullptr, nullptr);
+    return tendonfmu_estimator_jacobian(e.get(), 0, start.data(), first, count, 1, nullptr, nullptr, nullptr, nullptr);
   };
   said(rows(40, 11));
   said(rows(2, SIZE_MAX));

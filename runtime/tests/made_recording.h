@@ -115,7 +115,7 @@ inline std::pair<Numbers, Numbers> torques(const Json& description, const Record
     z.push_back(unknown.start);
   }
   Numbers torque(r.samples * r.joints), jump(r.samples * r.joints);
-  EXPECT_EQ(tendonfmu_estimator_jacobian(e, 0, z.data(), 0, r.samples, torque.data(), jump.data(), nullptr, nullptr),
+  EXPECT_EQ(tendonfmu_estimator_jacobian(e, 0, z.data(), 0, r.samples, 1, torque.data(), jump.data(), nullptr, nullptr),
             TENDONFMU_OK)
       << tendonfmu_estimator_last_error(e);
   tendonfmu_estimator_destroy(e);

@@ -169,25 +169,7 @@ TEST_P(SymmetricUpdateTest, GivesTheSameBitsForAPartAsForTheWhole) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, SymmetricUpdateTest, testing::Values(0, 1, 2));
-
-TEST(SymmetricUpdate, GivesTheSameBitsOnAvx2AndAvx512) {
-  const symmetric_update* list = tendonfmu::estimation::symmetric_updates();
-  if (std::string(list[0].name) != "avx512") {
-    GTEST_SKIP() << "no AVX-512 here";
-  }
-  const std::size_t p = 83, k = 131;
-  const std::vector<double> rows = some_rows(k, p, p, 7), before = some_triangle(p, 8);
-  std::vector<double> lower[2], product[2];
-  for (int i = 0; i < 2; ++i) {
-    lower[i] = before;
-    product[i].resize(k * p);
-    list[i].add_outer_products(lower[i].data(), p, rows.data(), k, p, -0.3);
-    list[i].multiply_symmetric(product[i].data(), p, lower[i].data(), p, rows.data(), k, p);
-  }
-  EXPECT_EQ(std::memcmp(lower[0].data(), lower[1].data(), sizeof(double) * p * p), 0);
-  EXPECT_EQ(std::memcmp(product[0].data(), product[1].data(), sizeof(double) * k * p), 0);
-}
+INSTANTIATE_TEST_SUITE_P(Kernels, SymmetricUpdateTest, testing::Values(0, 1));
 
 TEST(SymmetricUpdate, TakesTheFastestFirstAndEndsWithThePortable) {
   const symmetric_update* list = tendonfmu::estimation::symmetric_updates();
@@ -196,10 +178,9 @@ TEST(SymmetricUpdate, TakesTheFastestFirstAndEndsWithThePortable) {
     ++last;
   }
   EXPECT_STREQ(list[last].name, "portable");
-  EXPECT_STREQ(list[0].name, tendonfmu::estimation::symmetric_update_name());
 #if defined(TENDONFMU_ESTIMATION_AVX2)
-  const bool avx512 = __builtin_cpu_supports("avx512f"), avx2 = __builtin_cpu_supports("avx2");
-  EXPECT_STREQ(list[0].name, avx512 ? "avx512" : avx2 && __builtin_cpu_supports("fma") ? "avx2" : "portable");
+  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  EXPECT_STREQ(list[0].name, avx2 ? "avx2" : "portable");
 #endif
 }
 

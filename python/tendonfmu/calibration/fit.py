@@ -53,13 +53,17 @@ class CalibratedFit:
 
 
 def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int, seed: int) -> CalibratedFit:
-    """Fit a diagnosed finger to all recordings of free motion, less what looks like contact. Raises InputError."""
+    """Fit a finger that was fitted before to all recordings of free motion, less what looks like contact.
+
+    Raises InputError.
+    """
     if not unknowns(finger.data):
         return CalibratedFit(finger.data, (), ())
     events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
     kept = [without_events(recording, events) for recording in recordings]
     structure = build_structure(finger, Choice())
-    learned = learn_batch(structure, kept, Watch(None), settings_of(finger.data, kept, threads), None)
+    settings = replace(settings_of(finger.data, kept, threads), near=True)
+    learned = learn_batch(structure, kept, Watch(None), settings, None)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     result = with_known_numbers(result, kept)
     if np.isfinite(learned.covariance).all():

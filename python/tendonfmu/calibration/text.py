@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
+from tendonfmu.drawing import Sheet
 from tendonfmu.files import check_output, check_output_folder, counted, whole_file, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
@@ -354,18 +355,23 @@ def _write_diagnosis(calibration: Calibration, folder: Path) -> None:
             shutil.copyfile(file, copy)
 
 
+def sheets(calibration: Calibration) -> Iterator[Sheet]:
+    """Yield the figures of the page: motion, then pushes."""
+    report = calibration.report
+    yield motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])
+    if calibration.push is not None:
+        yield push_sheet(calibration.push)
+    if pushed := report["pushes"] and report["pushes"]["list"]:
+        yield pushes_sheet(pushed, report["pushes"]["false_alarm_list"])
+
+
 def calibration_page(calibration: Calibration) -> str:
     """Return the HTML text of the page."""
     report = calibration.report
     tone, sentence = verdict(report)
-    sheets = [motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])]
-    if calibration.push is not None:
-        sheets.append(push_sheet(calibration.push))
-    if pushed := report["pushes"] and report["pushes"]["list"]:
-        sheets.append(pushes_sheet(pushed, report["pushes"]["false_alarm_list"]))
     return render(
         "calibration.html.jinja",
-        drawn(sheets),
+        drawn(sheets(calibration)),
         report=report,
         finger=friction_figure(calibration.data),
         tone=tone,

@@ -52,7 +52,7 @@ FreeAtPretensions = Annotated[
     list[Path], typer.Argument(metavar="FREE", help="free motion at several pretensions, .csv or .parquet")
 ]
 Subject = Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")]
-Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures")]
+Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for a page with figures")]
 Report = Annotated[Path | None, typer.Option(metavar="R.json", help="report with all results, as JSON")]
 Progress = Annotated[
     bool | None, typer.Option("--progress/--no-progress", help="show progress [default: on a terminal]")

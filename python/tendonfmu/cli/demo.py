@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import Progress, command
-from tendonfmu.cli.console import phase_bar, print_json, print_results, say, warn
+from tendonfmu.cli.console import phase_bar, print_json, print_results, say, say_files, warn
 
 
 @command()
@@ -22,16 +22,16 @@ def demo(
 
     DIR gets the page story.html and all the files that it is made from.
     """
-    from tendonfmu.demo import Story, chapter_lines, chapter_tables, file_lines, story_report, write_story
+    from tendonfmu.demo import TITLES, Story
 
     story = Story(output)
     if story.missing:
         warn(f"{story.missing}")
-    for number, chapter in enumerate(story.chapters, start=1):
-        say(f"{number} {chapter.name}: {chapter.title[:1].lower()}{chapter.title[1:]}")
+    for number, name in enumerate(story.names, start=1):
+        say(f"{number} {name}: {TITLES[name][:1].lower()}{TITLES[name][1:]}")
         with phase_bar(progress) as show:
-            chapter.run(show)
-        print_results(chapter_tables(story, chapter.name), chapter_lines(story, chapter.name), left="")
-    write_story(story)
-    print_results((), file_lines(story), left="")
-    print_json(lambda: story_report(story))
+            chapter = story.run(name, show)
+        print_results(chapter.tables, chapter.lines, left="")
+    story.write()
+    say_files(story.files)
+    print_json(story.report)

@@ -63,10 +63,10 @@ def diagnose(
     Of a hand, every finger is diagnosed in DIR/FINGER, and DIR gets the page
     hand.html.
 
-    DIR gets the page diagnosis.html, diagnosis.json, figures, and the model
-    with its causes, extended.json and extended.fmu. With --history it gets the
-    page history.html, history.csv and history.png: a line per recording and
-    cause, and how fast each cause grows.
+    DIR gets the page diagnosis.html, diagnosis.json, and the model with its
+    causes, extended.json and extended.fmu. With --history it gets the page
+    history.html and history.csv: a line per recording and cause, and how fast
+    each cause grows.
     """
     from tendonfmu.hand import diagnose_hand, is_hand
     from tendonfmu.interface import DiagnosisWarning

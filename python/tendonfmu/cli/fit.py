@@ -29,7 +29,7 @@ def fit(
     ssv: Annotated[
         Path | None, typer.Option(metavar="FITTED.ssv", help="parameter set of SSP to write, for FMUs of the finger")
     ] = None,
-    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for figures and report.html")] = None,
+    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="folder for the page report.html")] = None,
     compare: Annotated[
         list[Path] | None, typer.Option(metavar="RECORDING", help="recording to judge, not to fit; may be repeated")
     ] = None,

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .demo import Story
-    from .page import chapter_lines, chapter_tables, file_lines, story_report, write_story
+    from .demo import TITLES, Chapter, Story
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

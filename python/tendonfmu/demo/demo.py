@@ -1,62 +1,95 @@
-"""The demo: every step on built-in data, from free motion to a tuned FMU. This module computes and prints nothing.
-
-Five chapters:
+"""The demo: every command on built-in data, from free motion to a tuned FMU. Each chapter calls it as a user would.
 
 - calibrate: a two-joint finger is calibrated on a minute of motion;
 - detect: pushes on an index finger are detected, which was calibrated on 27 min of motion;
-- diagnose: what the model of the two-joint finger lacked, which is unknown to the demo, and the gain on parts of the
-  recording that were not used for fitting;
+- diagnose: what the model of the two-joint finger lacked, which is unknown to the demo;
 - fit: the numbers of the two-joint finger alone;
-- run: the FMU of the index finger runs over free motion.
+- run: the FMU of the index finger runs over free motion, and over the same motion at four times the pretension.
 
-One page shows all of them. If the installation cannot estimate, the chapters of the two-joint finger are left out.
+One page shows all of them and leads to the page of each command. If the installation cannot estimate, the chapters of
+the two-joint finger are left out.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
-from importlib.resources import as_file
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from tendonfmu.demo.figures import compensated_sheet
-from tendonfmu.demo.run import DATA, IndexFinger
+from tendonfmu.calibration import DIAGNOSIS
+from tendonfmu.calibration import PAGE as CALIBRATION_PAGE
+from tendonfmu.calibration import text as calibration_text
+from tendonfmu.drawing import Sheet
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
-from tendonfmu.files import check_output_folder
-from tendonfmu.report import drawn, write_figures
-from tendonfmu.tasks import PhaseState
+from tendonfmu.files import check_output_folder, write_text
+from tendonfmu.interface import CalibrateResult, build, calibrate, fit, run, score
+from tendonfmu.model import read_finger
+from tendonfmu.report import (
+    Table,
+    Tile,
+    detect_text,
+    diagnosis_page,
+    diagnosis_sheets,
+    diagnosis_text,
+    drawn,
+    fit_page,
+    fit_text,
+    law_sheets,
+    render,
+    residual_tables,
+    rounded,
+    run_report,
+    run_sheets,
+    score_sheets,
+    together,
+    torque_sheets,
+    write_fit_page,
+    write_run_page,
+    write_score_figures,
+)
+from tendonfmu.tasks import forget_steps
 
-if TYPE_CHECKING:
-    from tendonfmu.calibration import Calibration
-    from tendonfmu.diagnosis import Diagnosis
-    from tendonfmu.estimate import FitProgress, FrictionFit
-
+FORMAT = "tendonfmu-demo-2"
+PAGE = "story.html"
+DATA = files("tendonfmu") / "data"
 TWO_JOINTS, TRAINING, UNSEEN = "two_joints.json", "two_joints_training.parquet", "two_joints_unseen.parquet"
-CALIBRATION, FIT = "calibration", "fit"  # folders of the full pages
-FITTED = "fitted.json"
+INDEX, GIVEN, FMU = "index_finger_calibrated.json", "index_finger.json", "index_finger.fmu"
+FREE, FREE_X4, PUSHES = "index_finger_free", "index_finger_free_x4", "index_finger_pushes"
+SHOWN = "mcp_flexion"  # joint that is drawn
+TITLES = {
+    "calibrate": "From free motion to a tuned FMU",
+    "detect": "Contact without a touch sensor",
+    "diagnose": "What the model got wrong, and why",
+    "fit": "Its numbers alone, and how well they are known",
+    "run": "What the joints feel, friction subtracted",
+}
 ESTIMATING = ("calibrate", "diagnose", "fit")  # chapters that need the estimation, which some installations lack
 
-Phase = Callable[[str, int, int | None], None]
+Phase = Callable[[str, int, int | None], None]  # words, steps done, steps
 
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter of the demo."""
+    """What a chapter shows, in the terminal and on the page."""
 
     name: str
-    title: str
-    run: Callable[[Phase], None]
+    tile: Tile  # its most important number
+    tables: Sequence[Table]
+    lines: Sequence[str]
+    sheets: Sequence[Sheet]
+    page: str  # the page of its command, in the folder
+
+    @property
+    def title(self) -> str:
+        return TITLES[self.name]
 
 
 class Story:
-    """The demo in a folder: its chapters run in order, and `write_story` (page.py) then writes the page."""
-
-    calibration: Calibration  # results of these chapters
-    diagnosis: Diagnosis  # diagnosis of the calibration
-    fit: FrictionFit
+    """The demo in a folder: `run` its chapters in the order of `names`, then `write` the page."""
 
     def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
@@ -65,67 +98,140 @@ class Story:
         except OSError as error:
             raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
         self.folder = folder
-        self.finger = IndexFinger(folder)
-        self._files: dict[Path, str] = {}
-        all_chapters = (
-            Chapter("calibrate", "From free motion to a tuned FMU", self._calibrate),
-            Chapter("detect", "Contact without a touch sensor", self._detect),
-            Chapter("diagnose", "What the model got wrong, and why", self._diagnose),
-            Chapter("fit", "Its numbers alone, and how well they are known", self._fit),
-            Chapter("run", "What the joints feel, friction subtracted", self._run),
-        )
-        self.chapters = [chapter for chapter in all_chapters if HAS_ESTIMATION or chapter.name not in ESTIMATING]
+        self.names = [name for name in TITLES if HAS_ESTIMATION or name not in ESTIMATING]
         self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
+        self.chapters: list[Chapter] = []
+        self.files: dict[Path, str] = {}  # each file with its content in words
+        self._calibrated: CalibrateResult
 
-    @property
-    def files(self) -> dict[Path, str]:
-        """Each file with its content in words, in the order of the story, the page first."""
-        return {**self._files, **self.finger.files}
-
-    def add_page(self, page: Path) -> None:
-        """Put the page of the whole story before all other files."""
-        self._files = {page: "the whole demo, for a browser", **self._files}
-
-    def _calibrate(self, phase: Phase) -> None:
-        from tendonfmu.calibration import calibrate, write_calibration
-        from tendonfmu.tasks import forget_steps
-
-        def show(state: PhaseState) -> None:
-            phase(state.words, state.done, state.total)
-
-        folder = self.folder / CALIBRATION
-        forget_steps(folder)  # of an earlier demo: this one shows every step
-        with as_file(DATA) as data:
-            calibration = calibrate(data / TWO_JOINTS, [data / TRAINING], folder, tests=[data / UNSEEN], progress=show)
-        assert calibration.diagnosis is not None, "no step was there to be repeated"
-        self.calibration, self.diagnosis = calibration, calibration.diagnosis
-        phase("writing", 0, None)
-        self._files |= write_calibration(calibration, folder)
-
-    def _detect(self, phase: Phase) -> None:
-        self.finger.pushes(lambda done, total: phase("running the FMU", done, total))
-
-    def _diagnose(self, phase: Phase) -> None:
-        """Do nothing: the chapter shows what the calibration has found."""
-
-    def _fit(self, phase: Phase) -> None:
-        from tendonfmu.estimate import FitWarning, FrictionFit
-        from tendonfmu.files import write_text
-        from tendonfmu.report import write_fit_page
-
-        def show(now: FitProgress) -> None:
-            phase(f"fitting: {now.phase}", now.done, now.total)
-
+    def run(self, name: str, phase: Phase) -> Chapter:
+        """Run a chapter. `phase` is called with what it does."""
         with as_file(DATA) as data, warnings.catch_warnings():
-            warnings.simplefilter("ignore", FitWarning)  # the page of the fit lists them
-            self.fit = FrictionFit(data / TWO_JOINTS, progress=show).fit(data / TRAINING, compare=data / UNSEEN)
-        phase("drawing the fit", 0, None)
-        folder = self.folder / FIT
-        page, *_ = write_fit_page(self.fit.picture(), folder)
-        write_text(folder / FITTED, self.fit.description_text())
-        self._files |= {page: "all of the fit", folder / FITTED: "the fitted description"}
+            warnings.simplefilter("ignore", UserWarning)  # the pages list them
+            chapter: Chapter = getattr(self, f"_{name}")(data, phase)
+        self.chapters.append(chapter)
+        return chapter
 
-    def _run(self, phase: Phase) -> None:
-        self.finger.free_motion(lambda done, total: phase("running the FMU", done, total))
-        (figure,) = write_figures(drawn([compensated_sheet(self.finger)]), self.folder)
-        self.finger.files[figure] = "torques, what is left of them, contacts"
+    def write(self) -> None:
+        """Write the page of all chapters that have run, whole or not at all."""
+        page = self.folder / PAGE
+        sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
+        written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
+        content = {"chapters": self.chapters, "missing": self.missing, "files": written}
+        write_text(page, render("story.html.jinja", drawn(sheets), **content))
+        self.files = {page: "the whole demo, for a browser", **self.files}
+
+    def report(self) -> dict[str, Any]:
+        """Return what `tendonfmu demo --json` prints."""
+        return {
+            "format": FORMAT,
+            "folder": str(self.folder),
+            "chapters": [
+                {"name": each.name, "title": each.title, "result": each.tile._asdict(), "lines": each.lines}
+                for each in self.chapters
+            ],
+            "left_out": self.missing or None,
+            "files": {str(path): what for path, what in self.files.items()},
+        }
+
+    # --- chapters: the two-joint finger -------------------------------------------------------------------------------
+
+    def _calibrate(self, data: Path, phase: Phase) -> Chapter:
+        folder = self.folder / "calibration"
+        forget_steps(folder)  # of an earlier demo: this one shows every step
+        self._calibrated = calibrate(
+            data / TWO_JOINTS,
+            data / TRAINING,
+            test=data / UNSEEN,
+            folder=folder,
+            progress=lambda state: phase(state.words, state.done, state.total),
+        )
+        phase("writing", 0, None)
+        self.files |= self._calibrated.write(folder)
+        report = self._calibrated.report
+        lines = [*(f"warning: {sentence}" for sentence in report["warnings"]), *calibration_text.lines(report)]
+        tile = Tile(*next(calibration_text.tiles(report)))
+        sheet = next(calibration_text.sheets(self._calibrated.calibration))
+        page = f"{folder.name}/{CALIBRATION_PAGE}"
+        return Chapter("calibrate", tile, list(calibration_text.tables(report)), lines, [sheet], page)
+
+    def _diagnose(self, data: Path, phase: Phase) -> Chapter:
+        """Show what the calibration has found."""
+        del data, phase
+        found = self._calibrated.calibration.diagnosis
+        assert found is not None, "no step was there to be repeated"
+        factor, unit = diagnosis_text.unit_of(found)
+        errors = (rounded(factor * together(model.test_rms)) for model in (found.nominal, found.extended))
+        tile = Tile(" → ".join(errors), unit, "error on held-out parts, before and after the causes are built in")
+        sheets = [sheet for sheet in diagnosis_sheets(found) if sheet.section != "views"]
+        tables, lines = list(diagnosis_text.tables(found)), list(diagnosis_text.lines(found))
+        return Chapter("diagnose", tile, tables, lines, sheets, f"calibration/{DIAGNOSIS}/{diagnosis_page.PAGE}")
+
+    def _fit(self, data: Path, phase: Phase) -> Chapter:
+        fitted = fit(
+            data / TWO_JOINTS,
+            data / TRAINING,
+            compare=data / UNSEEN,
+            progress=lambda now: phase(f"fitting: {now.phase}", now.done, now.total),
+        )
+        phase("drawing the fit", 0, None)
+        folder, picture = self.folder / "fit", fitted.estimator.picture()
+        self.files |= write_fit_page(picture, folder)
+        fitted.write(folder / "fitted.json")
+        self.files[folder / "fitted.json"] = "the fitted description"
+        residuals = list(residual_tables(picture))
+        start, end = (rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
+        tile = Tile(f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit")
+        sheets = [list(torque_sheets(picture))[-1]]
+        sheets += [sheet for sheet in law_sheets(picture) if sheet.name == "laws_joints"]
+        lines = list(fit_text.summary_sentences(picture, residuals))
+        return Chapter("fit", tile, [next(fit_text.tables(fitted.estimator))], lines, sheets, f"fit/{fit_page.PAGE}")
+
+    # --- chapters: the index finger -----------------------------------------------------------------------------------
+
+    def _detect(self, data: Path, phase: Phase) -> Chapter:
+        def show(done: int, total: int) -> None:
+            phase("running the finger", done, total)
+
+        fmu = self.folder / FMU
+        build(data / INDEX, fmu)
+        self.files[fmu] = "the calibrated index finger's FMU"
+        pushes = data / f"{PUSHES}.parquet"
+        after, before = (score(data / finger, pushes, progress=show) for finger in (INDEX, GIVEN))
+        self.files |= write_score_figures(after.scored, self.folder / "score")
+        tile = Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
+        as_given = f"as given: {before.found} of {before.events} pushes found"
+        lines = [*detect_text.score_lines(after.scored), as_given]
+        sheet = next(score_sheets(after.scored))
+        return Chapter("detect", tile, list(detect_text.score_tables(after.scored)), lines, [sheet], "score/score.html")
+
+    def _run(self, data: Path, phase: Phase) -> Chapter:
+        finger, fmu = read_finger(data / INDEX), self.folder / FMU
+        headings, reports, sheets, lines = ["joint"], [], [], []
+        for name in (FREE, FREE_X4):
+            outputs = self.folder / f"{name}.csv"
+            result = run(fmu, data / f"{name}.parquet", progress=lambda done: phase("running the FMU", done, None))
+            result.write(outputs)
+            table = result.columns()
+            report = run_report(fmu, Path(f"{name}.parquet"), table, finger, kinematics=1, output=outputs.name)
+            page = write_run_page(self.folder / f"{name}.html", report, table)
+            self.files |= {outputs: f"the FMU's outputs over {name}.parquet", page: "the same, for a browser"}
+            force = f"{result.recording.groups['tendon_force'].mean():.0f} N"
+            (joint,) = (sheet for sheet in run_sheets(table, finger.joint_names, []) if sheet.title == SHOWN)
+            sheets.append(replace(joint, caption=f"{SHOWN.replace('_', ' ')}, free motion at {force}"))
+            lines.append(f"free motion at {force}: {result.summary}")
+            headings.append(f"at {force}")
+            reports.append(report)
+        rows = [tuple(row) for row in zip(finger.joint_names, *map(_left, reports), strict=True)]
+        title = f"{finger.name}: joint torque → left after compensation, rms in mN·m"
+        joint = reports[0]["joints"][finger.joint_names.index(SHOWN)]
+        tile = Tile(_pair(joint), "mN·m", "torque at the base of the finger, before and after compensation")
+        return Chapter("run", tile, [(title, tuple(headings), rows)], lines, sheets, f"{FREE}.html")
+
+
+def _left(report: dict[str, Any]) -> Iterator[str]:
+    return map(_pair, report["joints"])
+
+
+def _pair(joint: dict[str, Any]) -> str:
+    return f"{1e3 * joint['joint_torque_rms']:.1f} → {1e3 * joint['compensated_torque_rms']:.1f}"

@@ -53,9 +53,7 @@ class Base:
     def without(self, out: Flags) -> Base:
         """Return the base fitted without some blocks [B]."""
         samples = self.samples.without(out)
-        nominal, model = (
-            refitted(replace(each, slopes={}), samples, self.settings) for each in (self.nominal, self.model)
-        )
+        nominal, model = (refitted(each, samples, self.settings) for each in (self.nominal, self.model))
         return replace(self, samples=samples, nominal=nominal, model=model)
 
 
@@ -67,7 +65,6 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
         settings,
         given=model.given,
         fixed=model.fixed,
-        known=model.slopes,
         rough=rough,
     )
 

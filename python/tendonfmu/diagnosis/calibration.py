@@ -149,7 +149,7 @@ def _sensors(view: View, cause: Cause, parts: Sequence[_Part]) -> tuple[Sensor, 
 
 def calibrated(cause: Cause) -> Cause:
     """Return a calibration of the fitted model: its sensors, one place for all numbers there, and its size."""
-    known = {sensor.where: sensor for sensor in cause.sensors}
+    known, intervals = {sensor.where: sensor for sensor in cause.sensors}, dict(cause.intervals)
     merged: dict[tuple[int | None, int | None], dict[str, tuple[float, str]]] = {}
     for term, place in zip(cause.terms, cause.places, strict=True):
         merged.setdefault((place.joint, place.tendon), {}).update(place.parameters)
@@ -158,9 +158,10 @@ def calibrated(cause: Cause) -> Cause:
         before = known.get(where, Sensor(where, Interval(value), unit)).correction
         moved = value - before.value  # a delay was fitted again
         known[where] = Sensor(where, Interval(value, before.low + moved, before.high + moved), unit)
+        intervals |= dict.fromkeys(place.parameters, known[where].correction)
     sensors = tuple(known.values())
     places = tuple(CausePlace(*place, numbers) for place, numbers in merged.items())
-    return replace(cause, sensors=sensors, places=places, size=_size(sensors))
+    return replace(cause, sensors=sensors, places=places, intervals=intervals, size=_size(sensors))
 
 
 def _size(sensors: Sequence[Sensor]) -> str:

@@ -128,6 +128,8 @@ class Cause:
         What the data cannot distinguish from it.
     parameters
         Its numbers in the extended description, of all places: path -> (value, unit).
+    intervals
+        95 % intervals of those that the data determine, by path.
     size
         In plain words with physical units.
     places
@@ -150,6 +152,7 @@ class Cause:
     gain_unit: str = "N.m"
     confusable_with: tuple[Where, ...] = ()
     parameters: Parameters = field(default_factory=dict)
+    intervals: Mapping[str, Interval] = field(default_factory=dict)
     size: str = ""
     places: tuple[CausePlace, ...] = ()
     evidence: tuple[Evidence, ...] = ()

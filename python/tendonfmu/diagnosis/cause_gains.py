@@ -12,7 +12,7 @@ from tendonfmu.diagnosis.base import refitted
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, SCALING, Term
 from tendonfmu.diagnosis.effects.memory import PRESLIDING
-from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, with_known
+from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, intervals_of, with_known
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.search import Search, terms_of
@@ -132,8 +132,7 @@ class _Bench:
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
             self._full, self.nominal = (
-                refitted(replace(model, slopes={}), self._samples, self._settings)
-                for model in (self._full, self.nominal)
+                refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
             )
         self._training = training
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
@@ -180,9 +179,11 @@ class _Bench:
         order = self._order.get(frozenset(id(term) for cause in causes for term in cause.terms), [])
         found = cause_parameters(self.nominal.data, order, model)
         numbers = {id(term): own for term, own in zip(order, found, strict=True)}
+        intervals = intervals_of(model, self._predicted, self._settings) if order else {}
         return [
             replace(
                 cause,
+                intervals=intervals,
                 places=tuple(
                     CausePlace(term.place.joint, term.place.tendon, numbers[id(term)]) for term in cause.terms
                 ),

@@ -1,8 +1,7 @@
 """How a description's numbers are fitted: by what runs of the core leave, without a learning bias.
 
 The likelihood is that of `estimate.memory_fit`; noise is correlated over some blocks, so that so many count as one.
-Derivatives are differences between runs. Between two computations of them Broyden's rank-one update keeps them good
-enough (Broyden, Math. Comp. 19, 1965), and a fit begins with those of a similar model.
+Between two computations of derivatives Broyden's rank-one update keeps them good enough.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
+from tendonfmu.diagnosis.cause import with_error
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.effects.description_edit import sides_at
 from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
@@ -25,28 +25,26 @@ from tendonfmu.estimate import (
     Choice,
     Estimator,
     MemoryProblem,
-    State,
     Structure,
     build_structure,
     get_number,
     guess_prior,
+    minimise,
     own_copy,
     set_number,
-    unknown_names,
     unknowns,
     with_known_numbers,
     with_values,
 )
 from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
-from tendonfmu.statistics import MEMORY, bounded
+from tendonfmu.statistics import MEMORY, Interval
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20
 LASTING = 0.2  # s, for which an error of the model lasts, about
-LEAST_FALL = 1e-3  # of the cost, for each independent block: a step that lowers it by less is the last one
-STEP = 1e-3  # of a coordinate, for derivatives
-FARTHEST = 10.0  # times its expected magnitude, that a step moves a number
+STEP = 1e-3  # of a coordinate, for slopes of numbers
+TOLERANCE = 0.05  # standard errors (rms): a shorter step is the last one, and so few blocks have large ones
 TINY = 1e-9  # expected magnitude of a number that is 0, which stays there
 NEW = 3.0  # times its start: prior standard deviation of a new number
 
@@ -71,16 +69,16 @@ class FittedModel:
     cost: float = float("nan")  # Σ e² with the prior, (N·m)²
     warnings: tuple[str, ...] = ()  # sentences
     fixed: tuple[str, ...] = ()  # paths of numbers that no fit of this model changes
-    # derivatives of what is left by the unknowns, by their keys [R, n]; of the samples it was fitted to
-    slopes: Mapping[str, Numbers] = field(default_factory=dict, repr=False, compare=False)
+    # derivatives of what is left by the unknowns [R, n, u]; of the samples it was fitted to
+    slopes: Numbers = field(default_factory=lambda: np.zeros((0, 0, 0)), repr=False, compare=False)
     scale: Numbers = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)  # of the unknowns [u]
 
     def columns(self, samples: Samples) -> tuple[Array, Numbers]:
         """Return the derivatives of the torque by the unknowns [B, n, u], 0 where not used, and their scale [u]."""
         joints = len(self.data["joints"])
-        columns = np.zeros((samples.grid.blocks, joints, len(self.slopes)), dtype=np.float32)
-        for k, slope in enumerate(self.slopes.values()):
-            columns[samples.used, :, k] = -slope
+        columns = np.zeros((samples.grid.blocks, joints, self.slopes.shape[2]), dtype=np.float32)
+        if self.slopes.size:
+            columns[samples.used] = -self.slopes
         return columns, self.scale
 
 
@@ -91,109 +89,80 @@ def fit_numbers(
     *,
     given: Mapping[str, Any] | None = None,
     fixed: tuple[str, ...] = (),
-    known: Mapping[str, Numbers] | None = None,
     rough: bool = False,
 ) -> FittedModel:
     """Fit the numbers of a description, starting at its own; one without numbers stays as it is.
 
-    `known` are derivatives of a similar model, to begin with. A rough fit does not compute them anew at its end.
+    A rough fit does not compute the derivatives anew at its end.
     """
     # The samples have the forces that the model predicts: they lack the noise, which a term that scales with the force
     # would otherwise fit by shrinking the force.
     if not unknowns(data):
         return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
-    if fixed:
-        settings = replace(settings, choice=replace(settings.choice, fix=(*settings.choice.fix, *fixed)))
-    structure = _with_scale(build_structure(finger_from_data(data, settings.path), settings.choice), origin)
-    problem = _Problem(structure, samples)
-    fit = problem.fit
-    state, columns = _minimised(problem, np.clip(fit.mean, fit.lower, fit.upper), known or {}, rough)
-    numbers = fit.estimator.values(
-        np.clip(fit.scale.unknowns(state.u), *(fit.scale.unknowns(end) for end in (fit.lower, fit.upper)))
-    )
+    structure = _structure(data, origin, fixed, settings)
+    problem = _problem(structure, samples)
+    begin = problem.state(np.clip(problem.mean, problem.lower, problem.upper))
+    found = minimise(problem, begin, MOST_STEPS, TOLERANCE, rough=True)
+    state, last = found.state, found.linearised if rough else problem.linearised(found.state)
+    numbers = problem.estimator.values(np.clip(problem.scale.unknowns(state.u), *problem.bounds))
+    log, size = problem.scale.log, problem.scale.size
     return FittedModel(
         data=with_values(structure, numbers).data,
         given=origin,
         values={number.path: float(numbers[structure.index[number.path]]) for number in structure.numbers},
         cost=state.cost,
         fixed=fixed,
-        slopes=problem.known(columns),
-        scale=np.where(fit.scale.log, np.log(10.0), fit.scale.size),
+        slopes=last.columns / np.where(log, 1.0, size),
+        scale=np.where(log, np.log(10.0), size),
     )
 
 
-class _Problem:
-    """A fit of a structure, with derivatives that other fits know."""
-
-    def __init__(self, structure: Structure, samples: Samples) -> None:
-        estimator = Estimator(structure.start.image, structure.group, structure.scale)
-        self.fit = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
-        self.fit.blocks = self.fit.blocks * (samples.grid.step / LASTING / MEMORY)
-        self.fit.mean, self.fit.known = guess_prior(self.fit)
-        self.keys = [key_of(structure.start.data, name) for name in unknown_names(estimator)]
-        self._unit = np.where(self.fit.scale.log, 1.0, self.fit.scale.size)  # of a coordinate
-
-    def columns(self, state: State, known: Mapping[str, Numbers]) -> Numbers:
-        """Return the derivatives of the residual at a state [R, n, u]; those that are known are taken as they are."""
-        columns = np.empty((*state.residual.shape, len(state.u)))
-        for k, key in enumerate(self.keys):
-            if key in known and len(known[key]) == len(state.residual):
-                columns[:, :, k] = known[key] * self._unit[k]
-                continue
-            step = STEP if state.u[k] + STEP <= self.fit.upper[k] else -STEP
-            moved = state.u.copy()
-            moved[k] += step
-            columns[:, :, k] = (self.fit.state(moved).residual - state.residual) / step
-        return columns
-
-    def known(self, columns: Numbers) -> dict[str, Numbers]:
-        """Return derivatives by their keys [R, n], for another fit."""
-        return {key: columns[:, :, k] / self._unit[k] for k, key in enumerate(self.keys)}
-
-    def step(self, state: State, columns: Numbers, damping: float) -> Numbers:
-        """Return the step [u] that minimises the damped quadratic model between bounds."""
-        fit = self.fit
-        weighted = columns * (fit.blocks / len(state.residual) / fit.variance(state.residual))[:, None]
-        matrix = np.tensordot(columns, weighted, ([0, 1], [0, 1])) + fit.known
-        score = -np.tensordot(weighted, state.residual, ([0, 1], [0, 1])) - fit.known @ (state.u - fit.mean)
-        matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
-        low, high = np.maximum(fit.lower - state.u, -FARTHEST), np.minimum(fit.upper - state.u, FARTHEST)
-        return np.asarray(bounded(matrix[None], score[None], low, high)[0])
+def _problem(structure: Structure, samples: Samples) -> MemoryProblem:
+    """Return a fit of a structure, whose blocks are worth fewer independent ones."""
+    estimator = Estimator(structure.start.image, structure.group, structure.scale)
+    problem = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
+    problem.blocks = problem.blocks * (samples.grid.step / LASTING / MEMORY)
+    problem.mean, problem.known = guess_prior(problem)
+    return problem
 
 
-def _minimised(problem: _Problem, begin: Numbers, known: Mapping[str, Numbers], rough: bool) -> tuple[State, Numbers]:
-    """Go down from coordinates `begin` [u] (Levenberg, Marquardt); return where it ends, and the derivatives there."""
-    fit = problem.fit
-    state, damping = fit.state(begin), 1e-3
-    columns, is_fresh = problem.columns(state, known), not known
-    for _ in range(MOST_STEPS if len(begin) else 0):
-        step = problem.step(state, columns, damping)
-        tried = fit.state(state.u + step)
-        fall = state.cost - tried.cost
-        if fall > 0.0:
-            missed = tried.residual - state.residual - columns @ step
-            columns = columns + missed[:, :, None] * (step / max(float(step @ step), 1e-300))
-            state, damping = tried, max(damping / 5.0, 1e-6)
-        if fall > LEAST_FALL * float(fit.blocks.sum()):
-            is_fresh = False
-        elif not (is_fresh or rough):
-            columns, is_fresh = problem.columns(state, {}), True
-        elif fall >= 0.0 or damping > 1.0:
-            break
-        else:
-            damping *= 10.0
-    return state, columns
+def _structure(data: Data, given: Data, fixed: tuple[str, ...], settings: FitSettings) -> Structure:
+    """Return what is fitted of a description; `given` says how large each number may be."""
+    choice = replace(settings.choice, fix=(*settings.choice.fix, *fixed))
+    return _with_scale(build_structure(finger_from_data(data, settings.path), choice), given)
+
+
+def intervals_of(model: FittedModel, samples: Samples, settings: FitSettings) -> dict[str, Interval]:
+    """Return the 95 % intervals of the numbers of a fitted model, by path.
+
+    The error is the larger one of what lasting errors of the model allow and what blocks of time differ by.
+    """
+    if not model.values:
+        return {}
+    fit = _problem(_structure(model.data, model.given, model.fixed, settings), samples)
+    state = fit.state(np.clip(fit.mean, fit.lower, fit.upper))
+    linearised, values = fit.linearised(state), fit.values(state.u)
+    scores = fit.scores(state, linearised)[0] * fit.scale.slopes(fit.scale.unknowns(state.u))
+    lasting = np.linalg.pinv(linearised.information + fit.known)
+    scattered = scores @ lasting
+    moves = [fit.values(state.u + STEP * way) for way in np.eye(len(state.u))]
+
+    def interval(path: str) -> Interval:
+        slope = np.array([moved[path] - values[path] for moved in moves]) / STEP
+        by_time = float(np.linalg.norm(scattered @ slope))
+        return with_error(values[path], max(float(np.sqrt(slope @ lasting @ slope)), by_time))
+
+    return {path: interval(path) for path in values}
 
 
 def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
     """Return the derivatives of a torque by the numbers that a fit estimates [B, n, u], and the scale of these [u]."""
     if not unknowns(data):
         return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
-    problem = _Problem(structure_of(data), samples)
-    fit = problem.fit
-    chosen = [k for k, unknown in enumerate(fit.estimator.unknowns) if not unknown.path.startswith("bias.")]
-    return fit.slopes(fit.state(fit.mean), fit.runs)[:, :, chosen], fit.scale.size[chosen]
+    problem = _problem(structure_of(data), samples)
+    chosen = [k for k, unknown in enumerate(problem.estimator.unknowns) if not unknown.path.startswith("bias.")]
+    return problem.slopes(problem.state(problem.mean))[:, :, chosen], problem.scale.size[chosen]
 
 
 def structure_of(data: Data) -> Structure:
@@ -237,10 +206,9 @@ def fit_extended(
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
     estimated = {number.path for number in unknowns(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
-    known = None if begin is None else begin.slopes
     if begin is not None:
         data = carried(data, begin.data)
-    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, known=known, rough=rough)
+    return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, rough=rough)
 
 
 def carried(data: Data, known: Data) -> Mapping[str, Any]:

@@ -133,7 +133,8 @@ class KinematicCauses:
             if off.where.effect == cause.effect
         )
         numbers = {path: number for place in places for path, number in place.parameters.items()}
-        return replace(cause, places=places, parameters=numbers)
+        intervals = {off.number.path: off.size.now for off in self.off if off.number.path in numbers}
+        return replace(cause, places=places, parameters=numbers, intervals=intervals)
 
     def _experiments(self) -> Iterator[str]:
         effects = {off.where.effect for off in self.off}

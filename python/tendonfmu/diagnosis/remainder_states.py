@@ -8,12 +8,13 @@ learner that is linear in them finds it. How much it finds of states planted for
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise, product
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tendonfmu.arrays import Indices, Numbers
+from tendonfmu.recordings import stopped
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.series import Series
@@ -62,16 +63,3 @@ def _drivers(series: Series) -> Iterator[tuple[str, Numbers, Numbers | None]]:
 def _in_ranges(values: Numbers) -> Numbers:
     low, high = np.quantile(values, (0.02, 0.98))
     return np.asarray(values / max(float(high - low), 1e-12))
-
-
-def stopped(drivers: Numbers, widths: Numbers, times: Numbers, step: float, starts: Indices) -> Numbers:
-    """Return stop operators of drivers [B, k] with widths [k] and times [k] (s), as shares of their widths [B, k]."""
-    kept = np.exp(-step / times)
-    moves = np.diff(drivers, axis=0, prepend=drivers[:1]) / widths
-    states = np.zeros_like(drivers)
-    for first, end in pairwise(starts):
-        state = np.zeros(drivers.shape[1])
-        for k in range(first + 1, end):
-            state = np.clip(kept * state + moves[k], -1.0, 1.0)
-            states[k] = state
-    return states

@@ -120,11 +120,12 @@ def _new_term(
     main = _main([path for place in places for path in place.parameters], now)
     unit = units.get(main[0], "1") if main else "1"
     value = math.hypot(*(data_number(now, path) for path in main)) if len(main) > 1 else data_number(now, main[0])
-    size = with_error(value, abs(value) * _relative_error(change))
+    error = abs(value) * _relative_error(change)
+    size, intervals = with_error(value, error), {path: with_error(data_number(now, path), error) for path in main}
     name = "amplitude" if len(main) > 1 else main[0].rsplit(".", 1)[-1]
     words = f"{size_of(change.effect, places, thresholds(now))}, beyond what the reference has"
     changed = ChangedSize(name, unit, Interval(0.0, 0.0, 0.0), size, size)
-    return replace(change, places=places, changed=changed, size=words)
+    return replace(change, places=places, changed=changed, size=words, intervals=intervals)
 
 
 def _main(paths: Sequence[str], now: Data) -> list[str]:
@@ -160,7 +161,8 @@ def _other_number(search: ChangeSearch, change: Cause, then: Data, now: Data, un
     more = f"{100 * share:+.0f}{NBSP}%: ".replace("-", "−") if math.isfinite(share) else ""
     where = f", at the largest of {len(places)} places" if len(places) > 1 else ""
     words = f"{more}{quantity(before, unit)} then, {quantity(after, unit)} now{where}"
-    return replace(change, places=places, changed=ChangedSize(name, unit, *ends), size=words)
+    intervals = {main: with_error(data_number(now, main), error)}
+    return replace(change, places=places, changed=ChangedSize(name, unit, *ends), size=words, intervals=intervals)
 
 
 def _difference(data: Data, path: str) -> float:

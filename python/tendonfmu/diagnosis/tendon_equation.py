@@ -13,7 +13,7 @@ from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.names import ENCODER, ZERO
 from tendonfmu.model import moment_arms
-from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, smooth_speeds
+from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
 
 ARM, SPRING, COUPLING = "moment_arm", "tendon_nonlinearity", "joint_coupling"
@@ -134,7 +134,7 @@ class Unseen:
         self._trained = [(each.recording, each.train) for each in given.training]
         self._reference = [(each.recording, each.train) for each in given.reference]
         self._shapes = {
-            id(recording): np.stack([_shapes(recording, each) for each in learned], axis=1)
+            id(recording): _shapes(recording, learned, moment_arms(given.finger.data))
             for recording, _ in (*self._judged, *self._trained, *self._reference)
         }
         self._tendons = [each.tendon for each in learned]
@@ -160,13 +160,18 @@ class Unseen:
         return gain if math.isfinite(gain.low) else Interval(gain.value, 0.0, 1.0)
 
 
-def _shapes(recording: Recording, routing: TendonRouting) -> Numbers:
-    """Return speeds of a tendon's position and force, and curves of force and angles [N, c]."""
-    groups, time, own = recording.groups, recording.time, [routing.tendon]
-    speeds = [smooth_speeds(time, groups[name][:, own]) for name in ("tendon_position", "tendon_force")]
-    angle = groups.get("joint_position", np.zeros((len(time), 0)))
-    span = routing.span[:, -1 - angle.shape[1] :]
-    return np.concatenate([*speeds, curves(np.column_stack([angle, groups["tendon_force"][:, own]]), span)], axis=1)
+def _shapes(recording: Recording, learned: Sequence[TendonRouting], arms: Numbers) -> Numbers:
+    """Return speeds of tendons' positions and forces, curves of force and angles, and what friction holds [N, t, c]."""
+    groups, own = recording.groups, [each.tendon for each in learned]
+    names = ("tendon_position", "tendon_force")
+    speeds = np.stack([smooth_speeds(recording.time, groups[name][:, own]) for name in names], axis=2)
+    angle = groups.get("joint_position", np.zeros((len(recording), 0)))
+    bent = [
+        curves(np.column_stack([angle, groups["tendon_force"][:, i]]), each.span[:, -1 - angle.shape[1] :])
+        for i, each in zip(own, learned, strict=True)
+    ]
+    held = held_on_the_way(recording, arms[:, : angle.shape[1]])
+    return np.concatenate([speeds, np.stack(bent, axis=1), held[:, own]], axis=2)
 
 
 def rows_of(recording: Recording, chosen: Flags) -> Recording:

@@ -2,7 +2,6 @@
 
 - `panel`: what a figure shows, with its colours and sizes
 - `figures`: makes it as a Plotly figure, which pages embed; `grid`: several in one, for notebooks
-- `png`: draws the Plotly figures of a sheet as a PNG file
 - `finger_picture`: draws what an FMU carries, with Pillow
 """
 
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .figures import dark_colours, figures_json, figures_of, packed_plotly, pooled
+    from .figures import dark_colours, figures_json, figures_of, packed_plotly
     from .finger_picture import draw_finger, draw_terminal
     from .grid import SeriesRow, series_figure, sheets_figure
     from .panel import (
@@ -36,6 +35,5 @@ if TYPE_CHECKING:
         Sheet,
         line_of,
     )
-    from .png import write_sheet
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

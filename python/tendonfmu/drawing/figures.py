@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 from plotly import graph_objects as go
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
@@ -223,16 +222,6 @@ def thinned(curves: Sequence[Curve]) -> Iterator[Curve]:
     yield from (Curve(curve.style, curve.x[rows], curve.y[rows]) for curve in curves)
 
 
-def pooled(matrix: NDArray[Any], most: tuple[int, int]) -> tuple[NDArray[Any], tuple[int, int]]:
-    """Draw neighbours as the strongest of them: return at most so many rows and columns, and how many each is for."""
-    every = tuple(math.ceil(size / limit) or 1 for size, limit in zip(matrix.shape, most, strict=True))
-    rows, columns = (math.ceil(size / count) for size, count in zip(matrix.shape, every, strict=True))
-    room = [(0, rows * every[0] - matrix.shape[0]), (0, columns * every[1] - matrix.shape[1])]
-    blocks = np.pad(matrix, room).reshape(rows, every[0], columns, every[1]).swapaxes(1, 2).reshape(rows, columns, -1)
-    best = np.take_along_axis(blocks, np.abs(blocks).argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
-    return best, (every[0], every[1])
-
-
 def _heat(heat: Heat) -> go.Heatmap:
     steps = len(heat.colours) - 1
     x, y = (list(map(html.escape, names)) if isinstance(names[0], str) else names for names in (heat.x, heat.y))
@@ -258,7 +247,7 @@ def _rgb(colour: str) -> tuple[int, ...]:
 
 
 def _shapes(panel: Panel) -> Iterator[go.layout.Shape]:
-    """Return the stripes, the marked x and the borders in a matrix."""
+    """Return the stripes and the marked x."""
     upright = {"yref": "y domain", "y0": 0, "y1": 1, "layer": "below"}
     for name, intervals in panel.stripes.items():
         colour = _filled(STYLES[name])["fillcolor"]
@@ -267,12 +256,6 @@ def _shapes(panel: Panel) -> Iterator[go.layout.Shape]:
     if panel.line is not None:
         line = {"color": STYLES["start"].colour, "width": 1, "dash": "dash"}
         yield go.layout.Shape(type="line", x0=panel.line, x1=panel.line, line=line, **upright)
-    if panel.heat is not None:
-        border = {"type": "line", "line": {"color": "#8A8A8A", "width": 0.5}}
-        end = len(panel.heat.values) - 0.5
-        for place in panel.borders:
-            yield go.layout.Shape(x0=place, x1=place, y0=-0.5, y1=end, **border)
-            yield go.layout.Shape(y0=place, y1=place, x0=-0.5, x1=end, **border)
 
 
 # --- axes -------------------------------------------------------------------------------------------------------------
@@ -290,8 +273,6 @@ def _x_axis(panel: Panel) -> go.layout.XAxis:
     _scale(axis, panel.x_limits, panel.log_x, panel.near_x, panel.ticks, _drawn(panel, "x"))
     if panel.near_x > 0:
         axis.unifiedhovertitle = {"text": html.escape(panel.x_label)}
-    if panel.borders:
-        axis.showticklabels = False
     return axis
 
 

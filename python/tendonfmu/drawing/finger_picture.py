@@ -1,8 +1,7 @@
 """Draws what an FMU carries: the routing of its finger, and the signs of its terminals.
 
 The geometry of the routing comes from `model/routing_geometry.py`. Pillow draws: it is imported in a tenth of the time
-of matplotlib, which draws everything else. It does not smooth edges, so the picture is drawn three times as large and
-then scaled down.
+of matplotlib. It does not smooth edges, so the picture is drawn three times as large and then scaled down.
 """
 
 from __future__ import annotations

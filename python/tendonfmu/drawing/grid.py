@@ -82,7 +82,7 @@ def series_figure(
 
 def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
     """Draw the panels of sheets, two in a row."""
-    panels = [(sheet, panel) for sheet in sheets for panel in sheet.panels if not panel.borders]
+    panels = [(sheet, panel) for sheet in sheets for panel in sheet.panels]
     if not panels:
         return _with_look(go.Figure(layout_title_text=html.escape(title)), {"t": 50, "b": 40})
     columns = min(_COLUMNS, len(panels))

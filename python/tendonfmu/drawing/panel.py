@@ -1,7 +1,7 @@
 """What a figure shows: sheets of panels and their styles, before they are drawn.
 
-`figures.py` makes a Plotly figure of each panel. Pages embed it; `png.py` draws all panels of a sheet in one PNG file.
-The colours are those of Okabe and Ito, which colour-blind readers can distinguish.
+`figures.py` makes a Plotly figure of each panel, which pages embed. The colours are those of Okabe and Ito, which
+colour-blind readers can distinguish.
 """
 
 from __future__ import annotations
@@ -100,9 +100,6 @@ STYLES = {
     "after_dots": Style(BLUE, 0.0),
     "before_scatter": Style(VERMILION, alpha=0.13, patch=True),
     "floor": Style(GREEN, 0.0, filled=False),
-    "positive": Style("#B2182B", patch=True),
-    "uncorrelated": Style("#FFFFFF", patch=True),
-    "opposed": Style("#2166AC", patch=True),
     "joint_1": Style(BLUE, 1.1),
     "joint_2": Style(VERMILION, 1.1),
     "joint_3": Style(GREEN, 1.1),
@@ -130,7 +127,6 @@ STYLES = {
     "false_bar": Style(PURPLE, 9.0),
     "share": Style(GREY, 1.4, "--"),
     "slow_limits": Style(GREY, 1.5, ":"),
-    "histogram": Style(ORANGE, alpha=0.9, patch=True),
     "start_dots": Style(GREEN, 0.0),
     "dark_dots": Style(DARK, 0.0),
     "bound": Style(LIGHT, patch=True),
@@ -219,7 +215,6 @@ class Panel:
     near_y: float = 0.0
     rows: tuple[str, ...] = ()  # names of y = 0, 1, ... from the top; empty: y is a number
     line: float | None = None  # a marked x
-    borders: tuple[float, ...] = ()  # where lines across a matrix separate its groups
     height: int = 0  # CSS pixels; 0: that of its size
     zoom: str = ""  # panels of a page with the same word are zoomed together along x; empty: this one alone
 
@@ -231,8 +226,8 @@ class Panel:
 
     @property
     def page_height(self) -> int:
-        """Return the height of the drawing in a page, where the title is above it; a matrix is about square."""
-        return 540 if self.borders else self.extent[1] - 20
+        """Return the height of the drawing in a page, where the title is above it."""
+        return self.extent[1] - 20
 
 
 @dataclass(frozen=True)
@@ -240,7 +235,7 @@ class Sheet:
     """Panels that belong together."""
 
     section: str  # heading of the page under which the sheet is
-    name: str  # stem of the PNG file
+    name: str
     title: str
     keys: Sequence[tuple[str, str]]  # (style, meaning) of what is drawn
     panels: Sequence[Panel]

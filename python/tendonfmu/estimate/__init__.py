@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     )
     from .memory import has_memory
     from .memory_choice import choose_memory
-    from .memory_fit import MemoryProblem, State
+    from .memory_fit import MemoryProblem, minimise
     from .memory_methods import guess_prior
     from .methods import learn_batch
     from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of

@@ -38,7 +38,7 @@ class Direction:
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class Stretch:
     """A stretch without a gap, thinned."""
 
     segment: Segment
@@ -60,6 +60,8 @@ class CoreRuns:
         [B] the stretch without a gap that a block belongs to, from 0.
     time, still
         [B] centre of each block (s), and whether all joints stand still in it.
+    stretches
+        The stretches without a gap, thinned.
     torque, speed
         [B, n] torque to explain (N·m), and joint speeds (rad/s).
     """
@@ -74,10 +76,10 @@ class CoreRuns:
         threads: int = 0,
     ) -> None:
         """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
-        self.data, self._rate, self._threads = data, rate, threads
+        self.data, self._image, self._rate, self._threads = data, _image(data), rate, threads
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
-        self._stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
+        self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
         self.used: Flags = np.concatenate(
             [_used(recordings[each.recording], each, self.grid.step) for each in segments]
         )
@@ -99,7 +101,7 @@ class CoreRuns:
     def of(self, data: Data) -> CoreRuns:
         """Return runs of another description of the same finger over the same samples."""
         other = object.__new__(CoreRuns)
-        other.__dict__ = {**self.__dict__, "data": data}
+        other.__dict__ = {**self.__dict__, "data": data, "_image": _image(data), "_instances": _Instances()}
         return other
 
     def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
@@ -119,8 +121,7 @@ class CoreRuns:
         ndarray
             [B, n] (N·m).
         """
-        image = _image(self.data)
-        parts = self._pool.map(lambda each: self._left(image, values or {}, each), self._stretches)
+        parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
         return np.concatenate(list(parts)) + self.added
 
     def columns(self, directions: Sequence[Direction], values: Mapping[str, float] | None = None) -> Numbers:
@@ -140,7 +141,7 @@ class CoreRuns:
         """
         at = dict(values or {})
         base = np.zeros(()) if all(direction.central for direction in directions) else self.residual(at)
-        images = [_image(self.data if each.data is None else each.data) for each in directions]
+        images = [self._image if each.data is None else _image(each.data) for each in directions]
         columns = np.empty((self.grid.blocks, self.joints, len(directions)))
 
         def run(k: int, sign: float) -> Numbers:
@@ -148,7 +149,7 @@ class CoreRuns:
             for path, change in directions[k].moves.items():
                 start = at[path] if path in at else self._instances.number(images[k], path)
                 moved[path] = start + sign * directions[k].step * change
-            return np.concatenate([self._left(images[k], moved, each) for each in self._stretches])
+            return np.concatenate([self._left(images[k], moved, each) for each in self.stretches])
 
         def fill(k: int) -> None:
             direction = directions[k]
@@ -160,7 +161,7 @@ class CoreRuns:
         list(self._pool.map(fill, range(len(directions))))
         return columns
 
-    def _left(self, image: bytes, values: Mapping[str, float], stretch: _Stretch) -> Numbers:
+    def _left(self, image: bytes, values: Mapping[str, float], stretch: Stretch) -> Numbers:
         """Return [count, n] block means of τ − T (N·m) of one stretch."""
         finger = self._instances.take(image)
         finger.reset()
@@ -201,7 +202,7 @@ def _image(data: Data) -> bytes:
     return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
 
 
-def _stretch(recording: FitRecording, segment: Segment, rate: float) -> _Stretch:
+def _stretch(recording: FitRecording, segment: Segment, rate: float) -> Stretch:
     rows = slice(segment.part.start, segment.part.start + segment.count * segment.samples)
     signals = recording.arrays(rows)
     step = float(np.median(np.diff(signals["time"])))
@@ -216,7 +217,7 @@ def _stretch(recording: FitRecording, segment: Segment, rate: float) -> _Stretch
     }
     external = recording.external
     known = 0.0 if external is None else segment.mean(external[segment.part])
-    return _Stretch(segment, thin, recording.kinematics, known)
+    return Stretch(segment, thin, recording.kinematics, known)
 
 
 def _turned(recording: FitRecording, segment: Segment, step: float) -> float:

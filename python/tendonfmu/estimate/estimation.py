@@ -175,12 +175,17 @@ class Estimator:
             cost, gradient, information = self._estimator.evaluate(_matrix(z), stride, threads)
         return float(cost), np.asarray(gradient), np.asarray(information)
 
-    def jacobian(self, recording: int, z: Array, start: int, stop: int) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """Compute the friction torque, the bias jumps and their derivatives."""
-        # z: [u]; returns [N, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m), [N, n, u] their derivatives by the
+    def jacobian(
+        self, recording: int, z: Array, start: int, stop: int, length: int = 1
+    ) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """Compute the friction torque, the bias jumps and their derivatives, as means over `length` samples.
+
+        Friction with a memory is taken to hold a constant share of its limit; numbers of extensions have derivatives 0.
+        """
+        # z: [u]; returns [K, n] T of eq. (10) and the jumps Δb of fig. 5 (N·m), [K, n, u] their derivatives by the
         # unknowns
         with _refusals():
-            arrays = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0))
+            arrays = self._estimator.jacobian(recording, _matrix(z), start, max(stop - start, 0) // length, length)
         torque, jump, by_torque, by_jump = (np.asarray(array) for array in arrays)
         return torque, jump, by_torque, by_jump
 

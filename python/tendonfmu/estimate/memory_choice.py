@@ -154,14 +154,15 @@ class _Search:
 def held_out_errors(problem: MemoryProblem, found: Minimum, variance: Numbers) -> Numbers:
     """Return [K] the squared error of each contiguous part, refitted without it, in units of variances [n]."""
     residual, columns = found.state.residual / np.sqrt(variance), found.linearised.columns / np.sqrt(variance)[:, None]
-    rows = np.array_split(np.arange(len(residual)), FOLDS)
-    grams = [np.einsum("rju,rjv->uv", columns[own], columns[own]) for own in rows]
-    scores = [np.einsum("rju,rj->u", columns[own], residual[own]) for own in rows]
+    parts = [part.reshape(-1, columns.shape[2]) for part in np.array_split(columns, FOLDS)]
+    left = [part.ravel() for part in np.array_split(residual, FOLDS)]
+    grams = [part.T @ part for part in parts]
+    scores = [part.T @ own for part, own in zip(parts, left, strict=True)]
     ridge = problem.known + 1e-9 * np.diag(np.diag(sum(grams))) + 1e-12 * np.eye(len(problem.known))
-    errors = []
-    for own, gram, score in zip(rows, grams, scores, strict=True):
-        away = -np.linalg.solve(sum(grams) - gram + ridge, sum(scores) - score)
-        errors.append(float(np.sum(residual[own] ** 2) + 2.0 * away @ score + away @ gram @ away))
+    whole, pull, errors = sum(grams) + ridge, sum(scores), []
+    for own, gram, score in zip(left, grams, scores, strict=True):
+        away = -np.linalg.solve(whole - gram, pull - score)
+        errors.append(float(own @ own + 2.0 * away @ score + away @ gram @ away))
     return np.array(errors)
 
 

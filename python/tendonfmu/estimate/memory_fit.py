@@ -11,15 +11,16 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import lsq_linear
+from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.estimate.core_runs import STEP, CoreRuns, Direction
 from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.law_slopes import LawSlopes
 from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
@@ -31,6 +32,7 @@ LEAST_SPREAD = 0.04  # of the mean variance over the joints
 WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
 RIGID = 1e12  # N/m
 LEAST_FALL = 3e-4  # of the cost, for each joint and effective block, in rough fits
+ROUNDS = 30  # of a step between bounds
 DAMPING = 1e-3, 1e-9, 1e6  # of Levenberg and Marquardt: at first, least, most
 
 
@@ -68,6 +70,7 @@ class Linearised:
     """Residual and derivatives at a state."""
 
     columns: Numbers  # [R, n, u] (N·m)
+    products: Numbers  # [u, u] of the columns, each joint by its blocks and spread
     information: Numbers  # [u, u] of the data
     gradient: Numbers  # [u] of the data's cost
 
@@ -96,7 +99,11 @@ class MemoryProblem:
         self.spread = np.ones(runs.joints)  # p_j
         target = drift.without(runs.torque)
         self._floor = FLOOR**2 * np.mean(target**2, axis=0) + 1e-30
+        self._laws = LawSlopes(structure, runs)
+        self._by_runs = np.array([unknown.path.startswith("extensions[") for unknown in unknowns])
         self.mean, self.known = np.zeros(len(log)), np.zeros((len(log), len(log)))  # u_0 and P of the prior
+        # directions, coordinates and derivatives of the last `linearised`: weights change without them
+        self._last: tuple[Numbers, Numbers, Numbers] | None = None
 
     def values(self, u: Numbers) -> dict[str, float]:
         """Return the numbers of the description by path."""
@@ -137,27 +144,38 @@ class MemoryProblem:
 
     def linearised(self, state: State) -> Linearised:
         """Return the derivatives by the directions of `span` at a state."""
-        return self.of_columns(state, self.drift.without(self._columns(state.u, self.runs, self.span)))
+        if self._last is None or self._last[0] is not self.span or not np.array_equal(self._last[1], state.u):
+            self._last = self.span, state.u, self.drift.without(self._columns(state.u, self.span))
+        columns = self._last[2]
+        products = np.zeros((columns.shape[2],) * 2)
+        for j, share in enumerate(self.blocks / self.spread):
+            products += share * columns[:, j].T @ columns[:, j]
+        return self._of_columns(state, columns, products)
 
-    def of_columns(self, state: State, columns: Numbers) -> Linearised:
-        """Return what follows from derivatives [R, n, v] at a state."""
-        information, gradient = np.zeros((columns.shape[2],) * 2), np.zeros(columns.shape[2])
-        for j, share in enumerate(self._weight(state.residual)):
-            information += share * columns[:, j].T @ columns[:, j]
-            gradient += share * columns[:, j].T @ state.residual[:, j]
+    def _of_columns(self, state: State, columns: Numbers, products: Numbers) -> Linearised:
+        """Return what follows from derivatives [R, n, v] at a state, and their products [v, v]."""
+        information = products / (len(state.residual) * self._common(state.residual))
         for k, joint in self._constants.items() if columns.shape[2] == len(self.scale.log) else ():
             information[k, k] += self.blocks[joint] / self.variance(state.residual)[joint] * self.scale.size[k] ** 2
-        return Linearised(columns, information, gradient)
+        gradient = self._pull(columns, self._weight(state.residual) * state.residual)
+        return Linearised(columns, products, information, gradient)
 
     def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
         """Return derivatives at `tried` that agree with the step [v] there from `state`: Broyden's update."""
+        way = step / max(float(step @ step), 1e-300)
         missed = tried.residual - state.residual - linearised.columns @ step
-        update = missed[:, :, None] * (step / max(float(step @ step), 1e-300))
-        return self.of_columns(tried, linearised.columns + update)
+        weighted = missed * self.blocks / self.spread
+        pull = np.outer(self._pull(linearised.columns, weighted), way)
+        products = linearised.products + pull + pull.T + np.sum(missed * weighted) * np.outer(way, way)
+        return self._of_columns(tried, linearised.columns + missed[:, :, None] * way, products)
+
+    def _pull(self, columns: Numbers, values: Numbers) -> Numbers:
+        """Return [v] the products of derivatives with values [R, n]."""
+        return np.asarray(values.ravel() @ columns.reshape(-1, columns.shape[2]))
 
     def columns(self, u: Numbers, chosen: Sequence[int]) -> Numbers:
         """Return [B, n, c] the derivatives of τ − T by the chosen of u (N·m)."""
-        return self._columns(u, self.runs, np.eye(len(u))[:, list(chosen)])
+        return self._columns(u, np.eye(len(u))[:, list(chosen)])
 
     def _weight(self, residual: Numbers) -> Numbers:
         """Return [n] what a block of each joint weighs."""
@@ -169,15 +187,27 @@ class MemoryProblem:
         self.spread = np.maximum(variance / variance.mean(), LEAST_SPREAD)
         return replace(state, cost=self.cost(state.residual, state.u))
 
-    def _columns(self, u: Numbers, runs: CoreRuns, span: Numbers) -> Numbers:
-        """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m)."""
-        here = self.values(u)
-        directions = [self._direction(way, u, here) for way in span.T]
-        return runs.columns(directions, self._of_description(here))
+    def _columns(self, u: Numbers, span: Numbers) -> Numbers:
+        """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m): by runs where laws have none."""
+        here, z = self.values(u), np.clip(self.scale.unknowns(u), *self.bounds)
+        columns = self._laws.at(z) * self.scale.slopes(z)
+        if span.shape[1] < len(u):
+            columns = columns @ span
+        rest = np.where(self._by_runs[:, None], span, 0.0)
+        moved = np.flatnonzero(rest.any(axis=0))
+        directions = [self._direction(way, u, here) for way in rest.T[moved]]
+        columns[:, :, moved] += self.runs.columns(directions, self._of_description(here))
+        return columns
 
-    def slopes(self, state: State, runs: CoreRuns) -> Numbers:
-        """Return [B, n, u] the derivatives of T by the unknowns z (N·m each) over some runs."""
-        return -self._columns(state.u, runs, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
+    def over(self, runs: CoreRuns) -> MemoryProblem:
+        """Return the problem over other runs of the same samples."""
+        other = copy(self)
+        other.runs, other._laws, other._last = runs, LawSlopes(self._structure, runs), None
+        return other
+
+    def slopes(self, state: State) -> Numbers:
+        """Return [B, n, u] the derivatives of T by the unknowns z (N·m each)."""
+        return -self._columns(state.u, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
 
     def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
         """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
@@ -232,7 +262,7 @@ def minimise(
     *,
     rough: bool = False,
 ) -> Minimum:
-    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors.
+    """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors (rms).
 
     Derivatives are computed anew when steps with Broyden's update (Math. Comp. 19, 1965) no longer go down well. A
     rough end has updated ones.
@@ -249,7 +279,7 @@ def minimise(
         tried = problem.state(np.clip(state.u + span @ step, problem.lower, problem.upper))
         expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
-        is_small = step @ matrix @ step < tolerance**2 or abs(fall) < least
+        is_small = step @ matrix @ step < tolerance**2 * len(step) or abs(fall) < least
         if fall > 0.0:
             linearised = problem.moved_on(linearised, state, step, tried)
             state, damping = tried, max(damping / 5.0, DAMPING[1])
@@ -278,15 +308,22 @@ def _room(span: Numbers, low: Numbers, high: Numbers) -> tuple[Numbers, Numbers]
 
 
 def bounded_step(matrix: Numbers, gradient: Numbers, damping: float, low: Numbers, high: Numbers) -> Numbers:
-    """Return the step that minimises the damped quadratic model between bounds."""
+    """Return the step that minimises the damped quadratic model between bounds, some of which it may be at."""
     diagonal = np.maximum(np.diag(matrix), 1e-12 * float(np.diag(matrix).max()) + 1e-300)
     length = np.sqrt(diagonal)
     scaled = matrix / np.outer(length, length) + (damping + 1e-10) * np.eye(len(length))
-    root = cholesky(scaled, lower=False)
-    right = -solve_triangular(root, gradient / length, trans="T")
-    free = solve_triangular(root, right) / length
-    if (free >= low).all() and (free <= high).all():
-        return np.asarray(free)
-    room = np.minimum(low, -1e-300), np.maximum(high, 1e-300)
-    found = lsq_linear(root, right, (room[0] * length, room[1] * length), method="bvls")
-    return np.asarray(np.clip(found.x / length, low, high))
+    right, least, most = -gradient / length, low * length, high * length
+    at_low = at_high = np.zeros(len(length), dtype=bool)
+    step = np.zeros(len(length))
+    for _ in range(ROUNDS):  # all that is beyond a bound stays there, until it is pulled back
+        free = ~(at_low | at_high)
+        step = np.where(at_low, least, np.where(at_high, most, 0.0))
+        own = cho_factor(scaled[np.ix_(free, free)], check_finite=False)
+        step[free] = cho_solve(own, (right - scaled @ step)[free], check_finite=False)
+        pull = scaled @ step - right
+        lower = np.where(free, step < least, at_low & (pull > 0.0))
+        upper = np.where(free, step > most, at_high & (pull < 0.0))
+        if (lower == at_low).all() and (upper == at_high).all():
+            break
+        at_low, at_high = lower, upper
+    return np.asarray(np.clip(step, least, most) / length)

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.core_runs import CoreRuns
+from tendonfmu.estimate.core_runs import RATE, CoreRuns
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.learning import FitProgress, Interrupted, Learned, MemoryEvidence, Settings, Watch
 from tendonfmu.estimate.memory import starts
@@ -132,7 +132,8 @@ def full_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over all samples, whose drift is the slowest that the rests demand."""
-    runs = CoreRuns(structure.start.data, recordings, grid, threads=threads)
+    rate = RATE if grid.step < 2.0 * STEP else COARSE_RATE  # long blocks see less of what is fast
+    runs = CoreRuns(structure.start.data, recordings, grid, rate=rate, threads=threads)
     drift = slowest_drift(runs.residual(), runs.time, runs.stretch, runs.used, runs.still)
     return MemoryProblem(structure, estimator, runs, drift)
 

@@ -211,7 +211,7 @@ class RememberedMotion:
         chosen = np.flatnonzero(inside == 1.0)
         chosen = chosen[:: max(1, math.ceil(len(chosen) / _SAMPLES))]
         loaded = [_loaded(each, load) for each in recordings]
-        slopes = problem.slopes(minimum.state, problem.runs if load == 1.0 else problem.runs.over(loaded))[chosen]
+        slopes = (problem if load == 1.0 else problem.over(problem.runs.over(loaded))).slopes(minimum.state)[chosen]
         parts = grid.means([_parts(self.data, each) for each in loaded])[chosen]
         return Seen(parts.transpose(1, 0, 2), (slopes @ self.known.factor).transpose(1, 0, 2))
 

@@ -68,6 +68,7 @@ class Instance:
         with _refusals():
             self._finger = _native.Finger(image)
             self._finger.kinematics_source = kinematics_source
+        self._indices: dict[str, int] = {}  # of parameters, by path
 
     @classmethod
     def from_description(cls, description: Mapping[str, Any] | str | bytes, kinematics_source: int = 1) -> Instance:
@@ -118,10 +119,12 @@ class Instance:
         ]
 
     def _index(self, path: str) -> int:
-        index = self._finger.find_parameter(path)
-        if index >= self._finger.parameter_count:
-            raise NativeError(f"no parameter {path!r} in this finger")
-        return index
+        if path not in self._indices:  # the runtime looks through all paths
+            index = self._finger.find_parameter(path)
+            if index >= self._finger.parameter_count:
+                raise NativeError(f"no parameter {path!r} in this finger")
+            self._indices[path] = index
+        return self._indices[path]
 
     def get(self, path: str) -> float:
         """Return the value of one parameter."""

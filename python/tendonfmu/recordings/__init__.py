@@ -56,6 +56,7 @@ if TYPE_CHECKING:
         Learned,
         TendonRouting,
         curves,
+        held_on_the_way,
         learn_routing,
         require_routing,
         routed,
@@ -63,5 +64,6 @@ if TYPE_CHECKING:
     )
     from .signal_noise import FEWEST, joint_position_noise
     from .smoothing import zero_phase
+    from .stop_operator import stopped
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

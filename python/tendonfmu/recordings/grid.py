@@ -61,6 +61,7 @@ def make_grid(recordings: Sequence[FitRecording], shortest: float = SHORTEST_STE
     segments, first = [], 0
     for number, recording in enumerate(recordings):
         samples = max(1, round(step / float(np.median(np.diff(recording.time)))))
+        samples += samples % 2 if samples > 3 else 0  # runs of the core thin by whole parts of a block
         for part in recording.parts:
             count = (part.stop - part.start) // samples
             if count and recording.train[part].any():

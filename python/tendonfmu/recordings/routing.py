@@ -4,9 +4,11 @@ Every sample of a taut tendon satisfies x0 = zero + R q + f0/k, whatever frictio
 of x0 on q and f0 therefore gives the tendon's row of R, 1/k and its zero. Both sides are noisy: the noise of q and f0,
 measured around a smooth curve, is taken out of their moments, else large noise would make the numbers too small
 (W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
-that are read some milliseconds apart do no harm. The intervals are those of sums over blocks of 2 s, so that they hold
-for correlated residuals, too. Recordings of a reference are regressed together with those of now: arms, 1/k and zero
-are free in both, and what the equation lacks (curves) is shared, so that another load or range is no change.
+that are read some milliseconds apart do no harm. Behind edges and pulleys a cord bears less than f0 and stretches less,
+by a share of f0 that follows which way it moved last: a stop operator of the travel at each level, times f0, is a
+further column. The intervals are those of sums over blocks of 2 s, so that they hold for correlated residuals, too.
+Recordings of a reference are regressed together with those of now: arms, 1/k and zero are free in both, and what the
+equation lacks (curves) is shared, so that another load or range is no change.
 """
 
 from __future__ import annotations
@@ -24,9 +26,11 @@ from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import FEWEST, white_noise
 from tendonfmu.recordings.smoothing import zero_phase
+from tendonfmu.recordings.stop_operator import stopped
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
+MOST = 60_000  # samples of a recording that are looked at: what is not noise is the same in its neighbours
 FEWEST_BLOCKS = 8
 SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
@@ -36,6 +40,8 @@ NORMAL = 1.96  # standard deviations of half an interval
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
+TURN = 0.001  # of the range of a travel, over which friction turns round; above the noise of angles
+SLOW = 0.02  # s, between samples of what turns round
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
 DEGREE, FAR = 5, 1.2  # of polynomials, and times half of the range, beyond which they are constant
@@ -149,7 +155,7 @@ def learn_routing(
     measured = [[each for each in side if "joint_position" in each.groups] for side in sides]
     if not all(measured):
         return _of_redundancy(finger, sides)
-    if (samples := _joined(measured)) is None:
+    if (samples := _joined(measured, np.asarray(finger.moment_arms))) is None:
         return []
     return [each for i in range(finger.tendons) if (each := _of_tendon(finger, i, samples, coupled=coupled))]
 
@@ -170,7 +176,7 @@ def _of_redundancy(finger: Finger, sides: Sequence[Sequence[Recording]]) -> list
         arm = arms[base, 0] if finger.joints == 1 else 1.0  # of several joints, positions tell as much as angles
         zeros = np.array([float(finger.data["tendons"][j].get("zero") or 0.0) for j in base])
         seen = [[_seen(each, base, zeros, arm) for each in side] for side in sides]
-        samples = _joined(seen)
+        samples = _joined(seen, arms[:, :0])
         learned = None if samples is None else _of_tendon(finger, i, samples, base)
         if learned is not None:
             is_alone = i in kept or finger.joints > 1
@@ -261,37 +267,40 @@ class _Samples:
     force_speed: Numbers
     force_noise: Numbers
     angle_noise: Numbers
+    held: Numbers  # [N, m, levels] what friction on the way may hold of each force
     block: Indices
     side: Indices  # [N] 0 now, 1 of the reference
     sound: Flags  # [N, m] no sensor of the tendon, and no encoder, is held
 
 
-def _samples(recording: Recording, side: int) -> _Samples | None:
+def _samples(recording: Recording, side: int, arms: Numbers) -> _Samples | None:
     groups, time = recording.groups, recording.time
     try:
         noise = {name: white_noise(time, groups[name]) ** 2 for name in ("tendon_force", "joint_position")}
     except InputError:  # gaps everywhere
         return None
+    sound = _changing(time, groups["tendon_force"]) & _changing(time, groups["tendon_position"])
+    sound &= np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None]
+    rows = slice(None, None, max(1, len(time) // MOST))
     return _Samples(
-        groups["tendon_position"],
-        groups["tendon_force"],
-        groups["joint_position"],
-        smooth_speeds(time, groups["tendon_position"]),
-        smooth_speeds(time, groups["tendon_force"]),
+        groups["tendon_position"][rows],
+        groups["tendon_force"][rows],
+        groups["joint_position"][rows],
+        smooth_speeds(time, groups["tendon_position"])[rows],
+        smooth_speeds(time, groups["tendon_force"])[rows],
         noise["tendon_force"],
         noise["joint_position"],
-        np.floor((time - time[0]) / BLOCK).astype(np.int64),
-        np.full(len(time), side),
-        _changing(time, groups["tendon_force"])
-        & _changing(time, groups["tendon_position"])
-        & np.asarray(_changing(time, groups["joint_position"]).all(axis=1))[:, None],
+        held_on_the_way(recording, arms)[rows],
+        np.floor((time[rows] - time[0]) / BLOCK).astype(np.int64),
+        np.full(len(time[rows]), side),
+        sound[rows],
     )
 
 
-def _joined(sides: Sequence[Sequence[Recording]]) -> _Samples | None:
+def _joined(sides: Sequence[Sequence[Recording]], arms: Numbers) -> _Samples | None:
     """Put the samples of recordings with joint positions together; None if a side has none."""
     of = [(k, each) for k, side in enumerate(sides) for each in side if len(each) >= FEWEST]
-    parts = [found for k, each in of if (found := _samples(each, k)) is not None]
+    parts = [found for k, each in of if (found := _samples(each, k, arms)) is not None]
     if len({int(each.side[0]) for each in parts}) < max(len(sides), 1):
         return None
     first = np.cumsum([0, *(int(each.block[-1]) + 1 for each in parts)])
@@ -304,6 +313,21 @@ def _joined(sides: Sequence[Sequence[Recording]]) -> _Samples | None:
     }
     whole["block"] += np.repeat(first[:-1], size)
     return _Samples(**whole)
+
+
+def held_on_the_way(recording: Recording, arms: Numbers) -> Numbers:
+    """Return what friction at each level may hold of a tendon's force [N, m, levels], N; arms [m, n], or [m, 0]."""
+    force, position = (recording.groups[name] for name in ("tendon_force", "tendon_position"))
+    beyond = [recording.groups["joint_position"][:, j:] @ arms[:, j:].T for j in range(arms.shape[1])]
+    travel = np.stack(beyond or [position], axis=2)
+    step = float(np.median(np.diff(recording.time)))
+    every = max(1, round(SLOW / step))
+    slow = travel[::every].reshape(-1, travel.shape[1] * travel.shape[2])
+    width = np.ptp(slow, axis=0) * TURN
+    state = stopped(
+        slow, np.where(width > 0.0, width, 1.0), np.full(len(width), np.inf), step, np.array([0, len(slow)])
+    )
+    return np.asarray(np.repeat(state, every, axis=0)[: len(force)].reshape(travel.shape) * force[:, :, None])
 
 
 def _changing(time: Numbers, values: Numbers) -> Flags:
@@ -355,6 +379,8 @@ def _of_tendon(
     if any(len(np.unique(block[side == k])) < FEWEST_BLOCKS for k in range(sides)):
         return None
     own = np.column_stack([samples.angle[:, joints], samples.force[:, i]])[taut]
+    held = samples.held[taut][:, [i, *seen_from]].reshape(len(block), -1)
+    held = held[:, held.any(axis=0) & (len(np.unique(block)) > FEWEST_BLOCKS + BLOCKS_PER_COLUMN * held.shape[1])]
     shared = np.column_stack(
         [
             samples.position_speed[:, i],
@@ -363,9 +389,10 @@ def _of_tendon(
             samples.position_speed[:, i] * BLOCK * (samples.block - samples.block.mean()),
             samples.force[:, list(seen_from)],
         ]
-    )[taut]
+    )
+    shared = np.column_stack([shared[taut], held])
     noise = np.array([*samples.angle_noise[joints], samples.force_noise[i]])
-    noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)]])
+    noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)], *np.zeros(held.shape[1])])
     count, position = len(joints), samples.position[taut, i]
     span = _span(own)
     degree, many = DEGREE if sides > 1 else 1, len(np.unique(block))

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from .numbers import Row, Table, capital, column, html_of, percent, rms, rounded, together
     from .page import Tile, drawn, render, write_figures
     from .rerun_recording import check_rerun, write_rerun
-    from .run_page import check_page, run_report, write_run_page
-    from .score_figures import write_score_figures
+    from .run_page import check_page, run_report, run_sheets, write_run_page
+    from .score_figures import score_sheets, write_score_figures
     from .tune_figures import write_tune_figures
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -236,9 +236,11 @@ def _cause(cause: Cause, kind: str) -> dict[str, Any]:
         **_where(cause.where),
         **_fields(cause, "p_value", "gain", "gain_unit"),
         "confusable_with": [_where(other) for other in cause.confusable_with],
-        **_numbers_of(cause.parameters),
+        **_numbers_of(cause.parameters, cause.intervals),
         **(_changed(cause.changed) if kind == "change" else {}),
-        "places": [_fields(place, "joint", "tendon") | _numbers_of(place.parameters) for place in cause.places],
+        "places": [
+            _fields(place, "joint", "tendon") | _numbers_of(place.parameters, cause.intervals) for place in cause.places
+        ],
         **({"sensors": [_sensor(sensor) for sensor in cause.sensors]} if cause.sensors else {}),
         **_fields(cause, "size", "title", "explanation", "evidence"),
     }
@@ -262,10 +264,11 @@ def _changed(changed: ChangedSize | None) -> dict[str, Any]:
     }
 
 
-def _numbers_of(parameters: Mapping[str, tuple[float, str]]) -> dict[str, Any]:
+def _numbers_of(parameters: Mapping[str, tuple[float, str]], intervals: Mapping[str, Interval]) -> dict[str, Any]:
     return {
         "parameters": {path: value for path, (value, _) in parameters.items()},
         "units": {path: unit for path, (_, unit) in parameters.items()},
+        "intervals": {path: [intervals[path].low, intervals[path].high] for path in parameters if path in intervals},
     }
 
 

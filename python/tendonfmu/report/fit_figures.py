@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.drawing import DIVERGING, Band, Curve, Dots, Heat, Interval, Panel, Sheet, pooled
+from tendonfmu.drawing import Band, Curve, Dots, Interval, Panel, Sheet
 from tendonfmu.estimate import FitPicture, FitSeries, identifiability
-from tendonfmu.files import are, counted
-from tendonfmu.model import part_of
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
 from tendonfmu.report.numbers import rms, torque_unit
@@ -28,8 +26,6 @@ COMPARED = 3  # recordings not trained on that are drawn; more would make the pa
 _BINS, _TIME_BINS = 36, 150
 _SHOWN = (1e-3, 10.0)  # standard error over value
 _TICKS = ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %"), (10.0, "1000 %"))
-_MOST_CELLS = 400  # rows of a correlation matrix; in larger ones the strongest of neighbours is drawn
-_NARROWEST = 0.035  # share of all unknowns; smaller groups share a name beside the correlation matrix
 _KINDS = {
     "friction": "joint friction",
     "load_friction": "load friction",
@@ -57,7 +53,6 @@ def fit_sheets(picture: FitPicture) -> list[Sheet]:
         *residual_sheets(picture),
         *law_sheets(picture),
         error_sheet(picture),
-        correlation_sheet(picture),
     ]
 
 
@@ -362,72 +357,3 @@ def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
     best = np.argsort(-np.abs(values[rows, columns]), kind="stable")[:count]
     names = [unknown.name for unknown in picture.unknowns]
     return [Pair(names[a], names[b], float(values[a, b])) for a, b in zip(rows[best], columns[best], strict=True)]
-
-
-def correlation_sheet(picture: FitPicture) -> Sheet:
-    """Show the correlations of all unknowns, ordered by where they act."""
-    places = [_place(unknown.path) for unknown in picture.unknowns]
-    order = sorted(range(len(places)), key=lambda k: places[k])
-    matrix = correlation(picture.covariance)[np.ix_(order, order)]
-    groups = _groups(picture, [places[k] for k in order])
-    above = int(np.count_nonzero(np.abs(np.triu(matrix, 1)) > 0.9))
-    shown, (every, _) = pooled(np.round(100 * matrix).astype(np.int8), (_MOST_CELLS, _MOST_CELLS))
-    more = f" and {every - 1} more" if every > 1 else ""
-    names = [picture.unknowns[k].name + more for k in order[::every]]
-    ticks = tuple((((begin + end - 1) / 2 + 0.5) / every - 0.5, name) for name, begin, end in groups)
-    panel = Panel(
-        title="Correlation of the estimates",
-        alt=f"Correlation matrix of {len(order)} unknowns, ordered by joint and tendon; {counted(above, 'pair')} "
-        f"{are(above)} correlated by more than 0.9.",
-        x_label="the same order",
-        y_label="",
-        size="large",
-        heat=Heat(shown, names, names, DIVERGING, -100, 100, "%"),
-        ticks=ticks,
-        y_ticks=ticks,
-        x_limits=(-0.5, len(shown) - 0.5),
-        y_limits=(len(shown) - 0.5, -0.5),
-        borders=tuple(begin / every - 0.5 for _, begin, _ in groups),
-    )
-    return Sheet(
-        section="correlation",
-        name="correlation",
-        title="What the data cannot distinguish",
-        caption="Correlation of the errors of all unknowns, in the fit's own form (coulomb, drop = static − coulomb, "
-        "rate = 1/stribeck_velocity, viscous), ordered by where they act. Red: their difference is known better than "
-        "either of them; blue: their sum is. "
-        + (f"Each entry is the strongest of {every} × {every}." if every > 1 else ""),
-        keys=(("positive", "+1"), ("uncorrelated", "0"), ("opposed", "−1")),
-        panels=(panel,),
-    )
-
-
-def _groups(picture: FitPicture, places: list[tuple[int, int]]) -> tuple[tuple[str, int, int], ...]:
-    """Return name, begin and end of the unknowns of each joint and tendon; small neighbours of a kind share a name."""
-    begins = [k for k in range(len(places)) if k == 0 or places[k] != places[k - 1]]
-    merged: list[tuple[int, int]] = []
-    for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
-        if merged and places[merged[-1][0]][0] == places[begin][0]:
-            before, middle = merged[-1]
-            if min(end - begin, middle - before) < _NARROWEST * len(places):
-                merged[-1] = (before, end)
-                continue
-        merged.append((begin, end))
-    names = []
-    for begin, end in merged:
-        first, last = (_place_name(picture, places[k]) for k in (begin, end - 1))
-        names.append((first if first == last else f"{first} … {last}", begin, end))
-    return tuple(names)
-
-
-def _place(path: str) -> tuple[int, int]:
-    """Return a sort key: joints before tendons before the rest, then the number of the joint or tendon."""
-    place = part_of(path)
-    return (2, 0) if place is None else (("joints", "tendons").index(place[0]), place[1])
-
-
-def _place_name(picture: FitPicture, place: tuple[int, int]) -> str:
-    kind, number = place
-    if kind == 2:
-        return "others"
-    return (picture.fitted.joint_names if kind == 0 else picture.fitted.tendon_names)[number - 1]

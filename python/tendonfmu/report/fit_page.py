@@ -1,4 +1,4 @@
-"""What the page of a fit, `report.html`, shows, and its figures as PNG files beside it."""
+"""What the page of a fit, `report.html`, shows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tendonfmu.report.fit_text import (
     summary_sentences,
 )
 from tendonfmu.report.numbers import Row, percent, rounded, unit_text
-from tendonfmu.report.page import Drawn, Tile, drawn, render, write_figures
+from tendonfmu.report.page import Drawn, Tile, drawn, make_folder, render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
@@ -30,11 +30,10 @@ Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
-    """Write `report.html` and one PNG file per sheet to a folder. Files appear whole or not at all."""
-    sheets = drawn(fit_sheets(picture))
-    pictures = write_figures(sheets, folder)
-    write_text(folder / PAGE, fit_page(picture, sheets))
-    return {folder / PAGE: "all results, to be read in a browser"} | pictures
+    """Write `report.html` to a folder, which is made if missing, whole or not at all."""
+    make_folder(folder)
+    write_text(folder / PAGE, fit_page(picture, drawn(fit_sheets(picture))))
+    return {folder / PAGE: "all results, to be read in a browser"}
 
 
 def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:

@@ -14,7 +14,7 @@ from tendonfmu.diagnosis import NBSP, History, Line, Names, at_place, quantity, 
 from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
 from tendonfmu.files import counted, whole_file, write_text
 from tendonfmu.report.numbers import Row, capital, percent, unit_text, with_ends
-from tendonfmu.report.page import drawn, render, write_figures
+from tendonfmu.report.page import drawn, render
 
 FORMAT = "tendonfmu-history-1"
 TABLE, PAGE = "history.csv", "history.html"
@@ -24,20 +24,14 @@ TABLE, PAGE = "history.csv", "history.html"
 
 
 def write_history(history: History, names: Names, folder: Path) -> dict[Path, str]:
-    """Write the table, the picture and the page of a history."""
-    sheets = drawn([_sheet(history, names)] if history.lines else [])
-    write_text(folder / PAGE, _page(history, names, sheets))
+    """Write the table and the page of a history."""
+    write_text(folder / PAGE, _page(history, names))
     with whole_file(folder / TABLE) as file, file.open("w", encoding="utf-8", newline="") as stream:
         columns = columns_of(history)
         writer = csv.writer(stream)
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
-    pictures = dict.fromkeys(write_figures(sheets, folder), "sizes over time")
-    return {
-        folder / PAGE: "all results, to be read in a browser",
-        folder / TABLE: "a row per recording and cause",
-        **pictures,
-    }
+    return {folder / PAGE: "all results, to be read in a browser", folder / TABLE: "a row per recording and cause"}
 
 
 def history_report(history: History, written: Iterable[Path] = ()) -> dict[str, Any]:
@@ -57,7 +51,8 @@ def history_report(history: History, written: Iterable[Path] = ()) -> dict[str, 
     }
 
 
-def _page(history: History, names: Names, sheets: list[Any]) -> str:
+def _page(history: History, names: Names) -> str:
+    sheets = drawn([_sheet(history, names)] if history.lines else [])
     times = [f"{time:.1f}" if history.dated else f"{time:.0f}" for time in history.times]
     files = [Path(name).name for name in history.recordings]
     return render(

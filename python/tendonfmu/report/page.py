@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from tendonfmu.drawing import STYLES, Sheet
 from tendonfmu.errors import InputError
-from tendonfmu.files import html_template
+from tendonfmu.files import html_template, write_text
 
 Drawn = tuple[Sheet, Sequence[Any]]  # a sheet and the Plotly figure of each of its panels
 
@@ -58,17 +58,15 @@ def _embedded(figures: list[Any]) -> dict[str, Any]:
     return {"drawn": figures_json(figures), "plotly": packed_plotly(), "dark_colours": dark_colours()}
 
 
-def write_figures(sheets: Iterable[Drawn], folder: Path) -> dict[Path, str]:
-    """Write the figures of each sheet as a PNG file to a folder, which is made if missing."""
-    from tendonfmu.drawing import write_sheet
+def write_figures(page: Path, kicker: str, heading: str, sheets: Iterable[Sheet]) -> None:
+    """Write a page of figures; its folder is made if missing."""
+    make_folder(page.parent)
+    write_text(page, render("figures.html.jinja", drawn(sheets), title=heading, kicker=kicker, heading=heading))
 
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for pages if it is missing. Raise InputError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
-    written = {}
-    for sheet, figures in sheets:
-        file = folder / f"{sheet.name}.png"
-        write_sheet(sheet, figures, file)
-        written[file] = sheet.title
-    return written

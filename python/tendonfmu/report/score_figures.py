@@ -18,9 +18,10 @@ from tendonfmu.drawing import BLUE, SKY, Band, Bars, Curve, Dots, Heat, Panel, S
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import with_ends
-from tendonfmu.report.page import drawn, write_figures
+from tendonfmu.report.page import write_figures
 from tendonfmu.statistics import intervals as statistics_intervals
 
+PAGE = "score.html"
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # drawn at most
 BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, after the end, and at most after onset
@@ -28,17 +29,13 @@ TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
 _HEAT = ("#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B")
-_WORDS = {
-    "contacts": "torques, compensated torques, label and detection over time",
-    "events": "every event from its onset on",
-    "roc": "found events against false alarms, over thresholds",
-    "delays": "how soon events are found",
-}
 
 
 def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
-    """Write the figures of a score as PNG files."""
-    return {file: _WORDS[file.stem] for file in write_figures(drawn(score_sheets(scored)), folder)}
+    """Write the page with the figures of a score."""
+    page = folder / PAGE
+    write_figures(page, "contact detection", scored.subject.finger.name, score_sheets(scored))
+    return {page: "torques and detection over time, every event, thresholds and delays"}
 
 
 def score_sheets(scored: Scored) -> Iterator[Sheet]:
@@ -306,24 +303,18 @@ def _named(points: Sequence[RocPoint]) -> list[int]:
 
 
 def delay_sheet(scored: Scored) -> Sheet:
-    """Show the share of all events found within a time, with its interval, and the number of delays."""
+    """Show the share of all events found within a time, with its interval."""
     delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
     total, delay = scored.summary.events, scored.summary.delay
     median, ninety = delay["median"].value, delay["ninety_percent"].value
     end = float(delays[-1])
     if end > TAIL * ninety > 0:
         end = TAIL * ninety
-    later, bins = int((delays > end).sum()), int(np.clip(len(delays) // 2, 12, 40))
-    ms = 1e3 * delays
+    later, ms = int((delays > end).sum()), 1e3 * delays
     share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
-    counts, edges = np.histogram(ms, bins, (0.0, 1e3 * end))
-    limits, top = (0.0, 1.03e3 * max(end, 1e-3)), min(100.0, 1.3 * float(high.max()))
-
-    def marks(height: float) -> list[Curve]:
-        marked = (("limit", median), ("ninety", ninety))
-        return [Curve(style, np.full(2, 1e3 * delay), np.array([0.0, height])) for style, delay in marked]
-
-    shared = Panel(
+    top = min(100.0, 1.3 * float(high.max()))
+    marks = (("limit", median), ("ninety", ninety))
+    panel = Panel(
         title="Found so far",
         note=f"{later} later, up to {ms[-1]:.0f} ms →" if later else "",
         alt=f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
@@ -332,25 +323,12 @@ def delay_sheet(scored: Scored) -> Sheet:
         size="wide",
         height=330,
         bands=(Band("confidence", np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1]),),
-        curves=(Curve("fitted", *_stairs(ms, share)), *marks(top)),
-        x_limits=limits,
+        curves=(
+            Curve("fitted", *_stairs(ms, share)),
+            *(Curve(style, np.full(2, 1e3 * delay), np.array([0.0, top])) for style, delay in marks),
+        ),
+        x_limits=(0.0, 1.03e3 * max(end, 1e-3)),
         y_limits=(0.0, top),
-        zoom="delay",
-    )
-    most = max(1.0, 1.05 * float(counts.max()))
-    apart = np.column_stack([edges[:-1], edges[1:], edges[1:]]) - 0.02 * (edges[1] - edges[0]) * np.array([0, 1, 1])
-    gap = np.column_stack([counts, counts, np.full(len(counts), math.nan)]).ravel().astype(float)
-    histogram = Panel(
-        title="Events",
-        alt="How many events are found with which delay",
-        x_label="delay from the onset (ms)",
-        y_label="events",
-        size="wide",
-        bands=(Band("histogram", apart.ravel(), 0.0 * gap, gap),),
-        curves=tuple(marks(most)),
-        x_limits=limits,
-        y_limits=(0.0, most),
-        zoom="delay",
     )
     keys = (
         ("fitted", "found so far"),
@@ -359,7 +337,7 @@ def delay_sheet(scored: Scored) -> Sheet:
         ("ninety", f"90 % within {1e3 * ninety:.0f} ms"),
     )
     title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
-    return Sheet("score", "delays", title, keys, [shared, histogram])
+    return Sheet("score", "delays", title, keys, [panel])
 
 
 def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:

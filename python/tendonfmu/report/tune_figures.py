@@ -10,9 +10,10 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.detect import ContactTuning, FreeRun, rate_limit, tail_levels
 from tendonfmu.drawing import Band, Curve, Dots, Panel, Sheet
 from tendonfmu.report.numbers import with_ends
-from tendonfmu.report.page import drawn, write_figures
+from tendonfmu.report.page import write_figures
 from tendonfmu.statistics import intervals
 
+PAGE = "tuning.html"
 JOINTS = 4  # drawn at most
 WORST = 4  # moments
 AROUND = 0.6  # s before and after a moment
@@ -20,17 +21,14 @@ APART = 2.0  # s; moments nearer than this have one cause
 _FACTORS = np.geomspace(0.4, 2.5, 60)
 _TICKS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5)
 _OTHERS = {"residual": ("share", "threshold of the residual"), "drift": ("slow_limits", "threshold of slow loads")}
-_WORDS = {
-    "tail": "false alarms over the level of the bounds",
-    "bounds": "bounds over the mean force",
-    "worst": "the moments of free motion nearest to an alarm",
-}
 
 
 def write_tune_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
-    """Write the figures of a tuning as PNG files."""
-    sheets = drawn([tail_sheet(tuning), bound_sheet(tuning), worst_sheet(tuning)])
-    return {file: _WORDS[file.stem] for file in write_figures(sheets, folder)}
+    """Write the page with the figures of a tuning."""
+    page = folder / PAGE
+    sheets = [tail_sheet(tuning), bound_sheet(tuning), worst_sheet(tuning)]
+    write_figures(page, "tuning of contact detection", tuning.description_.name, sheets)
+    return {page: "false alarms over the level of the bounds, bounds over the force, moments nearest to an alarm"}
 
 
 def tail_sheet(tuning: ContactTuning) -> Sheet:

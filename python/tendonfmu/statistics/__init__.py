@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .spectral_line import Line, find_lines
     from .splines import (
         KNOTS,
-        TRENDS,
         Span,
         Splines,
         basis,

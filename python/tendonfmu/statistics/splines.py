@@ -14,9 +14,6 @@ from tendonfmu.statistics.blocks import BlockSeries
 Splines = Any  # scipy.sparse.csr_array [B, s], which comes without types
 
 KNOTS = 2.0  # s; the splines follow a bias at this pace
-TRENDS = (
-    10.0  # s, for tests; faster changes of a bias are noise for the whitening (knots of 2 s make p-values too small)
-)
 _PIECE = 4096  # rows at a time
 _LOST = 1e-9  # of a column's square; if the projection leaves less, it is rounding only
 _RANK = 1e-10  # of the largest power of columns of length 1; derivatives are exact, rounding is far below

@@ -50,9 +50,7 @@ enum {
   PROCESSOR_AVX = 1 << 28, /* of leaf 1 */
   PROCESSOR_FMA = 1 << 12,
   PROCESSOR_AVX2 = 1 << 5, /* of leaf 7 */
-  PROCESSOR_AVX512F = 1 << 16,
-  REGISTERS_AVX = 0x06, /* SSE and AVX */
-  REGISTERS_AVX512 = 0xE6
+  REGISTERS_AVX = 0x06     /* SSE and AVX */
 };
 
 static inline int has_avx2(void) {
@@ -61,10 +59,6 @@ static inline int has_avx2(void) {
 
 static inline int has_avx2_and_fma(void) {
   return processor_has(PROCESSOR_AVX | PROCESSOR_FMA, PROCESSOR_AVX2, REGISTERS_AVX);
-}
-
-static inline int has_avx512f(void) {
-  return processor_has(PROCESSOR_AVX, PROCESSOR_AVX512F, REGISTERS_AVX512);
 }
 
 #endif

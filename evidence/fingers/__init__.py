@@ -1,1 +1,0 @@
-"""Simulated fingers: foreign ones, and the matched rig; what goes wrong with their recordings."""
