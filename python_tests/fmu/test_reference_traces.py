@@ -278,7 +278,7 @@ def test_the_fmu_agrees_with_what_it_carries(tmp_path: Path, fmi: int) -> None:
     header = members(fmu)[f"{FOLDER}/asymmetric_pair_ref.csv"].decode().partition("\n")[0]
     assert ("joint_torque[2]" in header) == (fmi == 2)
     done = check(fmu)
-    assert done.status == 0 and "joint_torque[2] " in done.out and " 0 of 20 variables differ" in done.out, done.err
+    assert done.status == 0 and "joint_torque[2] " in done.out and " 0 of 24 variables differ" in done.out, done.err
     done = check(fmu, "--set", "bias.forget_rate=6")
     assert done.status == 1 and re.search(r"compensated_torque\[\d\] .* DIFFERS", done.out)
 

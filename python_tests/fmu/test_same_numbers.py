@@ -41,18 +41,18 @@ def test_a_recording_gives_the_same_columns_in_both_versions(tmp_path: Path) -> 
 
 
 def test_all_outputs_that_there_may_be(tmp_path: Path) -> None:
-    """Force at the tip, link of a contact (an Int32), contact at rest, faults of sensors."""
+    """Force at the tip, link of a contact (an Int32), level of contact, faults of sensors."""
     description = FINGER | {
         "links": [{"axis": [0, 0, 1]}, {"axis": [0, 0, 1], "offset": [0.05, 0, 0]}],
         "tip": [0.04, 0, 0],
-        "contact": {"threshold": [0.03, 0.02], "rest": {"travel": 1e-4, "threshold": [0.1, 0.1]}},
+        "contact": {"threshold": [0.03, 0.02], "method": "bands", "bands": [{"noise": [0.01, 0.01]}] * 4},
         "sensor_fault": {},
     }
     rows = []
     for fmi in (2, 3):
         fmu = unpack(build_fmu(description, tmp_path / f"{fmi}.fmu", illustrated=False, fmi=fmi), tmp_path / str(fmi))
         names = [name for kind in ("Float64", "Boolean", "Int32") for name in fmu.names("output", kind)]
-        assert {"contact_observable", "contact_at_rest", "fingertip_force[3]", "contact_link"} <= set(names)
+        assert {"contact_observable", "contact_level[2]", "fingertip_force[3]", "contact_link"} <= set(names)
         with Instance(fmu) as instance:
             instance.initialise(motion(fmu, 0.0))
             rows.append([])

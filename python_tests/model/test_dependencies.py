@@ -29,6 +29,7 @@ from tendonfmu.model.output_dependencies import Dependencies, dependencies, stru
 from tendonfmu.model.output_names import FLAGS, INPUTS, NUMBERS
 
 SEEDS = range(30)
+DECIDED_BY = ("residual", "contact_level")  # a turn of the contact does not change them
 
 Influence = set[tuple[str, int, str, int]]  # output, element, input, element; 0-based
 Sample = dict[str, Any]
@@ -84,7 +85,7 @@ def steps_apart(finger: Instance, state: bytes, sample: Sample) -> Influence:
                 moved[name][0, i] += change * (10.0 if name == "tendon_force" else 1.0)
                 after = outputs_of(finger, state, moved)
                 turned = after["contact"][0] != plain["contact"][0]
-                for output in FLAGS if turned else (*NUMBERS, *FLAGS):
+                for output in (*DECIDED_BY, *FLAGS) if turned else (*NUMBERS, *DECIDED_BY, *FLAGS):
                     differ = np.flatnonzero(np.atleast_1d(after[output][0] != plain[output][0]))
                     found |= {(output, int(k), name, i) for k in differ}
     return found

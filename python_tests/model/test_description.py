@@ -71,9 +71,8 @@ def with_everything() -> dict[str, Any]:
     description["extensions"] = [{"effect": "cover_hardening", "joint": 2, "stiffness": 0.1}]
     description["links"] = [{"axis": [0.0, 0.0, 2.0]}, {"axis": [0.0, 1.0, 0.0], "offset": [0.04, 0.0, 0.0]}]
     description["tip"] = [0.02, 0.0, 0.0]
-    innovation = {"time": 0.1, "threshold": [0.02, 0.02]}
-    rest = {"travel": 1e-5, "threshold": [0.1, 0.1], "creep": [0.0, 0.0], "fall_share": 0.1, "innovation": innovation}
-    description["contact"]["rest"] = rest
+    bands = [{"noise": [0.02, 0.02], "friction": [0.0, 0.5], "motor_load": [0.1, 0.1]} for _ in range(4)]
+    description["contact"] |= {"method": "bands", "watches_motors": True, "bands": bands}
     description["sensor_fault"] = {"hold_time": 0.1, "jump_margin": 0.5, "force_resolution": 0.01}
     description["joints"][0]["load_friction"] = {"static": 1e-4, "coulomb": 8e-5, "stribeck_velocity": 0.1}
     return description
@@ -264,12 +263,17 @@ SADDLE = [{"axis": [0.0, 0.0, 1.0]}, {"axis": [0.0, 1.0, 0.0], "offset": [0.04, 
 @pytest.mark.parametrize(
     ("path", "change", "said"),
     [
-        (("contact", "rest", "travel"), "DELETE", r"contact\.rest\.travel"),
-        (("contact", "rest", "threshold"), [0.1, 0.0], r"contact\.rest\.threshold\[2\] = 0: expected above 0"),
-        (("contact", "rest", "threshold"), [0.1], r"contact\.rest\.threshold"),
-        (("contact", "rest", "creep"), [-1.0, 0.0], r"contact\.rest\.creep\[1\] = -1"),
-        (("contact", "rest", "fall_share"), 2.0, r"contact\.rest\.fall_share = 2"),
-        (("contact", "rest"), "ADD", r"contact\.rest\.unknown"),
+        (("contact", "bands"), "DELETE", r"contact\.bands: missing"),
+        (("contact", "method"), "DELETE", r"contact\.bands: not allowed"),
+        (("contact", "method"), "paper", r"contact\.bands: not allowed"),
+        (("contact", "method"), "threshold", r"contact\.method = .?threshold.*paper"),
+        (("contact", "method"), "innovation", r"contact\.method = .?innovation"),
+        (("contact", "bands"), [{"noise": [0.1, 0.1]}] * 3, r"contact\.bands has 3 elements: expected"),
+        (("contact", "bands", 1, "noise"), "DELETE", r"contact\.bands\[2\]\.noise"),
+        (("contact", "bands", 2, "noise"), [0.1, 0.0], r"contact\.bands\[3\]\.noise\[2\] = 0: expected above 0"),
+        (("contact", "bands", 2, "noise"), [0.1], r"contact\.bands\[3\]\.noise"),
+        (("contact", "bands", 3, "motor_load"), [-1.0, 0.0], r"contact\.bands\[4\]\.motor_load\[1\] = -1"),
+        (("contact", "bands", 0), "ADD", r"contact\.bands\[1\]\.unknown"),
         (("sensor_fault", "hold_time"), -1.0, r"sensor_fault\.hold_time = -1"),
         (("sensor_fault", "jump_margin"), 0.0, r"sensor_fault\.jump_margin = 0: expected above 0"),
         (("sensor_fault",), "ADD", r"sensor_fault\.unknown"),
@@ -284,3 +288,18 @@ SADDLE = [{"axis": [0.0, 0.0, 1.0]}, {"axis": [0.0, 1.0, 0.0], "offset": [0.04, 
 def test_a_changed_value_is_refused_by_its_key(path: tuple[Any, ...], change: Any, said: str) -> None:
     refused = accepted(changed(with_everything(), path, change))
     assert refused and re.search(said, refused) and "\n" not in refused
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "innovation", "friction_bound", "uncertainty", "uncertainty_level", "drift", "release_ratio", "hold_time",
+        "release_time", "rest", "start_share",
+    ],
+)  # fmt: skip
+def test_an_earlier_key_of_detection_is_refused_with_what_to_do(key: str) -> None:
+    table = "bias" if key == "start_share" else "contact"
+    description = FINGER | {table: FINGER.get(table, {}) | {key: 1.0}}
+    refused = accepted(description)
+    expected = rf"{table}\.{key}: no longer a key; leave it out, or calibrate again"
+    assert refused and re.search(expected, refused) and "\n" not in refused

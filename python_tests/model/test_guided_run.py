@@ -14,7 +14,7 @@ from repetitions import repeated
 from tendonfmu.model import native, without_detection
 from tendonfmu.recordings import run_parts
 
-FINGERS = range(600, 640)  # half of them with optional keys of the bias, such as start_share
+FINGERS = range(600, 640)
 SOME = FINGERS[::4]
 SAMPLES = 130
 OUTPUTS = (*agreement.REAL_OUTPUTS, *agreement.BOOLEAN_OUTPUTS, "residual")
@@ -46,7 +46,7 @@ def compared(expected: dict[str, Any], got: dict[str, Any]) -> agreement.Agreeme
 
 @pytest.mark.parametrize("seeds", repeated([SOME, FINGERS], 0), ids=["some", "all"])
 def test_agrees_with_the_oracle(seeds: range) -> None:
-    late, open_starts = 0, 0
+    late = 0
     for seed in seeds:
         description, recording = random_case(seed, SAMPLES, detection=True, extensions=seed % 3 > 0)
         free, source = without_detection(description), source_of(seed)
@@ -56,8 +56,7 @@ def test_agrees_with_the_oracle(seeds: range) -> None:
         found = compared(expected, got)
         assert found.agrees, f"finger {seed}, source {source}: {found}"
         late += bool(np.isnan(expected["residual_variance"][1:]).any() and learns.any())
-        open_starts += description.get("bias", {}).get("start_share") is not None
-    assert late and open_starts
+    assert late
 
 
 @pytest.mark.parametrize("seed", FINGERS[:4])
@@ -72,8 +71,10 @@ def test_contact_has_no_say(seed: int) -> None:
         assert not runs[0]["contact"].any()
         for name in ("residual", "residual_variance", "bias_torque", "friction_torque"):
             np.testing.assert_array_equal(runs[0][name], runs[1][name], err_msg=name)
+    assert not runs[1]["contact_level"].any()
     for name, values in native.Instance.from_description(free, 3).run(recording).items():
-        np.testing.assert_array_equal(runs[1][name], values, err_msg=name)
+        if name != "contact_level":
+            np.testing.assert_array_equal(runs[1][name], values, err_msg=name)
 
 
 @pytest.mark.parametrize("seed", [601, 604])

@@ -154,6 +154,15 @@ def test_the_bias_waits_and_begins_anew(runner: Runner) -> None:
     close(out["compensated_torque"][well, 0], 0.0)
 
 
+def test_bands_begin_anew(runner: Runner) -> None:
+    """Blind from sample 8 on, watched again with 13: level 0 there, and the change is counted from there."""
+    recording = changed(moving(24), "tendon_force", 0, slice(8, 12), 0.0)
+    rows = [{"noise": [1e-3]}] * 4
+    out = runner(pair(method="bands", bands=rows), recording, 1)
+    assert faults(out)[8:13] == [1] * 5 and not out["contact"][8:14].any()
+    close(out["contact_level"][8:14], 0.0)
+
+
 def test_a_second_fault_leaves_nothing_to_tell_the_angle(runner: Runner) -> None:
     """Positions of both tendons of one joint: the second one's row cannot leave."""
     recording = moving(24, tendons=2)

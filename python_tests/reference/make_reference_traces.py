@@ -31,8 +31,7 @@ Array = NDArray[Any]
 STEP = 1.0 / 128.0
 LARGEST_FILE = 300_000  # bytes; the cross-check allows 1 MB
 INPUTS = {"tendon_force": 6, "tendon_position": 9}  # name: decimals kept, as a sensor of 1 µN and 1 nm gives them
-# of the FMU, with the one that is not differentiated
-OUTPUTS = (*agreement.REAL_OUTPUTS, *agreement.BOOLEAN_OUTPUTS, "compensated_torque_std")
+OUTPUTS = (*agreement.REAL_OUTPUTS, *agreement.BOOLEAN_OUTPUTS, *agreement.DETECTION_OUTPUTS[:3])  # of the FMU
 
 # name: (description, seed of the motion, samples); 2 s in which every branch of the finger's model is taken
 TRACES = {

@@ -129,14 +129,9 @@ def test_the_compiled_runtime_has_the_numbers_of_the_table() -> None:
         "tip": [0, 0, 0],
         "contact": {
             "threshold": [0.1],
-            "method": "innovation",
-            "innovation": {"time": 0.1, "threshold": [0.1]},
-            "friction_bound": {},
-            "uncertainty": [[[None] * 5]],
+            "method": "bands",
+            "bands": [{"noise": [0.1]}] * 4,
             "deviation": [None],
-            "hold_time": 0.0,
-            "drift": {"threshold": [0.1]},
-            "rest": {"travel": 1e-4, "threshold": [0.1]},
         },
     }
     left_out = set()

@@ -129,7 +129,7 @@ def held_friction_builds_up(run: Run) -> None:
 
 @case
 def corrected_measurements(run: Run) -> None:
-    """Forces and arms other than described: corrections of the torque, not of joint_torque, the angle or the bounds."""
+    """Forces and arms other than described: corrections of the torque, not of joint_torque, or the angle."""
     extensions = [
         {"effect": "force_gain", "tendon": 1, "correction": 0.1},
         {"effect": "force_offset", "tendon": 2, "correction": -0.5},
@@ -137,13 +137,12 @@ def corrected_measurements(run: Run) -> None:
         {"effect": "moment_arm_variation", "joint": 2, "tendon": 1, "slope": 4e-3},
         {"effect": "pulley_eccentricity", "joint": 2, "tendon": 2, "sine": 1e-3, "cosine": 3e-3},
     ]
-    uncertainty = {"threshold": [1e6, 1e6], "uncertainty": [[[1.0, 1.0, 1.0, 1.0, 1.0]], None]}
     # q = R⁺ (x0 − f0/k) with x0 = R (0.3, π/6) + f0/k
     q = np.array([0.3, math.pi / 6])
     force = np.array([20.0, -8.0])
     position = np.array([[0.01, 0.02], [0.03, -0.01]]) @ q + force / 1000.0
     rec = of_two([0.0, 0.1], [force, force], 0.0) | {"tendon_position": np.array([position, position])}
-    description = two_joints(extensions, contact=uncertainty)
+    description = two_joints(extensions)
     out = run(description, rec, 1)
     arm = 1e-3 * 0.5 + 3e-3 * math.sqrt(0.75)
     first = -0.1 * 0.01 * 20.0 + 0.5 * 0.03 + 2e-3 * 8.0
@@ -151,7 +150,6 @@ def corrected_measurements(run: Run) -> None:
     close(torque(out), [[first, second]] * 2)
     close(out["joint_torque"], [[0.2 - 0.24, 0.4 + 0.08]] * 2)
     close(out["joint_angle"], [q, q])
-    close(out["compensated_torque_std"], 0.0)  # of the friction of section 5, there is none
 
 
 @case
@@ -252,18 +250,18 @@ def stribeck(run: Run) -> None:
 
 
 @case
-def bounds_of_stuck_friction(run: Run) -> None:
-    """H: |F| times the factors at rest, nothing of what slides; std is c_H·H/√3."""
+def all_that_friction_can_hold(run: Run) -> None:
+    """B: |F| times the factors, of what sticks and of what slides."""
     rows = [
         {"effect": "stribeck", "tendon": 1, "amplitude": 0.5, "stribeck_velocity": 1.0},
         {"effect": "friction_drift", "amplitude": 1.0, "time_constant": HALF},
     ]
     slides = [*rows, {"effect": "presliding", "tendon": 1, "displacement": 1.0}]
-    contact = {"threshold": [1e6], "friction_bound": {"stuck_share": 2.0, "jump_share": 0.0}}
-    rec = recording([0.0, 1.0], 10.0, 0.0)
-    stuck, sliding = (run(one_edge(DRY, contact=contact, extensions=each), rec) for each in (rows, slides))
-    close(stuck["compensated_torque_std"][:, 0], 2.0 * 0.01 * 1.5 * np.array([1.0, 1.5]) / math.sqrt(3.0))
-    close(sliding["compensated_torque_std"], 0.0)
+    contact = {"threshold": [1e6], "method": "bands", "bands": [{"noise": [1e6]}] * 4}
+    for extensions in (rows, slides):
+        out = run(one_edge(DRY, contact=contact, extensions=extensions), recording([0.0, 1.0], 10.0, 0.0))
+        if "contact_terms" in out:
+            close(out["contact_terms"][:, 0, :, 4].T, 0.01 * 1.5 * np.array([1.0, 1.5]) * np.ones((4, 1)))
 
 
 @case

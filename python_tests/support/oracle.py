@@ -37,7 +37,7 @@ class FingerOracle:
         self.branches: Counter[str] = Counter()
         self._read_structure(description)
         self._read_settings(description)
-        self.detector = Detector(description, self.R, kinematics_source, self.branches)
+        self.detector = Detector(description, self.R, self.branches)
         self.extensions = Extensions(description, self.n, self.m, self.R, self.joints, kinematics_source, self.branches)
         watches = given(description, "sensor_fault", None) is not None
         self.sensors = SensorWatch(description, self.R, kinematics_source, self.branches) if watches else None
@@ -140,9 +140,8 @@ class FingerOracle:
         # 5. contact, 6. bias
         unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew) | first
         r = np.where(unwatched, 0.0, tau - T_eff)
-        signals = Signals(
-            tau - T - self.jumps, r, self._driven(x0), T, self._held_at_most(limits * f), np.abs(friction)
-        )
+        B = self._held_at_most(limits * f)
+        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, B, np.abs(friction))
         joint_contact = self.detector.take(signals, mean_force, time, dt, unwatched, out)
         if not first:
             correction = self._gain(dt, noise, time, bool(joint_contact.any())) * r
@@ -370,11 +369,11 @@ class FingerOracle:
     def _held_at_most(self, products: Places) -> Array:
         """B [n] N·m, of the products |F|·f."""
         own = [self.extensions.own_limit(j) if self._remembers("joint", (j,)) else 0.0 for j in range(self.n)]
-        return self._at_joints(products, np.abs(self.R)) + np.array(own)
+        return np.asarray(self._at_joints(products, np.abs(self.R)) + np.array(own))
 
     def _driven(self, x0: Array | None) -> Array:
         """x [n] N·m: what the motors load. x0: tendon positions less their zeros."""
-        if not self.detector.uses_positions:
+        if not self.detector.watches_motors:
             return np.zeros(self.n)
         k = np.array([tendon.stiffness for tendon in self.tendons])
         return np.asarray(self.R.T @ (k * x0))

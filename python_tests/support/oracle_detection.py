@@ -91,7 +91,7 @@ class Joint:
 class Detector:
     """Decides on contact. `take` once a sample; then level [n], terms [n, 4, 8] and leak are those of the sample."""
 
-    def __init__(self, description: Mapping[str, Any], R: Array, source: int, branches: Counter[str]) -> None:
+    def __init__(self, description: Mapping[str, Any], R: Array, branches: Counter[str]) -> None:
         n = R.shape[1]
         self.n, self.branches = n, branches
         contact = description["contact"]
@@ -104,13 +104,11 @@ class Detector:
         self.deviation = per_joint(contact, "deviation")
         self.deviation_per_force = per_joint(contact, "deviation_per_force")
         self.by_bands = given(contact, "method", "paper") == "bands"
-        self.numbers = [
-            {name: per_joint(row, name).tolist() for name in NUMBERS} for row in given(contact, "bands", [])
-        ]
+        rows = given(contact, "bands", [])
+        self.numbers = [{name: per_joint(row, name).tolist() for name in NUMBERS} for row in rows]
         if len(self.numbers) != (len(SHORT) if self.by_bands else 0):
             raise ValueError("contact.bands: 4 rows, with the method bands alone")
-        watches = given(description, "sensor_fault", None) is not None
-        self.uses_positions = self.by_bands and (source == 1 or watches or given(contact, "watches_motors", False))
+        self.watches_motors = bool(given(contact, "watches_motors", False))
         self.joints = [Joint() for _ in range(n)]
         self.in_contact = np.zeros(n, dtype=bool)
         self.level = np.zeros(n)

@@ -67,7 +67,7 @@ def run_native(
     finger = product("model.native").Instance.from_description(description, kinematics_source)
     if kernel is not None:
         finger.kernel = kernel
-    outputs: Outputs = finger.run(recording, parts=True)
+    outputs: Outputs = finger.run(recording, terms=True)
     return outputs
 
 
@@ -84,7 +84,7 @@ def run_single_steps(
             state = finger.save_state()
             finger = native.Instance.from_description(description)
             finger.restore_state(state)
-        rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}, parts=True))
+        rows.append(finger.run({name: np.asarray(array)[k : k + 1] for name, array in recording.items()}, terms=True))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
@@ -154,7 +154,7 @@ def assert_state_continues(
 ) -> None:
     """Save the state at each cut, and go on twice from it in another instance: all outputs have the same bits."""
     native = product("model.native")
-    whole = native.Instance.from_description(description, source).run(recording, parts=True)
+    whole = native.Instance.from_description(description, source).run(recording, terms=True)
     for cut in cuts:
         head, tail = ({name: x[part] for name, x in recording.items()} for part in (slice(cut), slice(cut, None)))
         first, other = (
@@ -165,5 +165,5 @@ def assert_state_continues(
         state = first.save_state()
         for finger in (first, other, other):
             finger.restore_state(state)
-            for name, values in finger.run(tail, parts=True).items():
+            for name, values in finger.run(tail, terms=True).items():
                 np.testing.assert_array_equal(values, whole[name][cut:], err_msg=f"{name} from {cut}")

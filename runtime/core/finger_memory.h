@@ -7,7 +7,7 @@
  * together, so what fig. 5 remembers of an effect is kept once per slot. */
 #pragma once
 
-#include "detect/contact_bands.h"
+#include "contact_bands.h"
 #include "friction_law.h"
 #include "link_geometry.h"
 #include "model_image.h"

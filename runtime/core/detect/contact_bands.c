@@ -59,8 +59,8 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
   }
   joint->home = first ? sample->residual : joint->home;
   joint->unknown = unknown;
-  joint->begun_at = time;
-  joint->band = joint->sign = joint->peak = joint->touched_at = 0.0;
+  joint->begun_at = joint->touched_at = time;
+  joint->band = joint->sign = joint->peak = 0.0;
   joint->friction = fabs(sample->torque);
   joint->limit = sample->limit;
 }

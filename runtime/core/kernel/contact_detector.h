@@ -3,7 +3,7 @@
 #pragma once
 
 #include "bias_tracker.h"
-#include "detect/contact_bands.h"
+#include "contact_bands.h"
 
 /* base_j + per_force_j·mean|f0| */
 HOT_INLINE quad force_dependent(const double* base, const double* per_force, size_t j, double mean_force) {
