@@ -25,6 +25,7 @@ from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
 
+BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_SPREAD = 0.04  # of the mean variance over the joints
@@ -207,6 +208,17 @@ class MemoryProblem:
     def slopes(self, state: State) -> Numbers:
         """Return [B, n, u] the derivatives of T by the unknowns z (N·m each)."""
         return -self._columns(state.u, np.eye(len(state.u))) / self.scale.slopes(self.scale.unknowns(state.u))
+
+    def scores(self, state: State, linearised: Linearised) -> tuple[Numbers, float]:
+        """Return [K, u] the gradients of the data's cost by z over stretches of time, and their length (s)."""
+        seconds = self.runs.grid.step * len(state.residual)
+        length = min(max(seconds / BLOCKS, SHORTEST), seconds / FEWEST)
+        size = max(1, round(length / self.runs.grid.step))
+        weight = self._weight(state.residual)
+        rows = np.einsum("rju,rj->ru", linearised.columns, state.residual * weight)
+        sums = np.add.reduceat(rows, np.arange(0, len(rows), size), axis=0)
+        scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
+        return scores - scores.mean(axis=0), length
 
     def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
         """Return the move along a way [u], backwards where it would cross a bound."""
