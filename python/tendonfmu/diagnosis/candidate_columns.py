@@ -91,8 +91,8 @@ def _refuse_too_many(size: float, columns: int) -> None:
 
 
 def without_sensor_fault(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description without sensor monitoring."""
-    return {**data, "sensor_fault": None}
+    """Return the description without what asks for more signals than friction does."""
+    return {**data, "contact": {**data["contact"], "watches_motors": None}, "sensor_fault": None}
 
 
 def _proposed(

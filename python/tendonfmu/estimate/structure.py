@@ -26,6 +26,9 @@ FIXED = -1
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
 
+BESIDE = ("sensor_fault", "estimated", "contact")  # what no fit changes
+
+
 @dataclass(frozen=True)
 class Structure:
     """What is fitted."""
@@ -37,7 +40,7 @@ class Structure:
     group: NDArray[np.int32]
     scale: NDArray[np.float64]  # [p] expected magnitudes; NaN: that of the start
     index: Mapping[str, int]  # path -> index among the p parameters
-    # `sensor_fault` and `estimated` of the description, which `start` lacks
+    # of the description: what `start` lacks or has in part
     beside: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -80,7 +83,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
             group[index[number.with_path]] = owner
     return Structure(
         start=start,
-        beside={key: finger.data[key] for key in ("sensor_fault", "estimated") if finger.data.get(key) is not None},
+        beside={key: finger.data[key] for key in BESIDE if finger.data.get(key) is not None},
         numbers=_numbered(start, chosen),
         group=group,
         scale=_scales(paths, chosen, choice.scale),
@@ -89,8 +92,9 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
 
 
 def model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Remove `sensor_fault` and `estimated`."""
-    return {key: value for key, value in data.items() if key not in ("sensor_fault", "estimated")}
+    """Remove `estimated`, and what asks for more signals than friction does."""
+    contact = {key: value for key, value in data["contact"].items() if key != "watches_motors"}
+    return {**{key: value for key, value in data.items() if key not in BESIDE}, "contact": contact}
 
 
 def values_of(structure: Structure, finger: Finger) -> list[Unknown]:
