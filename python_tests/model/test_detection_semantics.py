@@ -149,11 +149,13 @@ def test_the_bound_sums_the_squares(runner: Runner, given: str, load: float, k: 
     }
     numbers = {name: value for name, value in NUMBERS.items() if given in (name, "all")}
     n, stiffness = np.arange(1, 200), 1000.0
-    T = np.concatenate([[0.01, 0.01], np.full(199, 0.05)])  # 0.2·angle
+    # the motors have moved, a minute before
+    time = np.concatenate([[0.0, 0.1], 0.1 + SETTLED + DT * np.arange(200)])
+    T = np.concatenate([[0.01] * 3, np.full(199, 0.05)])  # 0.2·angle
     tau = 0.02 * (T > 0.02)
     contact = one_band(k, 10.0, **numbers) | {"watches_motors": True}
-    position = load / (ARM * stiffness) * (T > 0.02)
-    out = of(runner, contact, settled(np.full(199, DT)), tau, [joint], angle=T / 0.2, position=position)
+    position = load / (ARM * stiffness) * (T > 0.02) - (time < 0.1)
+    out = of(runner, contact, time, tau, [joint], angle=T / 0.2, position=position)
     assert not out["contact"].any()
     e, D, D_3 = abs(0.02 - 0.04) * change(n, k), load * change(n, k), load * change(n, 2)
     terms = {
@@ -161,10 +163,10 @@ def test_the_bound_sums_the_squares(runner: Runner, given: str, load: float, k: 
         "friction_change": np.minimum(0.04 * change(n, k), D), "friction_reserve": np.minimum(0.1, D_3),
     }  # fmt: skip
     square = 100.0 + sum((value * terms[name]) ** 2 for name, value in numbers.items())
-    close(out["contact_level"][2:, 0], e / np.sqrt(square), within=1e-15)
+    close(out["contact_level"][3:, 0], e / np.sqrt(square), within=1e-15)
     if "contact_terms" in out:
         expected = [-e, -e, np.ones(199), *terms.values()]
-        close(out["contact_terms"][2:, 0, k], np.transpose(expected), within=1e-12)
+        close(out["contact_terms"][3:, 0, k], np.transpose(expected), within=1e-12)
 
 
 def test_what_acts_and_what_could_act(runner: Runner) -> None:
@@ -197,6 +199,21 @@ def test_the_start_is_unknown_for_a_second(runner: Runner) -> None:
     assert not any(contact_of(of(runner, bands([0.01] * 4), np.arange(10) * 0.01, [0.0] * 5 + [0.06] * 5, [joint])))
     late = of(runner, bands([0.01] * 4), np.arange(450) * 0.01, [0.0] * 400 + [0.06] * 50, [joint])
     assert contact_of(late)[400:405].count(1) == 5 and not any(contact_of(late)[:400])
+
+
+def test_the_first_motion_begins_anew(runner: Runner) -> None:
+    """At rest for 5 s V is gone. Then friction of 0.1 N·m turns over while the motors drive 0.5 N·m in 0.2 s."""
+    joint = {"name": "j", "friction": {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1}}
+    time = np.arange(1000) * 0.01
+    driven = np.clip((time - 5.0) / 0.2, 0.0, 1.0)
+    found = {}
+    for watches in (True, False):
+        contact = bands([0.01] * 4) | {"watches_motors": watches}
+        out = of(runner, contact, time, 0.08 * driven, [joint], position=0.05 * driven)
+        found[watches] = contact_of(out)
+    assert not any(found[True]) and any(found[False])
+    pushed = of(runner, bands([0.01] * 4) | {"watches_motors": True}, time, 0.06 * (time > 4.0), [joint], position=0.0)
+    assert contact_of(pushed)[401:430].count(1) > 25  # no motor drives
 
 
 def test_what_returns_to_the_old_level_is_no_contact(runner: Runner) -> None:

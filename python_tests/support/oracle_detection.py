@@ -76,6 +76,7 @@ class Joint:
     start: float = math.nan  # t_0
     h: float = 0.0
     V: float = 0.0
+    has_moved: bool = True
     band: int | None = None
     sign: float = 0.0
     begun: float = math.nan
@@ -149,10 +150,19 @@ class Detector:
         if anew:
             joint.bands = []
             joint.begin(e, x, T, time)
-            joint.h, joint.V = e, B
+            joint.h, joint.V, joint.has_moved = e, B, not self.watches_motors
             self.terms[j] = self._nothing(T, B)
             return False
         self._follow(joint, sample, time, dt, held)
+        D = joint.bands[2].D
+        waits = not joint.has_moved and joint.band is None
+        if waits and out.above(("moves", j), D, B):
+            joint.bands = []
+            joint.begin(e, x, T, time)
+            joint.h, joint.V, joint.has_moved = e, B, True
+            self.terms[j] = self._nothing(T, B)
+            self.branches["moves_first"] += 1
+            return False
         distances, bounds = zip(*(self._measure(j, k, abs(T), B) for k in range(len(SHORT))), strict=True)
         levels = [level_of(distance, bound) for distance, bound in zip(distances, bounds, strict=True)]
         self.level[j] = max(levels)
@@ -198,7 +208,8 @@ class Detector:
         self.branches["change_limited"] += change > band.D
         self.branches["reserve_limited"] += band.S > joint.bands[2].D
         parts = (1.0, T, B, band.D, min(change, band.D), min(band.S, joint.bands[2].D))
-        bound = math.sqrt(joint.V**2 + sum((numbers[name][j] * part) ** 2
+        unknown = max(joint.V, 0.0 if joint.has_moved else min(B, joint.bands[2].D))
+        bound = math.sqrt(unknown**2 + sum((numbers[name][j] * part) ** 2
                                            for name, part in zip(NUMBERS, parts, strict=True)))  # fmt: skip
         moved = band.a - band.m
         sign = math.copysign(1.0, moved) if moved != 0.0 else 0.0

@@ -118,7 +118,10 @@ static void find_squares(const band_memory* joint, size_t band, const double num
                          double* bound) {
   double terms[BAND_TERMS];
   band_terms(joint, band, terms);
-  *bound = joint->unknown * joint->unknown;
+  /* as long as it has not moved, motion may turn over all that friction holds */
+  const double turns = joint->has_moved != 0.0 ? 0.0 : smaller(joint->limit, joint->driven[RESERVE_BAND]);
+  const double unknown = larger(joint->unknown, turns);
+  *bound = unknown * unknown;
   for (size_t i = 0; i < BAND_NUMBERS; ++i) {
     *bound += numbers[i] * (terms[2 + i] * terms[2 + i]);
   }
@@ -126,10 +129,15 @@ static void find_squares(const band_memory* joint, size_t band, const double num
 }
 
 double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
-                 const double squares[BANDS * BAND_NUMBERS], double time, int any, size_t* band) {
+                 const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band) {
   double most = 0.0, bound_of_most = 1.0;
   *band = 0;
   follow_sample(joint, sample, shares, time - joint->begun_at, any);
+  if (joint->has_moved == 0.0 && !before && joint->driven[RESERVE_BAND] > joint->limit) {
+    band_begin(joint, sample, time, sample->limit, 1);
+    joint->has_moved = 1.0;
+    return 0.0;
+  }
   for (size_t k = 0; k < BANDS; ++k) {
     double size, bound;
     find_squares(joint, k, squares + k * BAND_NUMBERS, &size, &bound);

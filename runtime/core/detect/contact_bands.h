@@ -21,7 +21,8 @@ typedef struct band_memory {
   double begun_at, touched_at;                   /* t_0, begin of the contact: s */
   double band, sign, peak;                       /* of the contact: 0 to 3, ±1, N·m */
   double friction, limit;                        /* |T|, B of the last sample: N·m */
-  double spare[3];                               /* to a multiple of 4 */
+  double has_moved;                              /* 0 until the motors have driven all that friction can hold */
+  double spare[2];                               /* to a multiple of 4 */
 } band_memory;
 
 /* A joint at one sample, N·m. */
@@ -45,12 +46,12 @@ typedef struct band_shares {
 /* Fills the shares unless they are those of this step. */
 void band_find_shares(band_shares* shares, double step);
 
-/* A joint begins anew; unknown: V. First: at the first sample, and where it was not watched. */
+/* A joint begins anew; unknown: V. First: at the first sample, where it was not watched, and when it first moves. */
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first);
 
-/* Takes a sample; any: whether any joint was in contact at the one before. Returns the level. */
+/* Takes a sample; of the one before: whether the joint was in contact, and whether any was. Returns the level. */
 double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
-                 const double squares[BANDS * BAND_NUMBERS], double time, int any, size_t* band);
+                 const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band);
 
 /* Whether a joint is in contact now, from whether it was, its level and the band that has it. */
 int band_decide(band_memory* joint, const band_sample* sample, double time, double step, int before, double level,

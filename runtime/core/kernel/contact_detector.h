@@ -49,6 +49,7 @@ HOT_INLINE band_sample sample_of_bands(const tendonfmu_finger* f, size_t j) {
 COLD_STATIC void begin_bands(tendonfmu_finger* f, size_t j, double time) {
   const band_sample sample = sample_of_bands(f, j);
   band_begin(bands_of(f, j), &sample, time, sample.limit, 1);
+  bands_of(f, j)->has_moved = f->derived.settings.watches_motors ? 0.0 : 1.0; /* else nobody knows */
   f->remembered.level[j] = f->remembered.joint_contact[j] = 0.0;
 }
 
@@ -66,9 +67,9 @@ HOT_INLINE int exceed_bands(tendonfmu_finger* f, double time, double step) {
     const band_sample sample = sample_of_bands(f, j);
     const double* squares = f->derived.band_square + j * BANDS * BAND_NUMBERS;
     size_t band = 0;
-    s->level[j] = band_take(bands_of(f, j), &sample, &f->scratch.shares, squares, time, before, &band);
-    s->joint_contact[j] = band_decide(bands_of(f, j), &sample, time, CLOCK_ROUNDING * step, s->joint_contact[j] != 0.0,
-                                      s->level[j], band);
+    const int touched = s->joint_contact[j] != 0.0;
+    s->level[j] = band_take(bands_of(f, j), &sample, &f->scratch.shares, squares, time, touched, before, &band);
+    s->joint_contact[j] = band_decide(bands_of(f, j), &sample, time, CLOCK_ROUNDING * step, touched, s->level[j], band);
     any |= s->joint_contact[j] != 0.0;
   }
   return any;
