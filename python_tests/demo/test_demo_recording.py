@@ -89,7 +89,7 @@ def test_the_calibrated_finger_is_one_that_calibrate_takes_and_writes() -> None:
     given, calibrated = (read_finger(path) for path in FINGERS.values())
     earlier = earlier_finger(given, FINGERS["calibrated"])
     assert earlier.joint_names == given.joint_names and earlier.tendon_names == given.tendon_names
-    assert calibrated.data["contact"]["method"] == "innovation" and calibrated.data["contact"]["uncertainty"]
+    assert calibrated.data["contact"]["method"] == "bands" and calibrated.data["contact"]["watches_motors"]
 
 
 def test_pushes_are_found_as_the_readmes_say(
@@ -124,8 +124,7 @@ def test_pushes_are_found_as_the_readmes_say(
 
 
 def test_a_load_that_rises_over_seconds_is_found(recordings: dict[str, Recording]) -> None:
-    """30 mN·m at the second joint over 4 s: the bias would have them. With `contact.drift` all are found,
-    without it at most a half."""
+    """30 mN·m at the second joint over 4 s: the bias would have them. By the bands most are found."""
     free, finger = recordings["index_finger_free"], read_finger(FINGERS["calibrated"]).data
     arms = np.array([tendon["moment_arms"] for tendon in finger["tendons"]])
     stiffness = np.array([tendon["stiffness"] for tendon in finger["tendons"]])
@@ -138,11 +137,6 @@ def test_a_load_that_rises_over_seconds_is_found(recordings: dict[str, Recording
         "tendon_position": free.groups["tendon_position"] + load / stiffness,
     }
 
-    def found(contact: dict[str, Any]) -> tuple[int, int]:
-        outputs = Instance.from_description(json.dumps({**finger, "contact": contact})).run(groups)
-        result = score_detection(free.time, loaded, outputs["contact"].ravel())
-        return result.found, len(result.events)
-
-    with_rule, count = found(finger["contact"])
-    without, _ = found({key: value for key, value in finger["contact"].items() if key != "drift"})
-    assert count >= 4 and with_rule == count and without <= count / 2
+    outputs = Instance.from_description(finger).run(groups)
+    result = score_detection(free.time, loaded, outputs["contact"].ravel())
+    assert len(result.events) >= 4 and result.found >= 3

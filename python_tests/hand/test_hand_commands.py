@@ -35,7 +35,8 @@ def calibration(error: float, before: float = 4.0) -> dict[str, Any]:
     return {
         "error": {"as_given": [1e-3 * before], "calibrated": [1e-3 * error], "pretensions": []},
         "structure": {"causes": []},
-        "alarms": {"alarms": 0, "minutes": 2.0, "limit": None},
+        "alarms": {"alarms": 0, "minutes": 2.0, "interval": [0.0, 100.0]},
+        "detection": {"false_alarms_per_hour": 6.0},
         "pushes": None,
         "warnings": [],
     }
