@@ -12,7 +12,6 @@ import jsonschema
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 import tendonfmu.cli
 from command import Call, run_script
@@ -23,16 +22,17 @@ from tendonfmu.detect.learning import (
     gamma_weights,
     levels_of,
     numbers_of,
-    push_sizes,
     seconds_of,
     weights_of,
 )
 from tendonfmu.detect.noise import Residuals, bias_noise, deviation, drift_variance, time_constant
-from tendonfmu.detect.terms import AVERAGED, COMPARED, NAMES, Terms, bands_of, terms_of
+from tendonfmu.detect.pushes import pushed_part, size_found
+from tendonfmu.detect.terms import BANDS, NAMES, Terms, bands_of, terms_of
 from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model import native, read_finger
+from tendonfmu.options import KinematicsSource
 from tendonfmu.recordings import read_recording
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
@@ -51,21 +51,21 @@ def made_terms(seed: int, seconds: float, weights: NDArray[np.float64]) -> Terms
     """Distances that are normal with the variance that the weights [4, 6] say, of one joint, by cell of 10 ms."""
     draws = np.random.default_rng(seed)
     cells = round(100 * seconds)
-    squares = draws.gamma(0.5, 2.0, (cells, 1, len(AVERAGED), len(NAMES)))
+    squares = draws.gamma(0.5, 2.0, (cells, 1, BANDS, len(NAMES)))
     squares[..., 0] = 1.0
-    distance = np.sqrt(np.einsum("cjkp,kp->cjk", squares, weights)) * draws.standard_normal((cells, 1, len(AVERAGED)))
-    return Terms(*(each.astype(np.float32) for each in (distance, distance, squares)), np.arange(cells) / 100.0)
+    distance = np.sqrt(np.einsum("cjkp,kp->cjk", squares, weights)) * draws.standard_normal((cells, 1, BANDS))
+    return Terms(distance.astype(np.float32), squares.astype(np.float32), np.arange(cells) / 100.0)
 
 
 def test_weights_are_those_of_the_variance() -> None:
     """By a gamma likelihood on all samples: those that are there are found, and the others are small."""
     truth = np.array([4e-6, 0.0, 9e-6, 0.0, 0.0, 1e-6])
     terms = made_terms(0, 600.0, np.tile(truth, (4, 1)))
-    found = gamma_weights(terms.distance[:, 0, 0].astype(float) ** 2, terms.squares[:, 0, 0].astype(float))
+    found = gamma_weights(terms.level[:, 0, 0].astype(float) ** 2, terms.squares[:, 0, 0].astype(float))
     np.testing.assert_allclose(found[[0, 2]], truth[[0, 2]], rtol=0.1)
     assert found[5] == pytest.approx(1e-6, rel=0.5) and (found[[1, 3, 4]] < 3e-7).all()
     unseen = np.where(np.arange(6) == 3, 0.0, terms.squares[:, 0, 0].astype(float))
-    assert gamma_weights(terms.distance[:, 0, 0].astype(float) ** 2, unseen)[3] == 0.0, "a term that is always 0"
+    assert gamma_weights(terms.level[:, 0, 0].astype(float) ** 2, unseen)[3] == 0.0, "a term that is always 0"
 
 
 def test_a_level_keeps_its_share_of_the_rate() -> None:
@@ -105,33 +105,40 @@ def test_without_any_alarm_the_factor_is_the_lowest_that_was_tried() -> None:
     assert loop.factor == loop.tried.min() == loop.kept_out[0]
 
 
-def test_pushes_of_that_size_are_found_within_60_ms_nine_of_ten() -> None:
-    """By adding steps to a residual at random times, with means and references as the core has them."""
-    draws, dt = np.random.default_rng(4), 1e-3
-    time = np.arange(60_000) * dt
-    noise = 1e-3 * lfilter([1.0], [1.0, -0.9], draws.standard_normal(len(time)))
+def test_the_size_of_which_nine_of_ten_are_found() -> None:
+    """By logistic regression on pushes that are found with a known probability."""
+    draws = np.random.default_rng(4)
+    sizes = np.exp(draws.uniform(np.log(1e-3), np.log(4e-2), 3000))
+    found = draws.random(3000) < 1.0 / (1.0 + (1e-2 / sizes) ** 4)
+    assert size_found(sizes, found) == pytest.approx(1e-2 * 9.0**0.25, rel=0.1)
+    assert 9e-3 < size_found(sizes, sizes > 1e-2) < 1.3e-2, "a sharp limit"
+    assert math.isnan(size_found(sizes, np.zeros(3000, dtype=bool)))
 
-    def distances(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-        columns = []
-        for short, long in zip(AVERAGED, COMPARED, strict=True):
-            first, second = (1.0 - math.exp(-dt / constant) for constant in (short, long))
-            mean = lfilter([first], [1.0, first - 1.0], residual)
-            columns.append(mean - lfilter([second], [1.0, second - 1.0], mean))
-        return np.stack(columns, axis=1)
 
-    numbers = np.zeros((1, 4, 6))
-    numbers[0, :, 0] = 0.02, 0.012, 0.01, 0.01
-    values = np.zeros((len(time), 1, 4, 8))
-    values[:, 0, :, 0] = values[:, 0, :, 1] = distances(noise)
-    values[..., 2] = 1.0
-    size = float(push_sizes([terms_of(time, values, time >= 2.0)], numbers)[0])
-    found = 0
-    for at in draws.uniform(2.0, 59.0, 300):
-        signed = size * draws.choice([-1.0, 1.0])
-        rows = (time >= at - 2.0) & (time < at + 0.06)
-        pushed = distances(noise[rows] + signed * (time[rows] >= at))[time[rows] >= at]
-        found += bool((np.abs(pushed) > numbers[0, :, 0]).any())
-    assert 0.85 <= found / 300 <= 0.99, found
+@pytest.mark.parametrize("kinematics", [1, 2, 3])
+def test_a_push_turns_the_joints_and_changes_the_torque(kinematics: int) -> None:
+    """By its size at its joint, by nothing at the others, and with angles that agree with forces and springs."""
+    data = json.loads(INDEX.read_text())
+    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]])
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    time = np.arange(1000) / 500.0
+    arrays = {"time": time, "tendon_force": np.full((1000, 8), 20.0), "tendon_position": np.zeros((1000, 8))}
+    angle = -arrays["tendon_force"] / stiffness @ np.linalg.pinv(arms).T
+    arrays |= {"joint_position": angle} if kinematics > 1 else {}
+    arrays |= {"joint_velocity": np.zeros((1000, 4))} if kinematics == 3 else {}
+    counted = np.ones(1000, dtype=bool)
+    part = FreePart("made", arrays, np.full(1000, 20.0), counted, np.full(1000, 2e-3), KinematicsSource(kinematics))
+    pushed = pushed_part(data, part, 2, np.array([0.5]), np.array([0.01])).arrays
+    torque = (pushed["tendon_force"] - arrays["tendon_force"]) @ arms
+    held = (time >= 0.52) & (time < 0.78)
+    np.testing.assert_allclose(torque[held], np.tile([0.0, 0.0, 0.01, 0.0], (held.sum(), 1)), atol=1e-12)
+    assert not torque[(time < 0.5) | (time > 0.8)].any()
+    by_springs = (pushed["tendon_position"] - pushed["tendon_force"] / stiffness) @ np.linalg.pinv(arms).T
+    if kinematics > 1:
+        np.testing.assert_allclose(pushed["joint_position"], by_springs, atol=1e-12)
+    if kinematics == 3:
+        moved = np.cumsum(pushed["joint_velocity"], axis=0) * 2e-3
+        np.testing.assert_allclose(moved[held], (by_springs - angle)[held], atol=1e-4)
 
 
 def test_a_cell_keeps_the_sample_with_the_largest_distance() -> None:
@@ -145,7 +152,7 @@ def test_a_cell_keeps_the_sample_with_the_largest_distance() -> None:
     inside = np.flatnonzero((time >= terms.time[k] - 1e-9) & (time < terms.time[k] + 0.01 - 1e-9) & counted)
     for j, band in np.ndindex(2, 4):
         row = inside[np.argmax(np.abs(values[inside, j, band, 1]))]
-        assert terms.distance[k, j, band] == pytest.approx(values[row, j, band, 0], rel=1e-6)
+        assert terms.level[k, j, band] == pytest.approx(values[row, j, band, 1], rel=1e-6)
         np.testing.assert_allclose(terms.squares[k, j, band], values[row, j, band, 2:] ** 2, rtol=1e-5)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
+from tendonfmu.detect import tune_report
 from tendonfmu.drawing import Sheet
 from tendonfmu.files import check_output, check_output_folder, counted, whole_file, write_text
 from tendonfmu.fmu import build_fmu
@@ -134,10 +135,10 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
         f"in {_long(found['minutes'])}",
         f"false alarms in the same motion; at most {detection['false_alarms_per_hour']:g} an hour were asked for",
     )
-    least, joint = max(zip(detection["pushes"]["torque"], report["joints"], strict=True))
+    least, joint = tune_report.least_sensitive({"joints": report["joints"], **detection})
     within = 1e3 * detection["pushes"]["within_s"]
     yield (
-        mnm(least),
+        found_from(least),
         "mN·m",
         f"pushes of more are found within {within:.0f} ms, nine of ten, at {joint}, the least sensitive joint",
     )
@@ -179,10 +180,15 @@ def error_caption(report: Report) -> str:
     )
 
 
+def found_from(torque: float | None) -> str:
+    """Write the torque from which on pushes are found (mN·m)."""
+    return "not found" if torque is None else mnm(torque)
+
+
 def torque_rows(report: Report) -> list[Row]:
     """Return a row per joint: the sudden torque that is found nine times of ten (mN·m)."""
     return [
-        (joint, mnm(torque))
+        (joint, found_from(torque))
         for joint, torque in zip(report["joints"], report["detection"]["pushes"]["torque"], strict=True)
     ]
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import genpareto
 
 from tendonfmu.arrays import Indices, Numbers
-from tendonfmu.detect.terms import AVERAGED, COMPARED, Terms, begins, largest
+from tendonfmu.detect.terms import Terms, begins, largest
 
 BLOCK = 0.5  # s, of which only the largest ratio shapes a bound: most samples are far below any
 ROUNDS = 3  # of choosing the largest ratios by the weights, and the weights by them
@@ -28,8 +27,6 @@ FACTORS = 0.85  # from one factor to the next
 HIGHEST, LOWEST = 20.0, 0.1
 SEEN = 20  # alarms at the lowest factor that is tried, or three times those asked for
 SLOPE = (-25.0, -1.0)  # of the log of the alarms over the log of the factor
-WITHIN = 0.06  # s in which a push is found
-SURE = 0.9  # share of the instants at which it is found
 
 
 # --- weights and levels -----------------------------------------------------------------------------------------------
@@ -149,27 +146,6 @@ def _factor_for(factors: Numbers, alarms: Numbers, asked: float) -> float:
     return float(np.clip(np.exp((np.log(asked) - line[0]) / line[1]), factors.min(), HIGHEST))
 
 
-# --- numbers of the description, and what they mean to a user ---------------------------------------------------------
-
-
 def numbers_of(weights: Numbers, levels: Numbers) -> Numbers:
     """Return the numbers [n, 4, 6] of the bands."""
     return np.asarray(levels[..., None] * np.sqrt(weights))
-
-
-def push_sizes(parts: Sequence[Terms], numbers: Numbers) -> Numbers:
-    """Return by joint [n] the sudden torque that is found within `WITHIN` from `SURE` of the instants (N·m)."""
-    gain = _step_gain()
-    sizes = []
-    for part in parts:
-        bound = np.sqrt(np.einsum("cjkp,jkp->cjk", part.squares, numbers**2))
-        for sign in (-1.0, 1.0):
-            sizes.append(((bound - sign * part.distance) / gain).min(axis=2))
-    return np.asarray(np.maximum(np.quantile(np.concatenate(sizes), SURE, axis=0), 0.0))
-
-
-def _step_gain() -> Any:
-    """Return by band [4] the largest a − m within `WITHIN` after a step of 1."""
-    t = np.linspace(0.0, WITHIN, 601)[:, None]
-    followed = (COMPARED * np.exp(-t / COMPARED) - AVERAGED * np.exp(-t / AVERAGED)) / (COMPARED - AVERAGED)
-    return (followed - np.exp(-t / AVERAGED)).max(axis=0)

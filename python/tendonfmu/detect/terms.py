@@ -15,8 +15,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.model import native
 
 NAMES = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
-AVERAGED = np.array([0.004, 0.02, 0.06, 0.5])  # s, A of the bands
-COMPARED = np.array([0.05, 0.3, 1.0, 10.0])  # s, M
+BANDS = 4
 CELL = 0.01  # s, of which only the sample with the largest distance counts, by joint and band
 _NEVER = 1e6  # N·m, a noise that no residual exceeds
 _BLOCK = 50_000  # samples at once: the terms are 32 numbers for each joint
@@ -30,8 +29,7 @@ Signal = NDArray[np.float32]  # saves memory for millions of samples
 class Terms:
     """Distances and squared terms of a stretch of free motion, by cell, joint and band."""
 
-    distance: Signal  # [c, n, 4] a − m (N·m)
-    level: Signal  # [c, n, 4] the distance that decides: the lesser of those from m and from the slow mean
+    level: Signal  # [c, n, 4] the distance that decides: the lesser of those from m and from the slow mean (N·m)
     squares: Signal  # [c, n, 4, 6] of 1, |T|, B, D, min(|ΔT|, D), min(S, D_3)
     time: Numbers  # [c] (s)
 
@@ -41,11 +39,11 @@ def terms_of(time: Numbers, values: Numbers, counted: Flags) -> Terms:
     rows = np.flatnonzero(counted)
     if not len(rows):
         empty = np.zeros((0, *values.shape[1:3]), dtype=np.float32)
-        return Terms(empty, empty, np.zeros((*empty.shape, len(NAMES)), dtype=np.float32), np.zeros(0))
+        return Terms(empty, np.zeros((*empty.shape, len(NAMES)), dtype=np.float32), np.zeros(0))
     first = begins(np.floor(time[rows] / CELL + 1e-6))
     farthest = rows[largest(np.abs(values[rows, :, :, 1]), first)]
     picked = np.take_along_axis(values, farthest[..., None], axis=0).astype(np.float32)
-    return Terms(picked[..., 0], picked[..., 1], picked[..., 2:] ** 2, time[rows[first]])
+    return Terms(picked[..., 1], picked[..., 2:] ** 2, time[rows[first]])
 
 
 def begins(number: Numbers) -> Indices:
@@ -85,7 +83,7 @@ def _without_contact(data: Data, parts: Sequence[FreePart]) -> dict[str, Any]:
     """Return the description with bounds that nothing exceeds."""
     joints = len(data["joints"])
     contact: dict[str, Any] = {"threshold": [_NEVER] * joints, **motors_of(parts)}
-    return {**data, "contact": {**contact, "method": "bands", "bands": [{"noise": [_NEVER] * joints}] * len(AVERAGED)}}
+    return {**data, "contact": {**contact, "method": "bands", "bands": [{"noise": [_NEVER] * joints}] * BANDS}}
 
 
 def motors_of(parts: Sequence[FreePart]) -> dict[str, bool]:

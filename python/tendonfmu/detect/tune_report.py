@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.detect.learning import SURE, WITHIN
+from tendonfmu.detect.pushes import SURE, WITHIN
 from tendonfmu.detect.tuning import ContactTuning
 from tendonfmu.files import finite
 from tendonfmu.statistics import intervals
@@ -50,12 +50,20 @@ def sentence(report: Mapping[str, Any]) -> str:
     minutes = found["minutes"]
     long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.2g} min"
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
-    largest = int(np.argmax(pushes["torque"]))
+    pushed, joint = least_sensitive(report)
+    ending = f"{joint} are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
+    sized = "No pushes at" if pushed is None else f"Pushes of more than {1e3 * pushed:.2g} mN·m at"
     return (
         f"At most {report['false_alarms_per_hour']:g} alarms an hour were asked for; {alarms} in {long} of motion that "
-        f"was kept out. Pushes of more than {1e3 * pushes['torque'][largest]:.2g} mN·m at {report['joints'][largest]} "
-        f"are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
+        f"was kept out. {sized} {ending}"
     )
+
+
+def least_sensitive(report: Mapping[str, Any]) -> tuple[float | None, str]:
+    """Return the largest of the torques that are found, None if at a joint none is, and its joint."""
+    torques = report["pushes"]["torque"]
+    worst = torques.index(None) if None in torques else int(np.argmax(torques))
+    return torques[worst], report["joints"][worst]
 
 
 def _rate(alarms: int, hours: float) -> dict[str, Any]:

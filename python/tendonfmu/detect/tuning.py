@@ -23,7 +23,6 @@ from tendonfmu.detect.learning import (
     close_the_loop,
     levels_of,
     numbers_of,
-    push_sizes,
     seconds_of,
     weights_of,
 )
@@ -38,6 +37,7 @@ from tendonfmu.detect.noise import (
     residuals_of,
     wanted_time,
 )
+from tendonfmu.detect.pushes import push_sizes
 from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.detect.terms import Terms, bands_of, motors_of, run_free
 from tendonfmu.errors import InputError
@@ -106,7 +106,7 @@ class ContactTuning(Configured):
     loop_, kept_out_
         Factors on all bounds with their alarms, and the alarms in motion that was kept out.
     push_
-        By joint, the sudden torque that is found within 60 ms in nine of ten instants (N·m).
+        By joint, the sudden torque of which nine of ten are found within 60 ms; NaN if none is (N·m).
     residuals_, hours_
         Residuals of all free motion, and its counted time (h).
     sensors_
@@ -154,7 +154,8 @@ class ContactTuning(Configured):
             self._data["sensor_fault"] = dict(self.sensors_.keys)
         rule = self._learn_rule(terms)
         self.description_ = finger_from_data(self._with(rule, learned=True), self._start.path)
-        self.push_: Numbers = self._pushes(rule, terms)
+        left = np.sqrt(np.mean(self.residuals_.residual**2, axis=0))
+        self.push_: Numbers = push_sizes(self.description_.data, parts, left)
         self.seconds_ = perf_counter() - begin
         self._judge()
         for sentence in self.warnings_:
@@ -232,12 +233,6 @@ class ContactTuning(Configured):
             contact["deviation"] = rounded(self.deviation_.base, _DIGITS)
             contact["deviation_per_force"] = rounded(self.deviation_.per_force, _DIGITS)
         return {**self._data, "contact": contact}
-
-    def _pushes(self, rule: Rule, terms: Sequence[Terms]) -> Numbers:
-        if self.options.method == "bands":
-            return push_sizes(terms, rule[0])
-        bound = rule[0] + self.residuals_.force[:, None] * rule[1]
-        return np.asarray(np.quantile(bound + np.abs(self.residuals_.residual), 0.9, axis=0))
 
     def _show(self, done: int, steps: int) -> None:
         if self.progress is not None:

@@ -123,7 +123,7 @@ def tune_tables(tuning: ContactTuning) -> Iterator[Table]:
             "deviation\nmN·m",
             "+ per N\nmN·m/N",
         ),
-        [(joint, *(f"{1e3 * value:.3g}" for value in values)) for joint, *values in by_joint],
+        [(joint, *("–" if value is None else f"{1e3 * value:.3g}" for value in each)) for joint, *each in by_joint],
     )
     yield (
         "free motion",
