@@ -6,8 +6,7 @@ Every file goes into FOLDER, which is made. Runs in any environment that has the
 a compiler nor pytest. Two installations compute the same where their objects are the same:
 
     bits     name of a result: SHA-256 of its numbers; the same for every Python, compiler and processor
-    fit      the numbers that fit found: the same for every Python, and nearly for every compiler. Without
-             contact.uncertainty, which numpy and scipy compute: each Python has other versions of them
+    fit      the numbers that fit found: the same for every Python, and nearly for every compiler
     extras   name of an extra: how many of its packages were imported; only extras that are installed whole
     seconds  name of a command: time that it took
 
@@ -115,7 +114,6 @@ def try_all(folder: Path, version: str | None, rig: Path | None) -> dict[str, An
         trial.run("simulate", "rig.json", "-o", "simulated.parquet")
         bits["simulate"] = digest(folder / "simulated.parquet")
     fitted = json.loads((folder / "fitted.json").read_text(encoding="utf-8"))
-    fitted["contact"].pop("uncertainty")
     return {"bits": bits, "fit": numbers(fitted), "extras": imported_extras(), "seconds": trial.seconds}
 
 
