@@ -76,7 +76,8 @@ class Joint:
     start: float = math.nan  # t_0
     h: float = 0.0
     V: float = 0.0
-    has_moved: bool = True
+    has_moved: bool = False
+    turned: float = 0.0
     band: int | None = None
     sign: float = 0.0
     begun: float = math.nan
@@ -145,21 +146,22 @@ class Detector:
         self, j: int, sample: tuple[float, ...], time: float, dt: float, held: bool, anew: bool, out: Step
     ) -> bool:  # fmt: skip
         """Whether joint j is in contact. held: any was at the sample before."""
-        e, x, T, B, _ = sample
+        e, x, T, B, U = sample
         joint = self.joints[j]
         if anew:
             joint.bands = []
             joint.begin(e, x, T, time)
-            joint.h, joint.V, joint.has_moved = e, B, not self.watches_motors
+            joint.h, joint.V, joint.has_moved, joint.turned = e, B, False, 0.0
             self.terms[j] = self._nothing(T, B)
             return False
         self._follow(joint, sample, time, dt, held)
-        D = joint.bands[2].D
+        if not joint.has_moved:
+            joint.turned = max(joint.turned, B - U)
         waits = not joint.has_moved and joint.band is None
-        if waits and out.above(("moves", j), D, B):
+        if waits and out.above(("moves", j), joint.turned, 0.5 * B):
             joint.bands = []
             joint.begin(e, x, T, time)
-            joint.h, joint.V, joint.has_moved = e, B, True
+            joint.h, joint.V, joint.has_moved, joint.turned = e, B, True, 0.0
             self.terms[j] = self._nothing(T, B)
             self.branches["moves_first"] += 1
             return False
@@ -208,7 +210,7 @@ class Detector:
         self.branches["change_limited"] += change > band.D
         self.branches["reserve_limited"] += band.S > joint.bands[2].D
         parts = (1.0, T, B, band.D, min(change, band.D), min(band.S, joint.bands[2].D))
-        unknown = max(joint.V, 0.0 if joint.has_moved else min(B, joint.bands[2].D))
+        unknown = max(joint.V, joint.turned)
         bound = math.sqrt(unknown**2 + sum((numbers[name][j] * part) ** 2
                                            for name, part in zip(NUMBERS, parts, strict=True)))  # fmt: skip
         moved = band.a - band.m

@@ -14,6 +14,7 @@ static const double reference_time[BANDS] = {0.05, 0.3, 1.0, 10.0}; /* M, s */
 #define UNKNOWN_TIME 1.0   /* s */
 #define SHORTEST     0.02  /* s, of a contact */
 #define HIGHEST      1e150 /* level */
+#define TURNED       0.5   /* of all that friction can hold: then the start is behind */
 #define END          0.4   /* of its peak, below which a contact has ended */
 
 enum { HOME_BAND = 1, END_BAND = 2, RESERVE_BAND = 2 };
@@ -58,6 +59,8 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
     joint->reserve[k] = first ? 0.0 : joint->reserve[k];
   }
   joint->home = first ? sample->residual : joint->home;
+  joint->has_moved = first ? 0.0 : joint->has_moved;
+  joint->turned = first ? 0.0 : joint->turned;
   joint->unknown = unknown;
   joint->begun_at = joint->touched_at = time;
   joint->band = joint->sign = joint->peak = 0.0;
@@ -118,9 +121,7 @@ static void find_squares(const band_memory* joint, size_t band, const double num
                          double* bound) {
   double terms[BAND_TERMS];
   band_terms(joint, band, terms);
-  /* as long as it has not moved, motion may turn over all that friction holds */
-  const double turns = joint->has_moved != 0.0 ? 0.0 : smaller(joint->limit, joint->driven[RESERVE_BAND]);
-  const double unknown = larger(joint->unknown, turns);
+  const double unknown = larger(joint->unknown, joint->turned);
   *bound = unknown * unknown;
   for (size_t i = 0; i < BAND_NUMBERS; ++i) {
     *bound += numbers[i] * (terms[2 + i] * terms[2 + i]);
@@ -133,10 +134,13 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
   double most = 0.0, bound_of_most = 1.0;
   *band = 0;
   follow_sample(joint, sample, shares, time - joint->begun_at, any);
-  if (joint->has_moved == 0.0 && !before && joint->driven[RESERVE_BAND] > joint->limit) {
-    band_begin(joint, sample, time, sample->limit, 1);
-    joint->has_moved = 1.0;
-    return 0.0;
+  if (joint->has_moved == 0.0) {
+    joint->turned = larger(joint->turned, sample->limit - sample->reserve);
+    if (!before && joint->turned > TURNED * sample->limit) {
+      band_begin(joint, sample, time, sample->limit, 1);
+      joint->has_moved = 1.0;
+      return 0.0;
+    }
   }
   for (size_t k = 0; k < BANDS; ++k) {
     double size, bound;

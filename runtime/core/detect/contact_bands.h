@@ -21,8 +21,9 @@ typedef struct band_memory {
   double begun_at, touched_at;                   /* t_0, begin of the contact: s */
   double band, sign, peak;                       /* of the contact: 0 to 3, ±1, N·m */
   double friction, limit;                        /* |T|, B of the last sample: N·m */
-  double has_moved;                              /* 0 until the motors have driven all that friction can hold */
-  double spare[2];                               /* to a multiple of 4 */
+  double has_moved;                              /* 0 until friction has turned over */
+  double turned;                                 /* W: the largest friction until then, N·m */
+  double spare;                                  /* to a multiple of 4 */
 } band_memory;
 
 /* A joint at one sample, N·m. */

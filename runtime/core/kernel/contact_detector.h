@@ -49,7 +49,6 @@ HOT_INLINE band_sample sample_of_bands(const tendonfmu_finger* f, size_t j) {
 COLD_STATIC void begin_bands(tendonfmu_finger* f, size_t j, double time) {
   const band_sample sample = sample_of_bands(f, j);
   band_begin(bands_of(f, j), &sample, time, sample.limit, 1);
-  bands_of(f, j)->has_moved = f->derived.settings.watches_motors ? 0.0 : 1.0; /* else nobody knows */
   f->remembered.level[j] = f->remembered.joint_contact[j] = 0.0;
 }
 
