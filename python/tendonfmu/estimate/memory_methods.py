@@ -20,7 +20,7 @@ from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.learning import FitProgress, Interrupted, Learned, MemoryEvidence, Settings, Watch
 from tendonfmu.estimate.memory import starts
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, State, minimise
-from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
+from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely, posterior_factor
 from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
@@ -254,10 +254,11 @@ def learned_of(
     turn = problem.scale.slopes(z)
     information, both = last.linearised.information, np.outer(turn, turn)
     known = prior.reported(given)
+    factor, _ = posterior_factor(information, known)
     return Learned(
         estimator=problem.estimator,
         z=z,
-        covariance=both * np.linalg.inv(information + inverse(known)),
+        covariance=both * (factor @ factor.T),
         prior=both * known,
         information=information / both,
         cost=last.state.cost,

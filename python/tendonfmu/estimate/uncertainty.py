@@ -21,6 +21,7 @@ from tendonfmu.arrays import Data, Indices, Numbers, rounded
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
 from tendonfmu.estimate.learning import Learned, MemoryEvidence
+from tendonfmu.estimate.prior import posterior_factor
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import NEVER, native
 from tendonfmu.recordings import FitRecording, with_angles
@@ -33,7 +34,6 @@ DIGITS = 6  # of a written number
 _SAMPLES, _SIZE = 1000, 2_000_000  # most samples; most samples times joints times unknowns
 _CHUNK = 500_000  # numbers of a Jacobian in memory
 _STEP = 0.01  # s between samples that are evaluated separately; no result depends on it
-_ROUNDING = 1e-9  # of a variance: keeps a covariance positive in spite of rounding errors
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def parameter_uncertainty(
     structure: Structure, learned: Learned, data: Data, training: Sequence[Evaluation]
 ) -> tuple[list[list[list[float]]], dict[str, Any]]:
     """Compute the uncertainty of the friction torque: by joint up to four lists of m + 3 numbers, and the report."""
-    known = known_of(learned.covariance, learned.information)
+    known = Known(*posterior_factor(learned.information, learned.prior))
     if learned.memory is None:
         estimator = Estimator(structure.start.image, structure.group, structure.scale)
         scores, block_time = block_scores(structure, learned.z, data, training, learned.weights)
@@ -129,16 +129,6 @@ def _rms(values: Numbers) -> float:
 def _stated(joints: Sequence[JointUncertainty], which: str) -> dict[str, list[float]]:
     rows = zip(*(joint.stated[which] for joint in joints), strict=True)
     return dict(zip(("std", "error_rms", "error_worst"), map(list, rows), strict=True))
-
-
-def known_of(covariance: Numbers, information: Numbers) -> Known:
-    """Factorise a covariance [u, u] (prior included) by the information [u, u] of the data alone."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    correlation = covariance / np.outer(scale, scale)  # free of units
-    correlation[np.diag_indices_from(correlation)] += _ROUNDING
-    root = scale[:, None] * np.linalg.cholesky(correlation)
-    share, turn = np.linalg.eigh(root.T @ information @ root)
-    return Known(root @ turn, np.clip(share, 0.0, 1.0))
 
 
 def inflation_of(slopes: Numbers, known: Known, scores: Numbers) -> float:
