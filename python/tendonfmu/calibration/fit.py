@@ -29,7 +29,7 @@ from tendonfmu.estimate import (
     read_previous_fit,
     settings_of,
     unknowns,
-    with_known_numbers,
+    with_learned_numbers,
     with_previous_values,
     with_uncertainty,
     with_values,
@@ -65,7 +65,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     settings = replace(settings_of(finger.data, kept, threads), near=True)
     learned = learn_batch(structure, kept, Watch(None), settings, None)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-    result = with_known_numbers(result, kept)
+    result = with_learned_numbers(structure, learned, result)
     if np.isfinite(learned.covariance).all():
         judged = [evaluate(finger.data, result.data, recording) for recording in kept]
         directions, _ = parameter_uncertainty(structure, learned, result.data, judged)

@@ -57,6 +57,6 @@ if TYPE_CHECKING:
         with_values,
     )
     from .uncertainty import parameter_uncertainty
-    from .verdicts import Fitted, with_known_numbers
+    from .verdicts import Fitted, with_known_numbers, with_learned_numbers
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

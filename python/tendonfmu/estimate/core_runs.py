@@ -104,9 +104,9 @@ class CoreRuns:
         other.__dict__ = {**self.__dict__, "data": data, "_image": _image(data), "_instances": _Instances()}
         return other
 
-    def over(self, recordings: Sequence[FitRecording]) -> CoreRuns:
-        """Return runs of the same description over other signals of the same samples."""
-        return CoreRuns(self.data, recordings, self.grid, rate=self._rate, threads=self._threads)
+    def over(self, recordings: Sequence[FitRecording], grid: Grid) -> CoreRuns:
+        """Return runs of the same description over other signals of the same samples, or of a part of them."""
+        return CoreRuns(self.data, recordings, grid, rate=self._rate, threads=self._threads)
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T.

@@ -21,6 +21,7 @@ from tendonfmu.arrays import Data, Indices, Numbers, rounded
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.evaluation import Evaluation, block_scores, sampled
 from tendonfmu.estimate.learning import Learned, MemoryEvidence
+from tendonfmu.estimate.memory_methods import windows
 from tendonfmu.estimate.prior import posterior_factor
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.model import NEVER, native
@@ -32,6 +33,7 @@ WORST = 0.99  # quantile of the error that is reported
 ROLES = ("train", "held_out")  # of samples
 DIGITS = 6  # of a written number
 _SAMPLES, _SIZE = 1000, 2_000_000  # most samples; most samples times joints times unknowns
+_SECONDS = 120.0  # s of windows that friction with a memory is evaluated in, at least
 _CHUNK = 500_000  # numbers of a Jacobian in memory
 _STEP = 0.01  # s between samples that are evaluated separately; no result depends on it
 
@@ -196,12 +198,13 @@ class RememberedMotion:
     def look(self, recordings: Sequence[Evaluation], rows: Sequence[Indices], load: float = 1.0) -> Seen:
         """Evaluate every k-th of the blocks that lie in the rows, at `load` times the recorded tendon forces."""
         problem, minimum = self.memory.problem, self.memory.minimum
-        grid = problem.runs.grid
-        inside = grid.means([_flags(len(each.recording.time), own) for each, own in zip(recordings, rows, strict=True)])
-        chosen = np.flatnonzero(inside == 1.0)
+        flags = [_flags(len(each.recording.time), own) for each, own in zip(recordings, rows, strict=True)]
+        whole = problem.runs.grid
+        grid = next(each for each in (windows(whole, _SECONDS), whole) if (each.means(flags) == 1.0).any())
+        chosen = np.flatnonzero(grid.means(flags) == 1.0)
         chosen = chosen[:: max(1, math.ceil(len(chosen) / _SAMPLES))]
         loaded = [_loaded(each, load) for each in recordings]
-        slopes = (problem if load == 1.0 else problem.over(problem.runs.over(loaded))).slopes(minimum.state)[chosen]
+        slopes = problem.over(problem.runs.over(loaded, grid)).slopes(minimum.state)[chosen]
         parts = grid.means([_parts(self.data, each) for each in loaded])[chosen]
         return Seen(parts.transpose(1, 0, 2), (slopes @ self.known.factor).transpose(1, 0, 2))
 
