@@ -150,7 +150,7 @@ class MemoryProblem:
         columns = self._last[2]
         products = np.zeros((columns.shape[2],) * 2)
         for j, share in enumerate(self.blocks / self.spread):
-            products += share * columns[:, j].T @ columns[:, j]
+            products += share * (columns[:, j].T @ columns[:, j])
         return self._of_columns(state, columns, products)
 
     def _of_columns(self, state: State, columns: Numbers, products: Numbers) -> Linearised:
@@ -191,7 +191,8 @@ class MemoryProblem:
     def _columns(self, u: Numbers, span: Numbers) -> Numbers:
         """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m): by runs where laws have none."""
         here, z = self.values(u), np.clip(self.scale.unknowns(u), *self.bounds)
-        columns = self._laws.at(z) * self.scale.slopes(z)
+        columns = self._laws.at(z)
+        columns *= self.scale.slopes(z)
         if span.shape[1] < len(u):
             columns = columns @ span
         rest = np.where(self._by_runs[:, None], span, 0.0)
