@@ -32,6 +32,7 @@ COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell st
 FITTED_TIME = 240.0  # s of windows that a long fit is made on, before it is refined on all samples
 ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
 SAME = 0.3  # of a logarithm
+NEAR = 0.3  # standard errors (rms) if each block counted: where a fit is refined
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 
@@ -186,7 +187,7 @@ def minimum_from_starts(
         coarse = coarse_problem(structure, estimator, recordings, grid, threads)
         u = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))[0].u
     watch = shown(problem, "windows" if problem is not whole else "all samples")
-    found = minimise(problem, problem.state(u), settings.passes, tolerance, watch, rough=True)
+    found = minimise(problem, problem.state(u), settings.passes, max(tolerance, NEAR), watch)
     return whole, found.state if problem is whole else whole.state(found.state.u), found.steps
 
 
