@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns, Direction
+    from .core_runs import CoreRuns
     from .estimates import known_numbers
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate

@@ -18,13 +18,14 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.estimate.core_runs import STEP, CoreRuns, Direction
+from tendonfmu.estimate.core_runs import CoreRuns
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.law_slopes import LawSlopes
 from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
 
+STEP = 1e-4  # of a coordinate: far above rounding, far below what moves many samples across a limit
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
@@ -190,15 +191,15 @@ class MemoryProblem:
 
     def _columns(self, u: Numbers, span: Numbers) -> Numbers:
         """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m): by runs where laws have none."""
-        here, z = self.values(u), np.clip(self.scale.unknowns(u), *self.bounds)
+        z = np.clip(self.scale.unknowns(u), *self.bounds)
         columns = self._laws.at(z)
         columns *= self.scale.slopes(z)
         if span.shape[1] < len(u):
             columns = columns @ span
         rest = np.where(self._by_runs[:, None], span, 0.0)
         moved = np.flatnonzero(rest.any(axis=0))
-        directions = [self._direction(way, u, here) for way in rest.T[moved]]
-        columns[:, :, moved] += self.runs.columns(directions, self._of_description(here))
+        moves = [self._move(way, u) for way in rest.T[moved]]
+        columns[:, :, moved] += self.runs.columns(moves, self._of_description(self.values(u)))
         return columns
 
     def over(self, runs: CoreRuns) -> MemoryProblem:
@@ -222,12 +223,11 @@ class MemoryProblem:
         scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
         return scores - scores.mean(axis=0), length
 
-    def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
-        """Return the move along a way [u], backwards where it would cross a bound."""
+    def _move(self, way: Numbers, u: Numbers) -> tuple[dict[str, float], float]:
+        """Return the numbers a step along a way [u], and its length; it is backwards where it would cross a bound."""
         step = STEP * max(1.0, float(np.abs(u[(way != 0.0) & ~self.scale.log]).max(initial=0.0)))
         step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
-        there = self._of_description(self.values(u + step * way))
-        return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
+        return self._of_description(self.values(u + step * way)), step
 
     def without(self, state: State, path: str) -> float:
         """Return the cost at a state without a relaxation time, and all that share it, or with rigid cords."""

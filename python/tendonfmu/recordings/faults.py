@@ -130,9 +130,8 @@ def stuck_sensors(recording: Recording, finger: Finger) -> dict[str, list[StuckS
         else:
             expected = expected_values(recording, finger, name, k)
             if expected is not None:
-                learned = _learned_values(recording, name, k, runs)
-                known = [expected] if learned is None else [expected, learned]
-                sensors = list(_stuck(name, recording.groups[name], k, known, runs))
+                known = [expected, _learned_values(recording, name, k, runs)]
+                sensors = list(_stuck(name, recording.groups[name], k, [of for of in known if of is not None], runs))
         if sensors:
             stuck[f"{name}[{k + 1}]"] = sensors
     return stuck
