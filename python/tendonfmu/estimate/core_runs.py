@@ -97,37 +97,16 @@ class CoreRuns:
         return CoreRuns(self.data, recordings, grid, rate=self._rate, threads=self._threads)
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
-        """Return block means of τ − T.
-
-        Parameters
-        ----------
-        values
-            Numbers that differ from the description's, by path, SI units.
-
-        Returns
-        -------
-        ndarray
-            [B, n] (N·m).
-        """
+        """Return block means of τ − T, [B, n] (N·m). `values`: numbers that differ, by path, SI units."""
         parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
         return np.concatenate(list(parts)) + self.added
 
     def columns(
         self, moves: Sequence[tuple[Mapping[str, float], float]], values: Mapping[str, float] | None = None
     ) -> Numbers:
-        """Return the differences of `residual` from that at `values` by moves, per length of each.
+        """Return the differences of `residual` from that at `values` by p moves, per length of each, [B, n, p] (N·m).
 
-        Parameters
-        ----------
-        moves
-            p of them: the numbers that a move changes, by path, after it, and its length.
-        values
-            As of `residual`.
-
-        Returns
-        -------
-        ndarray
-            [B, n, p] (N·m per unit of the lengths).
+        A move is the numbers that it changes, by path, after it, and its length.
         """
         at, base = values or {}, self.residual(values)
         columns = np.empty((*base.shape, len(moves)))

@@ -1,9 +1,9 @@
 """The method `batch` for a finger whose friction remembers: starts, weights, prior and uncertainty about `memory_fit`.
 
 1. From each start of the memory's numbers (`memory.starts`) a few steps on evenly spread windows of the recordings.
-2. The best is refined on all of them. A prior that held it back here would make the errors of a wrong model last.
-3. The residuals say how many independent blocks they are worth, and the prior is the one under which the data are most
-   likely (`prior`). With both the better one is refined again.
+2. The best is refined on `FITTED_TIME`. A prior that held it back here would make the errors of a wrong model last.
+3. The residuals of all samples say how many independent blocks they are worth, and the prior is the one under which the
+   data are most likely (`prior`). With both it is refined on all samples, if they are many with few derivatives.
 """
 
 from __future__ import annotations
