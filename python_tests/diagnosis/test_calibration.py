@@ -16,7 +16,7 @@ from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.hypotheses import hypotheses
-from tendonfmu.diagnosis.search import Trial, beside_calibration
+from tendonfmu.diagnosis.search import Trial, beside_calibration, corrected_arms
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.view import View
 
@@ -80,6 +80,13 @@ def test_corrections_far_beyond_usual_ones_are_none() -> None:
     """They would shrink the torque, and with it whatever is missing."""
     together, _ = judged(4.0 * SEVERAL)
     assert together is None or np.mean((together.magnitudes / USUAL) ** 2) <= PLAUSIBLE**2
+
+
+def test_corrections_of_forces_and_arms_together_may_take_the_torque_away() -> None:
+    of_forces = [{"effect": "force_gain", "tendon": i, "correction": -0.3} for i in TENDONS]
+    of_arms = [{"effect": "moment_arm", "joint": 1, "tendon": i, "correction": -0.7 * ARM} for i in TENDONS]
+    assert corrected_arms({**FINGER, "extensions": of_forces}) == pytest.approx(np.array([[0.7 * ARM, 0.0]] * 4))
+    assert corrected_arms({**FINGER, "extensions": of_forces + of_arms}) == pytest.approx(np.zeros((4, 2)))
 
 
 def test_a_sound_bench_has_none_and_a_refused_one_is_not_tried_again() -> None:

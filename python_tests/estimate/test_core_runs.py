@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from fit_cases import small_finger
 from fit_finger import made_recording
-from tendonfmu.estimate.core_runs import CoreRuns, Direction
+from tendonfmu.estimate.core_runs import CoreRuns
 from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
 from tendonfmu.model import finger_from_data, native, without_learning
 from tendonfmu.recordings import FitRecording, Held, Recording, prepare
@@ -54,26 +55,22 @@ def test_columns_are_derivatives() -> None:
         "joints[1].friction.stribeck_velocity",
         "extensions[1].displacement",
     ]
-    sizes = [0.03, 0.08, 0.4]
-    at = {paths[2]: 0.5}
-    one_sided = runs.columns([Direction({path: size}) for path, size in zip(paths, sizes, strict=True)], at)
-    central = runs.columns([Direction({path: size}, 1e-3, True) for path, size in zip(paths, sizes, strict=True)], at)
+    begin = dict(
+        zip(paths, [*(native.Instance.from_description(data).get(path) for path in paths[:2]), 0.5], strict=True)
+    )
+    sizes = dict(zip(paths, [0.03, 0.08, 0.4], strict=True))
+
+    def columns(step: float, *together: list[str]) -> NDArray[np.float64]:
+        moves = [({path: begin[path] + step * sizes[path] for path in chosen}, step) for chosen in together]
+        return runs.columns(moves, begin)
+
+    each = [[path] for path in paths]
+    one_sided, central = columns(1e-4, *each), 0.5 * (columns(1e-3, *each) + columns(-1e-3, *each))
     scale = np.sqrt(np.mean(central**2, axis=(0, 1)))
     assert (scale > 1e-6).all()
     assert (np.sqrt(np.mean((one_sided - central) ** 2, axis=(0, 1))) < 0.01 * scale).all()
-    both = runs.columns([Direction({paths[0]: sizes[0], paths[1]: sizes[1]})], at)[:, :, 0]
+    both = columns(1e-4, paths[:2])[:, :, 0]
     np.testing.assert_allclose(both, one_sided[:, :, 0] + one_sided[:, :, 1], atol=0.05 * scale[:2].max())
-
-
-def test_a_column_of_a_term_that_the_finger_lacks() -> None:
-    recording = prepared(made_recording(rate=200.0))
-    runs = CoreRuns(finger(REMEMBERING), [recording])
-    candidate = finger(REMEMBERING, {"effect": "gravity", "joint": 1, "sine": 0.0, "cosine": 0.0})
-    column = runs.columns([Direction({"extensions[2].sine": 1.0}, data=candidate)])[:, :, 0]
-    angle = recording.recording.groups["joint_position"][:, 0]
-    expected = -np.sin(angle)[: len(angle) // 2 * 2].reshape(-1, 2).mean(axis=1)
-    np.testing.assert_allclose(column[:, 0], expected, atol=1e-9)
-    assert not column[:, 1].any()
 
 
 def test_fast_recordings_are_thinned() -> None:

@@ -10,7 +10,7 @@ import pytest
 from test_core_runs import REMEMBERING, finger
 
 from fit_finger import made_recording
-from tendonfmu.estimate.core_runs import CoreRuns, Direction
+from tendonfmu.estimate.core_runs import CoreRuns
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.law_slopes import LawSlopes
 from tendonfmu.estimate.slow_drift import SlowDrift
@@ -50,9 +50,9 @@ def test_they_are_the_differences_of_runs(rows: tuple[dict[str, Any], ...]) -> N
             continue
         moved = estimator.start.copy()
         moved[k] += 1e-4 * unknown.scale
-        change = estimator.values(moved) - estimator.values(estimator.start)
-        moves = {path: change[row] / 1e-4 for path, row in structure.index.items() if change[row]}
-        wanted = drift.without(runs.columns([Direction(moves)]))[:, :, 0]
+        begin, there = estimator.values(estimator.start), estimator.values(moved)
+        after = {path: there[row] for path, row in structure.index.items() if there[row] != begin[row]}
+        wanted = drift.without(runs.columns([(after, 1e-4)]))[:, :, 0]
         own = drift.without(slopes[:, :, [k]] * unknown.scale)[:, :, 0]
         if np.abs(wanted).max() > 1e-5:
             compared += 1

@@ -189,3 +189,23 @@ def test_the_angles_known_best(noise: float, stretch: float, source: str) -> Non
     away = best - angle
     assert (away - away.mean(axis=0)).std() < 1.1 * min(noise, 1e-2)
     assert found.recordings[0].kinematics == 2
+
+
+# --- covariance
+
+
+def test_factor_of_a_covariance_is_exact_and_survives_rounding() -> None:
+    rng = np.random.default_rng(7)
+    size = 10.0 ** rng.uniform(-9.0, 0.0, 40)  # units of very different size
+    columns = rng.standard_normal((30, 40)) / size  # data that know 30 combinations of 40 numbers
+    information, units = columns.T @ columns, np.outer(size, size)
+    factor, share = posterior_factor(information, np.diag(size**2))
+    expected = np.linalg.inv(np.eye(40) + information * units)
+    np.testing.assert_allclose(factor @ factor.T / units, expected, atol=1e-9)
+    np.testing.assert_allclose(factor.T @ information @ factor, np.diag(share), atol=1e-9)
+    # the inverse of what knows some numbers 1e6 times better than others has negative eigenvalues
+    factor, share = posterior_factor(1e11 * information, np.diag(size**2))
+    covariance = factor @ factor.T
+    std = np.sqrt(np.diag(covariance))
+    assert np.linalg.eigvalsh(covariance / np.outer(std, std)).min() > -1e-12
+    assert share.min() >= 0.0 and share.max() <= 1.0 and np.count_nonzero(share > 0.999) == 30

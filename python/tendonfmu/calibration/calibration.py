@@ -352,12 +352,11 @@ class _Run:
         """Fit the extended description to all recordings, and to four fifths of them."""
         case, options = self._case, self._options
 
-        finger = described(case.finger, lacks["extended"])
+        def fitted(data: Data, recordings: Sequence[FitRecording]) -> CalibratedFit:
+            return fit_all(described(case.finger, data), recordings, threads=options.jobs, seed=options.seed)
 
-        def fitted(recordings: Sequence[FitRecording]) -> CalibratedFit:
-            return fit_all(finger, recordings, threads=options.jobs, seed=options.seed)
-
-        whole, most = fitted(case.free), fitted(self._most())
+        whole = fitted(lacks["extended"], case.free)
+        most = fitted(whole.data, self._most())
         return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
 
     def _refit(self) -> dict[str, Any]:

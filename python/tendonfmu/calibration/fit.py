@@ -27,7 +27,7 @@ from tendonfmu.estimate import (
     read_previous_fit,
     settings_of,
     unknowns,
-    with_known_numbers,
+    with_learned_numbers,
     with_previous_values,
     with_values,
 )
@@ -62,7 +62,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     settings = replace(settings_of(finger.data, kept, threads), near=True)
     learned = learn_batch(structure, kept, Watch(None), settings, None)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-    result = with_known_numbers(result, kept)
+    result = with_learned_numbers(structure, learned, result)
     return CalibratedFit(result.data, events, tuple(learned.warnings))
 
 

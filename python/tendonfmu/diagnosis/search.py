@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
@@ -31,7 +31,7 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.view import View
-from tendonfmu.model import finger_from_data
+from tendonfmu.model import extension_rows, finger_from_data, moment_arms
 from tendonfmu.tasks import Phases, Step
 
 MOST_CAUSES = 8
@@ -119,7 +119,14 @@ class ExtensionSearch(CauseSearch):
         model = refitted(model, base.samples, base.settings, rough=True)
         if not base.least.shows_all(cause.effect, cause.terms, model.data):
             return Trial(cause, None, np.array([np.inf]))
-        return Trial(cause, model, base.look(model, ()).selection.base)
+        return Trial(cause, model, base.look(model, ()).selection.base / self._kept_torque(model))
+
+    def _kept_torque(self, model: FittedModel) -> float:
+        """Return which part of the torque's power corrections of sensors leave: less of it lowers any error."""
+        samples = self.base.samples
+        force = samples.drift.without(samples.grid.forces(samples.recordings))
+        now, before = (float(np.sum((force @ corrected_arms(each.data)) ** 2)) for each in (model, self.model))
+        return float(np.clip(now / before, 1e-12, 1.0)) if before > 0.0 else 1.0
 
     def _take(self, trial: Trial) -> bool:
         """Keep a further cause if it lowers the error on unseen stretches materially and certainly."""
@@ -157,6 +164,19 @@ class ExtensionSearch(CauseSearch):
                 named = self._named(cause, selection)
                 small += [named] if named.p_value < SIGNIFICANCE else []
         return small
+
+
+def corrected_arms(data: Data) -> Numbers:
+    """Return the moment arms with the corrections of a description's forces and arms, [m, n] (m)."""
+    arms = moment_arms(data)
+    corrected: Numbers = arms.copy()
+    for row in extension_rows(data):
+        tendon = slice(None) if row.get("tendon") is None else row["tendon"] - 1
+        if row["effect"] == "force_gain":
+            corrected[tendon] += row["correction"] * arms[tendon]
+        elif row["effect"] == "moment_arm":
+            corrected[tendon, row["joint"] - 1] += row["correction"]
+    return corrected
 
 
 def beside_calibration(trial: Trial, together: Cause | None) -> Trial:

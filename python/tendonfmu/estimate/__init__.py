@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns, Direction
+    from .core_runs import CoreRuns
     from .estimates import known_numbers
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .evaluation import evaluate
@@ -55,6 +55,6 @@ if TYPE_CHECKING:
         set_number,
         with_values,
     )
-    from .verdicts import Fitted, with_known_numbers
+    from .verdicts import Fitted, with_known_numbers, with_learned_numbers
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -23,18 +23,6 @@ from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 RATE = 400.0  # Hz; the samples of faster recordings are averaged, but not below this rate
 SETTLED = 1.0, 0.05  # s, and share of a stretch: until then what friction remembers is still unknown,
 TURNED, MOST = 0.1, 0.3  # and until every joint that turns has turned so far (rad), at most this share of the stretch
-STEP = 1e-4  # of a number's size: far above rounding, far below what moves many samples across a limit
-
-
-@dataclass(frozen=True)
-class Direction:
-    """A change of numbers, or of the description, whose effect is wanted."""
-
-    moves: Mapping[str, float]  # path -> change of the number per unit of the direction, SI units
-    step: float = STEP  # difference that the derivative is taken over, in units of the direction
-    central: bool = False  # whether a step is taken both ways, where the torque is curved
-    # description that has the numbers, if the finger itself lacks them; with its own values it leaves the same torque
-    data: Data | None = None
 
 
 @dataclass(frozen=True)
@@ -105,56 +93,26 @@ class CoreRuns:
         return other
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
-        """Return block means of τ − T.
-
-        Parameters
-        ----------
-        values
-            Numbers that differ from the description's, by path, SI units.
-
-        Returns
-        -------
-        ndarray
-            [B, n] (N·m).
-        """
+        """Return block means of τ − T, [B, n] (N·m). `values`: numbers that differ, by path, SI units."""
         parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
         return np.concatenate(list(parts)) + self.added
 
-    def columns(self, directions: Sequence[Direction], values: Mapping[str, float] | None = None) -> Numbers:
-        """Return the derivatives of `residual` by directions at `values`.
+    def columns(
+        self, moves: Sequence[tuple[Mapping[str, float], float]], values: Mapping[str, float] | None = None
+    ) -> Numbers:
+        """Return the differences of `residual` from that at `values` by p moves, per length of each, [B, n, p] (N·m).
 
-        Parameters
-        ----------
-        directions
-            What to move; p of them.
-        values
-            As of `residual`.
-
-        Returns
-        -------
-        ndarray
-            [B, n, p] (N·m per unit of the direction).
+        A move is the numbers that it changes, by path, after it, and its length.
         """
-        at = dict(values or {})
-        base = np.zeros(()) if all(direction.central for direction in directions) else self.residual(at)
-        images = [self._image if each.data is None else _image(each.data) for each in directions]
-        columns = np.empty((self.grid.blocks, self.joints, len(directions)))
-
-        def run(k: int, sign: float) -> Numbers:
-            moved = dict(at)
-            for path, change in directions[k].moves.items():
-                start = at[path] if path in at else self._instances.number(images[k], path)
-                moved[path] = start + sign * directions[k].step * change
-            return np.concatenate([self._left(images[k], moved, each) for each in self.stretches])
+        at, base = values or {}, self.residual(values)
+        columns = np.empty((*base.shape, len(moves)))
 
         def fill(k: int) -> None:
-            direction = directions[k]
-            if direction.central:
-                columns[:, :, k] = (run(k, 1.0) - run(k, -1.0)) / (2.0 * direction.step)
-            else:
-                columns[:, :, k] = (run(k, 1.0) + self.added - base) / direction.step
+            moved, length = moves[k]
+            left = np.concatenate([self._left(self._image, {**at, **moved}, each) for each in self.stretches])
+            columns[:, :, k] = (left + self.added - base) / length
 
-        list(self._pool.map(fill, range(len(directions))))
+        list(self._pool.map(fill, range(len(moves))))
         return columns
 
     def _left(self, image: bytes, values: Mapping[str, float], stretch: Stretch) -> Numbers:
@@ -182,14 +140,6 @@ class _Instances:
 
     def give(self, image: bytes, finger: native.Instance) -> None:
         self._idle[image].append(finger)
-
-    def number(self, image: bytes, path: str) -> float:
-        """Return a number of the description that an image is of."""
-        finger = self.take(image)
-        finger.reset()
-        value = finger.get(path)
-        self.give(image, finger)
-        return value
 
 
 def _image(data: Data) -> bytes:

@@ -132,7 +132,7 @@ class _Search:
         begin = self._numbers_of(estimator, form.data)
         problem = full_problem(structure, estimator, self._recordings, self._grid, self._threads)
         problem.mean, problem.known = guess_prior(problem)
-        found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE)
+        found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE, rough=True)
         return with_values(structure, estimator.values(problem.unknowns_at(found.state)))
 
     def simpler(self, first: Form, second: Form) -> Form:

@@ -18,18 +18,20 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.estimate.core_runs import STEP, CoreRuns, Direction
+from tendonfmu.estimate.core_runs import CoreRuns
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.law_slopes import LawSlopes
 from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
 
+STEP = 1e-4  # of a coordinate: far above rounding, far below what moves many samples across a limit
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number
 FARTHEST = float(np.log(1e6))  # of a logarithm from a number's magnitude
 FLOOR = 1e-3  # of a joint's torque: a residual's rms below it gives a joint no more weight
 LEAST_SPREAD = 0.04  # of the mean variance over the joints
-WELL = 0.5  # of the fall that the derivatives predict: below, they are computed anew
+WELL = 0.5  # of the fall that the derivatives predict: below, a step is bad
+PATIENCE = 4  # bad steps, until derivatives are computed anew
 RIGID = 1e12  # N/m
 LEAST_FALL = 3e-4  # of the cost, for each joint and effective block, in rough fits
 ROUNDS = 30  # of a step between bounds
@@ -149,7 +151,7 @@ class MemoryProblem:
         columns = self._last[2]
         products = np.zeros((columns.shape[2],) * 2)
         for j, share in enumerate(self.blocks / self.spread):
-            products += share * columns[:, j].T @ columns[:, j]
+            products += share * (columns[:, j].T @ columns[:, j])
         return self._of_columns(state, columns, products)
 
     def _of_columns(self, state: State, columns: Numbers, products: Numbers) -> Linearised:
@@ -160,14 +162,14 @@ class MemoryProblem:
         gradient = self._pull(columns, self._weight(state.residual) * state.residual)
         return Linearised(columns, products, information, gradient)
 
-    def moved_on(self, linearised: Linearised, state: State, step: Numbers, tried: State) -> Linearised:
-        """Return derivatives at `tried` that agree with the step [v] there from `state`: Broyden's update."""
+    def updated(self, linearised: Linearised, state: State, step: Numbers, tried: State, at: State) -> Linearised:
+        """Return derivatives at one of two states that agree with the step [v] between them: Broyden's update."""
         way = step / max(float(step @ step), 1e-300)
         missed = tried.residual - state.residual - linearised.columns @ step
         weighted = missed * self.blocks / self.spread
         pull = np.outer(self._pull(linearised.columns, weighted), way)
         products = linearised.products + pull + pull.T + np.sum(missed * weighted) * np.outer(way, way)
-        return self._of_columns(tried, linearised.columns + missed[:, :, None] * way, products)
+        return self._of_columns(at, linearised.columns + missed[:, :, None] * way, products)
 
     def _pull(self, columns: Numbers, values: Numbers) -> Numbers:
         """Return [v] the products of derivatives with values [R, n]."""
@@ -189,18 +191,19 @@ class MemoryProblem:
 
     def _columns(self, u: Numbers, span: Numbers) -> Numbers:
         """Return [B, n, v] the derivatives of τ − T by directions [u, v] of u (N·m): by runs where laws have none."""
-        here, z = self.values(u), np.clip(self.scale.unknowns(u), *self.bounds)
-        columns = self._laws.at(z) * self.scale.slopes(z)
+        z = np.clip(self.scale.unknowns(u), *self.bounds)
+        columns = self._laws.at(z)
+        columns *= self.scale.slopes(z)
         if span.shape[1] < len(u):
             columns = columns @ span
         rest = np.where(self._by_runs[:, None], span, 0.0)
         moved = np.flatnonzero(rest.any(axis=0))
-        directions = [self._direction(way, u, here) for way in rest.T[moved]]
-        columns[:, :, moved] += self.runs.columns(directions, self._of_description(here))
+        moves = [self._move(way, u) for way in rest.T[moved]]
+        columns[:, :, moved] += self.runs.columns(moves, self._of_description(self.values(u)))
         return columns
 
     def over(self, runs: CoreRuns) -> MemoryProblem:
-        """Return the problem over other runs of the same samples."""
+        """Return the problem over other runs, for derivatives only."""
         other = copy(self)
         other.runs, other._laws, other._last = runs, LawSlopes(self._structure, runs), None
         return other
@@ -220,12 +223,11 @@ class MemoryProblem:
         scores = sums / self.scale.slopes(self.scale.unknowns(state.u))
         return scores - scores.mean(axis=0), length
 
-    def _direction(self, way: Numbers, u: Numbers, here: Mapping[str, float]) -> Direction:
-        """Return the move along a way [u], backwards where it would cross a bound."""
+    def _move(self, way: Numbers, u: Numbers) -> tuple[dict[str, float], float]:
+        """Return the numbers a step along a way [u], and its length; it is backwards where it would cross a bound."""
         step = STEP * max(1.0, float(np.abs(u[(way != 0.0) & ~self.scale.log]).max(initial=0.0)))
         step = -step if (u + step * way > self.upper)[way != 0.0].any() else step
-        there = self._of_description(self.values(u + step * way))
-        return Direction({path: (there[path] - here[path]) / step for path in there if there[path] != here[path]}, step)
+        return self._of_description(self.values(u + step * way)), step
 
     def without(self, state: State, path: str) -> float:
         """Return the cost at a state without a relaxation time, and all that share it, or with rigid cords."""
@@ -264,12 +266,12 @@ def minimise(
 ) -> Minimum:
     """Go down from a state, in at most `most` steps, until a step is below `tolerance` standard errors (rms).
 
-    Derivatives are computed anew when steps with Broyden's update (Math. Comp. 19, 1965) no longer go down well. A
-    rough end has updated ones.
+    Every step, good or bad, corrects the derivatives (Broyden, Math. Comp. 19, 1965). They are computed anew after some
+    bad ones, and near the end. A rough end has corrected ones.
     """
     state, damping, number, converged, span = begin, DAMPING[0], 0, False, problem.span
     least = LEAST_FALL * float(problem.blocks.sum()) if rough else 0.5 * tolerance**2
-    linearised, is_fresh = problem.linearised(state), True
+    linearised, is_fresh, bad = problem.linearised(state), True, 0
     while number < most:
         number += 1
         gradient = linearised.gradient + span.T @ problem.known @ (state.u - problem.mean)
@@ -280,21 +282,19 @@ def minimise(
         expected = -float(gradient @ step + 0.5 * step @ matrix @ step)
         fall = state.cost - tried.cost
         is_small = step @ matrix @ step < tolerance**2 * len(step) or abs(fall) < least
-        if fall > 0.0:
-            linearised = problem.moved_on(linearised, state, step, tried)
-            state, damping = tried, max(damping / 5.0, DAMPING[1])
-            if watch is not None:
-                watch(number, state)
-        else:
-            damping *= 8.0
+        is_good = fall > WELL * expected
+        better = tried if fall > 0.0 else state
+        linearised, state = problem.updated(linearised, state, step, tried, better), better
+        damping = max(damping / 5.0, DAMPING[1]) if is_good else damping if fall > 0.0 else 8.0 * damping
+        if fall > 0.0 and watch is not None:
+            watch(number, state)
         if (is_small and (is_fresh or rough)) or damping > DAMPING[2]:
             converged = True
             break
-        is_good = fall > WELL * expected
-        if is_good and not is_small:
-            is_fresh = False
-        elif not is_fresh or fall > 0.0:
-            linearised, is_fresh = problem.linearised(state), True
+        bad = 0 if is_good else bad + 1
+        is_fresh = is_small or bad > PATIENCE
+        if is_fresh:
+            linearised, bad = problem.linearised(state), 0
     return Minimum(state, linearised if rough else problem.linearised(state), number, converged)
 
 

@@ -1,9 +1,9 @@
 """The method `batch` for a finger whose friction remembers: starts, weights, prior and uncertainty about `memory_fit`.
 
 1. From each start of the memory's numbers (`memory.starts`) a few steps on evenly spread windows of the recordings.
-2. The best is refined on all of them. A prior that held it back here would make the errors of a wrong model last.
-3. The residuals say how many independent blocks they are worth, and the prior is the one under which the data are most
-   likely (`prior`). With both the better one is refined again.
+2. The best is refined on `FITTED_TIME`. A prior that held it back here would make the errors of a wrong model last.
+3. The residuals of all samples say how many independent blocks they are worth, and the prior is the one under which the
+   data are most likely (`prior`). With both it is refined on all samples, if they are many with few derivatives.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.learning import FitProgress, Interrupted, Learned, MemoryEvidence, Settings, Watch
 from tendonfmu.estimate.memory import starts
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, State, minimise
-from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
+from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely, posterior_factor
 from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
@@ -29,8 +29,10 @@ from tendonfmu.statistics import sample_weights
 STEP = 0.02  # s, blocks of a fit: friction changes in tens of milliseconds
 COARSE_RATE = 200.0  # Hz: averaged samples leave 0.1 to 0.4 mN·m (elements with relaxation within 2 ms) more
 COARSE_TIME, WINDOW = 30.0, 10.0  # s in all, and of a window: enough to tell starts apart
+FITTED_TIME = 240.0  # s of windows that a long fit is made on, before it is refined on all samples
 ROUGH_STEPS, COARSE_STEPS, POLISHED = 14, 8, 2  # from each start; of the best ones with all numbers; how many these are
 SAME = 0.3  # of a logarithm
+NEAR = 0.3  # standard errors (rms) if each block counted: where a fit is refined
 FACTOR = np.log(10.0)  # expected error of a logarithm: nobody knows these numbers better than by a factor
 _MOVES = 0.05  # of the largest speed of a joint: what is slower is no stroke
 
@@ -168,17 +170,25 @@ def minimum_from_starts(
     begin: Numbers,
     settings: Settings,
     shown: Shown = no_show,
-) -> tuple[MemoryProblem, Minimum]:
-    """Fit from several starts with each block counting as one, under the prior of guesses."""
+) -> tuple[MemoryProblem, State, int]:
+    """Fit windows roughly from several starts, each block counting as one, under the prior of guesses.
+
+    Returns the problem of all samples, its state there, and the number of steps.
+    """
     threads, tolerance = settings.options.threads, settings.options.tolerance
     grid = make_grid(recordings, STEP)
-    problem = full_problem(structure, estimator, recordings, grid, threads)
-    problem.mean, problem.known = guess_prior(problem)
+    whole = full_problem(structure, estimator, recordings, grid, threads)
+    part = windows(grid, FITTED_TIME)
+    problem = whole if part is grid else full_problem(structure, estimator, recordings, part, threads)
+    for each in (whole, problem):
+        each.mean, each.known = guess_prior(each)
     u = problem.scale.coordinates(begin)
     if not settings.near:
         coarse = coarse_problem(structure, estimator, recordings, grid, threads)
         u = from_starts(coarse, begin, tolerance, shown(coarse, "starts"))[0].u
-    return problem, minimise(problem, problem.state(u), settings.passes, tolerance, shown(problem, "all samples"))
+    watch = shown(problem, "windows" if problem is not whole else "all samples")
+    found = minimise(problem, problem.state(u), settings.passes, max(tolerance, NEAR), watch)
+    return whole, found.state if problem is whole else whole.state(found.state.u), found.steps
 
 
 # --- the method -------------------------------------------------------------------------------------------------------
@@ -207,37 +217,36 @@ def learn_with_memory(
         return show
 
     try:
-        problem, first = minimum_from_starts(structure, estimator, recordings, begin, settings, shown)
-        return _weighted(problem, first, recordings, settings, shown, lambda: passes)
+        problem, first, steps = minimum_from_starts(structure, estimator, recordings, begin, settings, shown)
+        last, prior, shares = _weighted(problem, first, settings, shown)
+        weights = _weights(problem, recordings, shares)
+        return learned_of(problem, last, prior, settings.options.prior, weights, steps, passes)
     except KeyboardInterrupt:
         raise Interrupted(estimator, begin, float("nan"), by_user=True) from None
 
 
 def _weighted(
-    problem: MemoryProblem,
-    first: Minimum,
-    recordings: Sequence[FitRecording],
-    settings: Settings,
-    shown: Shown,
-    passes: Callable[[], int],
-) -> Learned:
-    """Refine a minimum with the effective number of blocks and the most likely prior."""
-    prior = coordinate_prior(problem, settings)
-    given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(problem.runs.grid.segments)
+    problem: MemoryProblem, first: State, settings: Settings, shown: Shown
+) -> tuple[Minimum, Prior, list[Numbers]]:
+    """Refine a state with the effective number of blocks and the most likely prior.
+
+    Returns minimum, prior, and by stretch [n] the share of an independent block that each block counts for.
+    """
+    prior, grid = coordinate_prior(problem, settings), problem.runs.grid
+    given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(grid.segments)
     if settings.effective:
-        problem.blocks, shares = effective_blocks(problem, first.state)
-    problem.reweighted(first.state)
+        problem.blocks, shares = effective_blocks(problem, first)
+    problem.reweighted(first)
     if given is None:
-        now = problem.linearised(first.state)
-        pull = now.information @ (first.state.u - problem.mean) - now.gradient
+        now = problem.linearised(first)
+        pull = now.information @ (first.u - problem.mean) - now.gradient
         covariance = most_likely(now.information, pull, prior)
     else:
         covariance = prior.of_spread(given)
     problem.known = inverse(covariance)
-    again = problem.reweighted(first.state)
-    tolerance, show = settings.options.tolerance, shown(problem, "effective samples")
-    last = minimise(problem, again, settings.passes, tolerance, show)
-    return learned_of(problem, last, prior, given, _weights(problem, recordings, shares), first.steps, passes())
+    again, is_long = problem.reweighted(first), windows(grid, FITTED_TIME) is not grid
+    show = shown(problem, "effective samples")
+    return minimise(problem, again, settings.passes, settings.options.tolerance, show, rough=is_long), prior, shares
 
 
 def learned_of(
@@ -254,10 +263,11 @@ def learned_of(
     turn = problem.scale.slopes(z)
     information, both = last.linearised.information, np.outer(turn, turn)
     known = prior.reported(given)
+    factor, _ = posterior_factor(information, known)
     return Learned(
         estimator=problem.estimator,
         z=z,
-        covariance=both * np.linalg.inv(information + inverse(known)),
+        covariance=both * (factor @ factor.T),
         prior=both * known,
         information=information / both,
         cost=last.state.cost,

@@ -61,15 +61,34 @@ class Prior:
 
     def posterior(self, information: Numbers) -> Numbers:
         """Return the covariance [u, u] of the estimate by the information [u, u] of the data and what was known."""
-        return np.asarray(np.linalg.inv(information + inverse(self.reported(None))), dtype=np.float64)
+        factor, _ = posterior_factor(information, self.reported(None))
+        return np.asarray(factor @ factor.T)
 
 
 def inverse(covariance: Numbers) -> Numbers:
     """Invert a covariance whose correlations are rounded: no direction counts as better known than by 1e-6."""
+    root, value, turn = _parts(covariance)
+    turned = turn / root[:, None]
+    return np.asarray((turned / value) @ turned.T)
+
+
+def posterior_factor(information: Numbers, covariance: Numbers) -> tuple[Numbers, Numbers]:
+    """Return F and [u] the shares s: F Fᵀ = (I + C⁻¹)⁻¹ and Fᵀ I F = diag(s), by the data's I and what was known, C.
+
+    F is made of I in units of C, free of a negative eigenvalue that rounding leaves where the data know nothing.
+    """
+    root, value, turn = _parts(covariance)
+    half = root[:, None] * turn * np.sqrt(value)
+    known, turn = np.linalg.eigh(half.T @ information @ half)
+    known = np.maximum(known, 0.0)
+    return half @ turn / np.sqrt(1.0 + known), known / (1.0 + known)
+
+
+def _parts(covariance: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Return standard deviations [u], and eigenvalues [u] and eigenvectors [u, u] of the correlations."""
     root = np.sqrt(np.diag(covariance))
     value, turn = np.linalg.eigh(covariance / np.outer(root, root))
-    turned = turn / root[:, None]
-    return np.asarray((turned / np.maximum(value, 1e-6)) @ turned.T)
+    return root, np.maximum(value, 1e-6), turn
 
 
 def most_likely(information: Numbers, pull: Numbers, prior: Prior) -> Numbers:

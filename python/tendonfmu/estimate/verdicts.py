@@ -135,7 +135,11 @@ def with_known_numbers(finger: Finger, recordings: Sequence[FitRecording]) -> Fi
     if not unknowns(finger.data):
         return finger
     structure = build_structure(finger, Choice())
-    learned = learned_at(structure, recordings)
+    return with_learned_numbers(structure, learned_at(structure, recordings), finger)
+
+
+def with_learned_numbers(structure: Structure, learned: Learned, finger: Finger) -> Finger:
+    """Return a fitted finger with `estimated`: what its fit tells of its numbers."""
     numbers, matrix = number_slopes(structure, learned, finger)
     noise = number_of(finger.data, "bias.noise_std")
     return with_estimates(finger, numbers, matrix @ learned.covariance @ matrix.T, sizes_of(numbers, noise))

@@ -26,6 +26,7 @@ SLOW_RATE, FAST_RATE = 50.0, 5000.0  # samples per second; the model's events ne
 # m, rad, rad; a channel is stuck only if it should have moved by more
 _MOVES = {"tendon_position": 2e-4, "joint_position": 0.02, "joint_velocity": 0.05}
 FEWEST_LEARNED = 100  # samples of motion for each channel that a value is learned from
+MOST_LEARNED = 20_000  # samples that this is learned from, evenly spread
 _FORCE_SHARE = 0.1  # of a tendon's mean force; a force is stuck only if the others change by more
 _OF_RANGE = 0.05  # of the range in the whole recording; a channel is stuck only if it should have moved by more
 
@@ -127,9 +128,10 @@ def stuck_sensors(recording: Recording, finger: Finger) -> dict[str, list[StuckS
         if name == "tendon_force":
             sensors = list(_stuck_force(recording.groups["tendon_force"], k, runs))
         else:
-            expected = [expected_values(recording, finger, name, k), _learned_values(recording, name, k, runs)]
-            if expected[0] is not None:
-                sensors = list(_stuck(name, recording.groups[name], k, [of for of in expected if of is not None], runs))
+            expected = expected_values(recording, finger, name, k)
+            if expected is not None:
+                known = [expected, _learned_values(recording, name, k, runs)]
+                sensors = list(_stuck(name, recording.groups[name], k, [of for of in known if of is not None], runs))
         if sensors:
             stuck[f"{name}[{k + 1}]"] = sensors
     return stuck
@@ -165,6 +167,7 @@ def _learned_values(recording: Recording, group: str, k: int, runs: Runs) -> Num
     if len(rows) < FEWEST_LEARNED * known.shape[1]:
         return None
     known /= np.maximum(np.abs(known).max(axis=0), 1e-12)
+    rows = rows[:: max(1, len(rows) // MOST_LEARNED)]
     weights = np.linalg.lstsq(known[rows], recording.groups[group][rows, k], rcond=1e-9)[0]
     return np.asarray(known @ weights)
 
