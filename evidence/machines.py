@@ -274,7 +274,7 @@ def published(_folder: Path, _workers: int) -> Figures:
     recordings = [emps_run(name) for name in (PLAIN, PULSES)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = partial(tf.fit, recordings=recordings[0], kinematics=ENCODER, uncertainty=False)
+        fit = partial(tf.fit, recordings=recordings[0], kinematics=ENCODER)
         symmetric = fit(HERE / "emps" / "symmetric.json").finger
         # with two sides of the law the offset cannot be told from the difference of their Coulomb parts
         asymmetric = fit(HERE / "emps" / "asymmetric.json", fix="bias.initial_torque").finger
