@@ -1,16 +1,24 @@
-"""Which pushes are found without a touch sensor, and where on the finger? On the virtual hand (hand.py)."""
+"""Which pushes are found without a touch sensor, where on the finger, and is a failing sensor told from a push?
+
+On the product's own virtual hand (hand.py), and on fingers in MuJoCo (evidence/families), which share no code with it.
+"""
 
 from __future__ import annotations
 
+import itertools
 import json
+import resource
+import subprocess
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from evidence import table
-from evidence.cases import INDEX_RIG, run_cases
+from evidence.cases import INDEX_RIG, run_cases, write
 from evidence.contact import hand
+from evidence.contact.sensor_faults import fault_table, judged_faults
 from evidence.part import Figures, Part
 from evidence.table import Row
 from tendonfmu.arrays import Flags, Numbers
@@ -180,6 +188,75 @@ def virtual_hand(folder: Path, workers: int) -> Figures:
     return summary(rows, free_rms(folder)) | places([row for case in touched for row in case["rows"]])
 
 
+# --- fingers in MuJoCo ------------------------------------------------------------------------------------------------
+
+FINGERS = (3, 19)  # odd seeds: nothing is hidden; the weight of a link is
+
+
+def calibrated(folder: Path, number: int) -> Path:
+    """Folder of what `tendonfmu calibrate` made of a finger; `cpu.json` in it is the processor time, s."""
+    from evidence.contact import pushed_fingers
+
+    into = folder / f"calibrated_{number:02d}"
+    if not (into / "cpu.json").exists():
+        pushed_fingers.make(folder, number)
+        free, pushed = (
+            [
+                str(pushed_fingers.place(folder, number, *one))
+                for one in itertools.product(kinds, pushed_fingers.PRETENSIONS)
+            ]
+            for kinds in (pushed_fingers.FREE, pushed_fingers.PUSHED)
+        )
+        description = pushed_fingers.description_file(folder, number)
+        command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(description), *free, "--pushes", *pushed]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([*command, "-o", str(into), "--no-progress"], check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        write(into / "cpu.json", json.dumps(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+    return into
+
+
+def finger_case(folder: Path, number: int) -> Row:
+    """What `calibrate` reports of a finger. Sizes are in multiples of the free residual's rms."""
+    into = calibrated(folder, number)
+    report = json.loads((into / "calibration.json").read_text(encoding="utf-8"))
+    pushes = report["pushes"]
+    sizes = {f"{size['from']:g}": [size["found"], size["events"]] for size in pushes["sizes"]}
+    return {
+        "finger": number,
+        "large": sizes.get("6", [0, 0]),
+        "small": sizes.get("3", [0, 0]),
+        "alarms": pushes["false_alarms"],
+        "promised": report["detection"]["kept_out"]["interval"][1] * pushes["free_minutes"] / 60.0,
+        "minutes": pushes["free_minutes"],
+        "delay": 1e3 * pushes["median_delay_s"],
+        "cpu": json.loads((into / "cpu.json").read_text(encoding="utf-8")),
+    }
+
+
+def fingers(folder: Path, workers: int) -> Figures:
+    cases = {f"finger_{number:02d}": (folder, number) for number in FINGERS}
+    rows = run_cases(finger_case, cases, folder, workers)
+    missed = sum(row["large"][1] - row["large"][0] for row in rows)
+    return {"missed": missed, "rows": rows, "sensor_faults": judged_faults(folder, workers)}
+
+
+def fingers_table(figures: Figures) -> str:
+    lines = [
+        [
+            str(row["finger"]),
+            *("{}/{}".format(*row[size]) for size in ("large", "small")),
+            f"{row['alarms']} in {row['minutes']:.1f}",
+            f"{row['promised']:.1f}",
+            f"{row['delay']:.0f}",
+            f"{row['cpu']:.0f}",
+        ]
+        for row in figures["rows"]
+    ]
+    head = ["finger", "≥ 6 × rms", "3 to 6 × rms", "false alarms in min", "promised at most", "median delay, ms"]
+    return table.table([*head, "CPU time of `calibrate`, s"], lines)
+
+
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 LINK_HEAD = ["pretension, N", "push", "in contact", "not named (−1), %", "on `contact_link` or beyond, %"]
@@ -203,5 +280,16 @@ PARTS: dict[str, Part] = {
             "links": table.of_cells("links", LINK_HEAD, 2),
             "forces": table.of_cells("forces", FORCE_HEAD),
         },
+    ),
+    "fingers": Part(
+        fingers,
+        minutes=20.0,
+        needs=("mujoco",),
+        headlines={
+            "missed": (0, 1),
+            "sensor_faults.share": (98.0, 100.0),
+            "sensor_faults.sound_faults": (0, 0),
+        },
+        tables={"fingers": fingers_table, "faults": fault_table},
     ),
 }

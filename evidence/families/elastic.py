@@ -136,6 +136,11 @@ class Mechanism:
             friction[hidden.j] += hidden.size * tension[self.first].sum()
         self.model.dof_frictionloss[self.hinges] = friction * drift(hidden, t)
 
+    def outside(self, t: float, angle: Array) -> Array:
+        """[n] N·m on the joints that MuJoCo has no element for, as they act."""
+        velocity = self.data.qvel[self.hinges][None]
+        return np.asarray(-extra_torque(self.hidden, np.array([t]), angle[None], velocity, self.crept)[0])
+
     def advance(self, t: float, motors: Array) -> tuple[Array, Array]:
         """One tick: angle and force at its beginning."""
         data = self.data
@@ -143,15 +148,19 @@ class Mechanism:
         tension, angle = self.tension(), data.qpos[self.hinges].copy()
         self.rub(t, tension)
         self.crept += TICK * (angle - self.crept) / CREEP
-        extra = extra_torque(self.hidden, np.array([t]), angle[None], data.qvel[self.hinges][None], self.crept)
-        data.qfrc_applied[self.hinges] = -extra[0]
+        data.qfrc_applied[self.hinges] = self.outside(t, angle)
         mujoco.mj_step(self.model, data, round(TICK / STEP))
         return angle, tension[self.first]
 
 
 def simulate(finger: Finger, hidden: Hidden, motion: Motion, seconds: float) -> Trace:
     """True signals at RATE; the first SETTLE seconds are left out."""
-    mechanism = Mechanism(finger, hidden)
+    return moved(Mechanism(finger, hidden), motion, seconds)
+
+
+def moved(mechanism: Mechanism, motion: Motion, seconds: float) -> Trace:
+    """The same of a mechanism."""
+    finger = mechanism.finger
     before = round(SETTLE / TICK)
     time = np.asarray(TICK * np.arange(-before, round(seconds / TICK)), dtype=float)
     motors = motion.angles(time) @ finger.arms.T + motion.pull(time)[:, None] / finger.stiffness
