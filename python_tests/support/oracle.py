@@ -404,11 +404,14 @@ class FingerOracle:
             self.branches["noise_time"] += 1
         self.P = self.P + self.drift_variance * dt
         self.branches["gain_zero_of_zero"] += int((self.P + noise == 0.0).sum())
-        K = np.array([P / (P + noise) if P + noise != 0.0 else 0.0 for P in self.P])
+        K, of_all = (
+            np.array([P / (P + noise) if P + noise != 0.0 else 0.0 for P in self.P + more])
+            for more in (0.0, self.detector.unknown**2 / 3.0)
+        )
         self.P = (1.0 - K) * self.P
         # all joints have one K: one start, one drift, one noise
         self.absorbed += LARGEST_ABSORPTION if K[0] >= 1.0 else min(LARGEST_ABSORPTION, -math.log(1.0 - K[0]))
-        return K
+        return of_all
 
     def _inhibit(self, time: float) -> None:
         """Contact: P stays, the rest counts as begun now (fig. 5, t1 = t)."""

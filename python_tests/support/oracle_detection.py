@@ -112,6 +112,7 @@ class Detector:
             raise ValueError("contact.bands: 4 rows, with the method bands alone")
         self.watches_motors = bool(given(contact, "watches_motors", False))
         self.joints = [Joint() for _ in range(n)]
+        self.unknown = np.zeros(n)  # max(V, W) before this sample; 0 with the paper's method
         self.in_contact = np.zeros(n, dtype=bool)
         self.level = np.zeros(n)
         self.terms = np.zeros((n, len(SHORT), 8))
@@ -121,6 +122,7 @@ class Detector:
     ) -> Array:  # fmt: skip
         """Step 5: joint_contact [n]. anew [n]: joints that begin with this sample or are blind."""
         before = bool(self.in_contact.any())
+        self.unknown = np.array([max(joint.V, joint.turned) for joint in self.joints])
         self.level, self.terms = np.zeros(self.n), np.zeros((self.n, len(SHORT), 8))
         found = np.zeros(self.n, dtype=bool)
         for j in range(self.n):

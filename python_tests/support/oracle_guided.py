@@ -32,6 +32,7 @@ class GuidedOracle(FingerOracle):
         predicted = self.P + self.drift_variance * dt
         self.S = predicted + noise * scale
         if self.learns:
+            self.detector.unknown = np.zeros(self.n)
             return super()._gain(dt, noise, time, contact)
         self.P = predicted
         return np.zeros(self.n)

@@ -187,7 +187,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   double** const joint_rows[] = {&s->angle,     &s->torque,           &s->friction,      &s->bias_step,
                                  &s->load,      &s->joint_friction,   &s->load_friction, &s->joint_bias,
                                  &s->load_bias, &s->residual_variance};
-  double** const band_rows[] = {&s->slip_torque, &s->limit, &s->motor_load};
+  double** const band_rows[] = {&s->slip_torque, &s->limit, &s->motor_load, &s->unknown};
   double** const limit_rows[] = {&s->edge_limit, &s->pulley_limit};
   const int banded = (f->shape.options & MODEL_DETECTS_BY_BANDS) != 0;
   double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,

@@ -232,6 +232,7 @@ typedef struct finger_scratch {
   double *edge_limit, *pulley_limit; /* [n × M + N] |F| of the law, whether it acts or not; joints T_jv0, T_jvf */
   double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
   double* motor_load;                /* [N] x, N·m */
+  double* unknown;                   /* [N] max(V, W) before this sample, N·m */
   band_shares shares;                /* of the last step */
   double* residual_variance;         /* [N] S, (N·m)²; of a guided sample only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */

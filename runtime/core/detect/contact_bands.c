@@ -101,6 +101,10 @@ static void follow_sample(band_memory* joint, const band_sample* sample, const b
   joint->limit = sample->limit;
 }
 
+double band_unknown(const band_memory* joint) {
+  return larger(joint->unknown, joint->turned);
+}
+
 void band_terms(const band_memory* joint, size_t band, double* terms) {
   const double mean = joint->mean[band], change = mean - joint->reference[band];
   const double from_home = change < 0.0 ? joint->home - mean : mean - joint->home;
@@ -121,7 +125,7 @@ static void find_squares(const band_memory* joint, size_t band, const double num
                          double* bound) {
   double terms[BAND_TERMS];
   band_terms(joint, band, terms);
-  const double unknown = larger(joint->unknown, joint->turned);
+  const double unknown = band_unknown(joint);
   *bound = unknown * unknown;
   for (size_t i = 0; i < BAND_NUMBERS; ++i) {
     *bound += numbers[i] * (terms[2 + i] * terms[2 + i]);

@@ -58,6 +58,9 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
 int band_decide(band_memory* joint, const band_sample* sample, double time, double step, int before, double level,
                 size_t band);
 
+/* max(V, W): friction whose state nobody knows, N·m. */
+double band_unknown(const band_memory* joint);
+
 /* The terms of a band [BAND_TERMS]. */
 void band_terms(const band_memory* joint, size_t band, double* terms);
 

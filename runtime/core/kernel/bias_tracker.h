@@ -212,6 +212,15 @@ COLD_STATIC void predict_residual(tendonfmu_finger* f, double step, double noise
   }
 }
 
+/* P⁻ and the variance of friction whose state nobody knows, four joints: it is distributed evenly */
+HOT_INLINE quad with_unknown(const tendonfmu_finger* f, size_t j, quad variance) {
+  if (!f->derived.settings.has_bands || f->guide.guides) {
+    return variance;
+  }
+  const quad unknown = quad_load(f->scratch.unknown + j);
+  return quad_add(variance, quad_mul(quad_mul(unknown, unknown), quad_set(1.0 / 3.0)));
+}
+
 /* friction and bias take a share of the residual, four joints */
 HOT_INLINE void learn_share(tendonfmu_finger* f, size_t j, quad gain) {
   const finger_state* s = &f->remembered;
@@ -226,11 +235,11 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0), noise_variance = quad_set(noise);
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
-  _Alignas(32) double gains[4] = {0.0}; /* the same at all joints */
+  _Alignas(32) double gains[4] = {0.0}; /* without what is unknown the same at all joints */
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
     const quad gain = kalman_gain(predicted, noise_variance);
-    learn_share(f, j, gain);
+    learn_share(f, j, kalman_gain(with_unknown(f, j, predicted), noise_variance));
     quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
     quad_store(gains, gain);
   }

@@ -59,6 +59,7 @@ HOT_INLINE int exceed_bands(tendonfmu_finger* f, double time, double step) {
   int any = 0;
   band_find_shares(&f->scratch.shares, step);
   for (size_t j = 0; j < f->joints; ++j) {
+    f->scratch.unknown[j] = band_unknown(bands_of(f, j));
     if (f->derived.settings.watches_sensors && s->watch[j] != JOINT_WATCHED) {
       begin_bands(f, j, time);
       continue;
