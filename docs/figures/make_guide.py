@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from PIL import Image
+from PIL import Image, ImageChops
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parents[1] / "examples"
@@ -82,20 +82,23 @@ def photograph(page: Path, height: int, place: str = "") -> Path:
     # figures are drawn after the page has loaded
     options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
     options.append(f"--window-size=1280,{height}")
+    styles = ".modebar { display: none }"
     if place:  # a page that is scrolled is photographed white, so all else is hidden
         shown = ", ".join(f"#{each}, #{each} *" for each in (place, "js-plotly-tester"))  # which measures texts
-        others = f"<style>body *:not(:has(#{place}), {shown}) {{ display: none !important }}</style>"
-        page = page.with_stem(place)
-        page.write_text(picture.with_suffix(".html").read_text("utf-8") + others, encoding="utf-8")
-    command = [browser, *options, f"--screenshot={picture}", page.as_uri()]
+        styles += f" body *:not(:has(#{place}), {shown}) {{ display: none !important }}"
+    copy = page.with_stem(f"{page.stem}_{place}")
+    copy.write_text(f"{page.read_text('utf-8')}<style>{styles}</style>", encoding="utf-8")
+    command = [browser, *options, f"--screenshot={picture}", copy.as_uri()]
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     return picture
 
 
 def keep(picture: Path, target: Path) -> None:
-    """Shrunk to WIDTH and COLOURS."""
+    """Without white below, shrunk to WIDTH and COLOURS."""
     with Image.open(picture) as image:
         small = image.convert("RGB")
+        drawn = ImageChops.invert(small).getbbox() or (0, 0, *small.size)
+        small = small.crop((0, 0, small.width, min(small.height, drawn[3] + 20)))
         if small.width > WIDTH:
             small = small.resize((WIDTH, round(small.height * WIDTH / small.width)), Image.Resampling.LANCZOS)
         small.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)

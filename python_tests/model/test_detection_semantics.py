@@ -289,17 +289,6 @@ def test_contact_at_any_joint_holds_all_references(runner: Runner) -> None:
 # --- bias, rates, states
 
 
-def test_the_bias_follows_slowly_in_contact(runner: Runner) -> None:
-    """1 − exp(−dt/10 s) of r at every joint; P stays."""
-    e = np.array([0.0] * 4 + [0.1] * 6)
-    out = of(runner, bands([1e-3] * 4), np.arange(10) * 0.125, e, bias=HALF)
-    assert contact_of(out) == [0] * 4 + [1] * 6
-    kept = math.exp(-0.125 / 10.0) ** np.arange(1, 7)
-    close(out["bias_torque"][4:, 0], 0.1 + 0.1 * (1.0 - kept))
-    close(out["residual"][4:, 0], 0.1 * np.concatenate([[1.0], kept[:-1]]))
-    close(out["compensated_torque_std"][4:, 0], out["compensated_torque_std"][3, 0])
-
-
 def test_the_sample_rate_leaves_no_trace(runner: Runner) -> None:
     """Pushes that rise within 30 ms, at 1 kHz and at 500 Hz."""
     time = np.arange(0.0, 3.0, 0.001)

@@ -398,7 +398,7 @@ class FingerOracle:
         """What step 6 takes of r, per joint; updates P."""
         if contact:
             self._inhibit(time)
-            return np.full(self.n, self.detector.leak(dt))
+            return np.zeros(self.n)
         if self.noise_time is not None:
             noise = noise * float(self.noise_time) / dt
             self.branches["noise_time"] += 1

@@ -91,7 +91,7 @@ class Joint:
 
 
 class Detector:
-    """Decides on contact. `take` once a sample; then level [n], terms [n, 4, 8] and leak are those of the sample."""
+    """Decides on contact. `take` once a sample; then level [n] and terms [n, 4, 8] are those of the sample."""
 
     def __init__(self, description: Mapping[str, Any], R: Array, branches: Counter[str]) -> None:
         n = R.shape[1]
@@ -135,10 +135,6 @@ class Detector:
                 found[j] = not anew[j] and out.above(("contact", j), distance, bound)
         self.in_contact = found
         return found
-
-    def leak(self, dt: float) -> float:
-        """The share of r that the bias learns in contact."""
-        return 1.0 - math.exp(-dt / LEAK) if self.by_bands else 0.0
 
     def std(self, P: Array, mean_force: float) -> Array:
         """Step 7, [n] N·m."""

@@ -357,15 +357,14 @@ static void linearise_forces(linearisation* l, const double* direction) {
   }
 }
 
-/* what the bias took at the last sample: d(K·r), where the gain of the Kalman filter, not that in contact, varies with
- * the mean tendon force */
+/* what the bias took at the last sample: d(K·r), where the gain of the Kalman filter varies with the mean tendon force
+ */
 static double correction_slope(const linearisation* l, size_t j, double residual_slope) {
   const finger_settings* settings = &l->finger->derived.settings;
   const finger_state* s = &l->finger->remembered;
   const double noise = settings->noise_std + settings->noise_std_per_force * l->mean_force;
   /* dK·r = −K·(1 − K)·r·dN/N with N the noise variance, and (1 − K)·r is the compensated torque */
-  const int filters = noise > 0.0 && s->scalar[STATE_CONTACT] == 0.0;
-  const double relative = filters ? 2.0 * settings->noise_std_per_force * l->mean_force_slope / noise : 0.0;
+  const double relative = noise > 0.0 ? 2.0 * settings->noise_std_per_force * l->mean_force_slope / noise : 0.0;
   return s->gain[j] * (residual_slope - s->compensated[j] * relative);
 }
 

@@ -46,10 +46,6 @@ void band_find_shares(band_shares* shares, double step) {
   shares->unknown = 1.0 - share_of(step, UNKNOWN_TIME);
 }
 
-double band_bias_share(const band_shares* shares) {
-  return shares->held[0];
-}
-
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first) {
   for (size_t k = 0; k < BANDS; ++k) {
     joint->mean[k] = joint->reference[k] = sample->residual;

@@ -63,6 +63,3 @@ double band_unknown(const band_memory* joint);
 
 /* The terms of a band [BAND_TERMS]. */
 void band_terms(const band_memory* joint, size_t band, double* terms);
-
-/* Share of contact that the bias takes in a step: it follows with the time of a held reference. */
-double band_bias_share(const band_shares* shares);

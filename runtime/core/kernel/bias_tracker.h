@@ -221,15 +221,6 @@ HOT_INLINE quad with_unknown(const tendonfmu_finger* f, size_t j, quad variance)
   return quad_add(variance, quad_mul(quad_mul(unknown, unknown), quad_set(1.0 / 3.0)));
 }
 
-/* friction and bias take a share of the residual, four joints */
-HOT_INLINE void learn_share(tendonfmu_finger* f, size_t j, quad gain) {
-  const finger_state* s = &f->remembered;
-  const quad correction = quad_mul(gain, quad_load(s->residual + j));
-  quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
-  quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
-  quad_store(s->gain + j, gain);
-}
-
 /* one Kalman step per joint on the residual r = τ − T_eff */
 HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
@@ -239,7 +230,11 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
     const quad gain = kalman_gain(predicted, noise_variance);
-    learn_share(f, j, kalman_gain(with_unknown(f, j, predicted), noise_variance));
+    const quad learned = kalman_gain(with_unknown(f, j, predicted), noise_variance);
+    const quad correction = quad_mul(learned, quad_load(s->residual + j));
+    quad_store(s->bias + j, quad_add(quad_load(s->bias + j), correction));
+    quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
+    quad_store(s->gain + j, learned);
     quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
     quad_store(gains, gain);
   }

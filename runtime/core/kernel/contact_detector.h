@@ -79,17 +79,11 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
   return f->derived.settings.has_bands ? exceed_bands(f, time, step) : exceed_thresholds(f, mean_force);
 }
 
-/* the bias in contact: it stays, or with bands follows slowly */
+/* the bias stays in contact */
 HOT_INLINE void hold_bias(tendonfmu_finger* f, double time) {
-  const int follows = f->derived.settings.has_bands;
-  const quad share = quad_set(follows ? band_bias_share(&f->scratch.shares) : 0.0);
   restart_rest(f, time);
   for (size_t j = 0; j < f->joint_lanes; j += 4) {
-    if (follows) {
-      learn_share(f, j, share);
-    } else {
-      quad_store(f->remembered.gain + j, share);
-    }
+    quad_store(f->remembered.gain + j, quad_set(0.0));
   }
 }
 
