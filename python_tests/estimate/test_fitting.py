@@ -206,6 +206,17 @@ def test_fixed_numbers_stay_and_the_others_move() -> None:
     assert all(value != get_number(start, path) for path, value in fit.parameters_.items())
 
 
+def test_what_scales_the_measured_torque_stays() -> None:
+    """A gain of -1 would leave no torque, and so no error: motion does not tell it."""
+    finger = small_finger()
+    finger["extensions"] = [{"effect": "force_gain", "tendon": 1, "correction": -0.02}]
+    path = "extensions[1].correction"
+    free = shared(finger, threads=1).fit(made_recording())
+    asked = shared(finger, threads=1, only=[path]).fit(made_recording())
+    assert path not in free.parameters_ and get_number(free.description_.data, path) == -0.02
+    assert list(asked.parameters_) == [path]
+
+
 @pytest.mark.parametrize(
     ("share", "unknowns"),
     [(["tendons"], 19 + 6), (["tendons[*].pulley_friction[*]"], 10 + 4 + 4 * 11), ([], 70)],

@@ -26,6 +26,7 @@ from tendonfmu.estimate import (
     learn_batch,
     read_previous_fit,
     settings_of,
+    torque_scales,
     unknowns,
     with_learned_numbers,
     with_previous_values,
@@ -58,7 +59,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
         return CalibratedFit(finger.data, (), ())
     events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
     kept = [without_events(recording, events) for recording in recordings]
-    structure = build_structure(finger, Choice())
+    structure = build_structure(finger, Choice(fix=torque_scales(finger.data)))
     settings = replace(settings_of(finger.data, kept, threads), near=True)
     learned = learn_batch(structure, kept, Watch(None), settings, None)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         get_number,
         own_copy,
         set_number,
+        torque_scales,
         with_values,
     )
     from .verdicts import Fitted, with_known_numbers, with_learned_numbers

@@ -33,7 +33,7 @@ from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.remembered import Remembered, learn_remembered
-from tendonfmu.estimate.structure import Choice, build_structure, with_values
+from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
@@ -158,7 +158,8 @@ class FrictionFit(Configured):
             finger = with_previous_values(finger, previous)
         else:
             previous = estimated_numbers(finger)
-        self._choice = Choice(_sides(options), options.only, options.fix, options.share, options.scale)
+        fixed = options.fix if options.only else (*options.fix, *torque_scales(finger.data))
+        self._choice = Choice(_sides(options), options.only, fixed, options.share, options.scale)
         self.structure_ = build_structure(finger, self._choice)
         self.start_ = self.structure_.start
         held = Held(options.holdout, options.holdout_block, strict=True)

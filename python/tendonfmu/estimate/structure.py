@@ -26,6 +26,8 @@ FIXED = -1
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
 
+# effects whose numbers scale the measured torque: the error of a fit would be least with no torque at all
+SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
 BESIDE = ("sensor_fault", "estimated", "contact")  # what no fit changes
 
 
@@ -58,6 +60,11 @@ class Choice:
     fix: Sequence[str] = ()
     share: Sequence[str] = ()  # "tendons", "pulleys" or patterns of the laws that share their values
     scale: Sequence[str] = ()  # "PATTERN=VALUE": expected magnitude in the unit of the description
+
+
+def torque_scales(data: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the paths of the numbers that scale the measured torque, which motion alone does not tell."""
+    return tuple(number.path for number in unknowns(data) if number.extension in SCALING)
 
 
 def build_structure(finger: Finger, choice: Choice) -> Structure:
