@@ -212,7 +212,7 @@ def test_what_scales_the_measured_torque_stays() -> None:
     finger["extensions"] = [{"effect": "force_gain", "tendon": 1, "correction": -0.02}]
     path = "extensions[1].correction"
     free = shared(finger, threads=1).fit(made_recording())
-    asked = shared(finger, threads=1, only=[path]).fit(made_recording())
+    asked = shared(finger, threads=1, share=[], only=[path]).fit(made_recording())
     assert path not in free.parameters_ and get_number(free.description_.data, path) == -0.02
     assert list(asked.parameters_) == [path]
 
