@@ -201,6 +201,12 @@ def test_the_start_is_unknown_for_a_second(runner: Runner) -> None:
     assert contact_of(late)[400:405].count(1) == 5 and not any(contact_of(late)[:400])
 
 
+def test_a_level_is_at_most_1e150(runner: Runner) -> None:
+    for noise, level in ((1e-100, 0.04 * counted(1, 0) / 1e-100), (1e-200, 1e150)):
+        out = of(runner, one_band(0, noise), settled(np.full(1, DT)), [0.0, 0.0, 0.04])
+        assert out["contact_level"][2, 0] == pytest.approx(float(level), rel=1e-9)
+
+
 def test_the_first_motion_begins_anew(runner: Runner) -> None:
     """At rest for 5 s V is gone. Then the joint moves, and 0.08 of the 0.1 N·m that it may hold turn over."""
     joint = {"name": "j", "friction": {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1}}

@@ -13,7 +13,7 @@ static const double reference_time[BANDS] = {0.05, 0.3, 1.0, 10.0}; /* M, s */
 #define HOME_TIME    3.0   /* s */
 #define UNKNOWN_TIME 1.0   /* s */
 #define SHORTEST     0.02  /* s, of a contact */
-#define HIGHEST      1e150 /* level */
+#define HIGHEST      1e300 /* square of a level */
 #define TURNED       0.5   /* of all that friction can hold: then the start is behind */
 #define END          0.4   /* of its peak, below which a contact has ended */
 
