@@ -2,9 +2,9 @@
  * (fmi2_call_table.c, fmi3_call_table.c). A library has one of them; all else in it is the same. */
 #pragma once
 
-/* States of an instance. Steps are carried out at once, so stepInProgress, stepFailed and stepCanceled never occur.
- * There are no events and no structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either.
- */
+/* States of an instance. Steps are carried out at once, so stepInProgress and stepCanceled never occur. A discarded
+ * step leads to stepComplete, which allows all that stepFailed does and the next step too. There are no events and no
+ * structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either. */
 typedef enum fmu_phase {
   PHASE_INSTANTIATED,
   PHASE_INITIALISATION,

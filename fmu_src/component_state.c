@@ -6,10 +6,10 @@
 
 /* byte offsets of the header; the checksum covers all that follows it */
 enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, IDENTITY = 32, NUMBERS = 40 };
-enum { STATE_VERSION = 2 };
+enum { STATE_VERSION = 3 };
 
 /* numbers before the inputs and parameters */
-enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
+enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, AT_INPUTS_GIVEN, LIFE_COUNT };
 
 static const unsigned char magic[8] = {'T', 'F', 'M', 'U', 'F', 'M', 'I', '2'};
 
@@ -68,11 +68,9 @@ void component_save(const component* c, void* bytes) {
   unsigned char* to = bytes;
   const variables* v = &c->values;
   const size_t size = component_state_size(c);
-  const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase,
-                                   [AT_STOP_DEFINED] = c->stop_time_defined,
-                                   [AT_START] = c->start_time,
-                                   [AT_STOP] = c->stop_time,
-                                   [AT_END] = c->end_of_step};
+  const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase, [AT_STOP_DEFINED] = c->stop_time_defined,
+                                   [AT_START] = c->start_time,    [AT_STOP] = c->stop_time,
+                                   [AT_END] = c->end_of_step,     [AT_INPUTS_GIVEN] = c->inputs_given};
   memcpy(to + MAGIC, magic, sizeof magic);
   put_u64(to + VERSION, STATE_VERSION);
   put_u64(to + SIZE, size);
@@ -97,26 +95,15 @@ static int is_flag(double x) {
 static int life_is_sound(const unsigned char* from) {
   const double phase = get_number(from, AT_PHASE);
   return phase >= 0.0 && phase < PHASE_COUNT && phase == floor(phase) && is_flag(get_number(from, AT_STOP_DEFINED)) &&
-         isfinite(get_number(from, AT_START)) && !isnan(get_number(from, AT_STOP)) &&
-         isfinite(get_number(from, AT_END));
+         is_flag(get_number(from, AT_INPUTS_GIVEN)) && isfinite(get_number(from, AT_START)) &&
+         !isnan(get_number(from, AT_STOP)) && isfinite(get_number(from, AT_END));
 }
 
-/* inputs and parameters within their ranges */
-static int values_are_sound(const component* c, const unsigned char* from) {
-  size_t at = LIFE_COUNT;
-  for (int g = 0; g < GROUP_COUNT; ++g) {
-    const variable_group* group = &variable_groups[g];
-    const size_t count = group->causality == CAUSALITY_INPUT ? c->values.count[g] : 0;
-    for (size_t i = 0; i < count; ++i) {
-      const variable input = {group, (variable_group_id)g, i, 0};
-      if (!variables_accept(c->model, &input, get_number(from, at++))) {
-        return 0;
-      }
-    }
-  }
+/* Parameters within their ranges. Inputs may be anything: a step says what is wrong with them. */
+static int parameters_are_sound(const component* c, const unsigned char* from) {
   for (size_t i = 0; i < c->values.parameter_count; ++i) {
     const variable parameter = {NULL, GROUP_COUNT, i, 0};
-    const double value = get_number(from, at++);
+    const double value = get_number(from, LIFE_COUNT + c->values.input_count + i);
     if (value != c->values.parameters[i] && !variables_accept(c->model, &parameter, value)) {
       return 0;
     }
@@ -146,7 +133,7 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
   if (get_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
     return "damaged state: its checksum does not match";
   }
-  if (!life_is_sound(bytes) || !values_are_sound(c, bytes)) {
+  if (!life_is_sound(bytes) || !parameters_are_sound(c, bytes)) {
     return "damaged state: a number is out of its range";
   }
   const unsigned char* of_model = (const unsigned char*)bytes + model_offset(c);
@@ -165,20 +152,22 @@ const char* component_restore(component* c, const void* bytes) {
   }
   variables_fetch_settings(v, c->model);
   c->failed = 0;
+  c->waiting = c->outputs_pending = !model_is_initialised(c->model);
   c->phase = (fmu_phase)get_number(from, AT_PHASE);
   v->parameters_pending = 1; /* whether they differ from the model's is found when they are handed over */
   c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
   c->start_time = get_number(from, AT_START);
   c->stop_time = get_number(from, AT_STOP);
   c->end_of_step = get_number(from, AT_END);
+  c->inputs_given = get_number(from, AT_INPUTS_GIVEN) != 0.0;
+  component_forget_steps(c);
   for (size_t i = 0; i < v->input_count; ++i) {
     v->numbers[i] = get_number(from, LIFE_COUNT + i);
   }
   for (size_t i = 0; i < v->parameter_count; ++i) {
     v->parameters[i] = get_number(from, LIFE_COUNT + v->input_count + i);
   }
-  c->outputs_pending = c->phase == PHASE_INITIALISATION;
-  if (model_is_initialised(c->model)) {
+  if (!c->waiting) {
     model_fetch_outputs(c->model, v);
   }
   return NULL;

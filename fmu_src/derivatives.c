@@ -94,15 +94,15 @@ static double* next_number(const variables* view, const references* list, place*
   return NULL;
 }
 
-/* In initialisation mode derivatives are those of the first sample, taken for the time being. */
-static int begin_derivatives(component* c) {
-  const int trial = !c->failed && c->phase == PHASE_INITIALISATION;
-  return trial && model_begin_trial(c->model, &c->values, c->start_time) ? -1 : 0;
+/* Until the first sample is taken derivatives are those of a sample taken for the time being. Where there is none, with
+ * FMU_WARNING, outputs are 0, and so are derivatives. */
+static fmu_status begin_derivatives(component* c, fmu_function function) {
+  return c->waiting && !c->failed ? component_begin_trial(c, function) : FMU_OK;
 }
 
 /* Ends what begin_derivatives() began. 0 for the status OK; otherwise says why and fails. */
 static fmu_status end_derivatives(component* c, fmu_function function, tendonfmu_status status) {
-  if (!c->failed && c->phase == PHASE_INITIALISATION) {
+  if (c->waiting && !c->failed) {
     model_end_trial(c->model);
   }
   return status == TENDONFMU_OK ? FMU_OK : component_fail_because(c, call_name(function), model_last_error(c->model));
@@ -127,12 +127,12 @@ fmu_status derivatives_directional(component* c, const partials* p) {
   for (double* number; (number = next_number(&view, &p->knowns, &known)) != NULL;) {
     *number += *seed++;
   }
-  if (begin_derivatives(c)) {
-    return component_fail_because(c, call_name(function), model_last_error(c->model));
+  fmu_status status = begin_derivatives(c, function);
+  if (status == FMU_OK) {
+    status = end_derivatives(c, function, derive(c, &view));
   }
-  const fmu_status status = end_derivatives(c, function, derive(c, &view));
   double* sensitivity = p->sensitivity;
-  for (const double* number; status == FMU_OK && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
+  for (const double* number; status != FMU_ERROR && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
     *sensitivity++ = *number;
   }
   return status;
@@ -157,11 +157,13 @@ fmu_status derivatives_adjoint(component* c, const partials* p) {
     return FMU_ERROR;
   }
   const variables view = lay_out(c);
-  if (begin_derivatives(c)) {
-    return component_fail_because(c, call_name(function), model_last_error(c->model));
-  }
+  const fmu_status begun = begin_derivatives(c, function);
   tendonfmu_status status = TENDONFMU_OK;
   double* sensitivity = p->sensitivity;
+  if (begun != FMU_OK) {
+    memset(sensitivity, 0, p->sensitivity_count * sizeof *sensitivity);
+    return begun;
+  }
   for (double* number; status == TENDONFMU_OK && (number = next_number(&view, &p->knowns, &known)) != NULL;) {
     *number = 1.0;
     status = derive(c, &view);

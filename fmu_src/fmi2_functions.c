@@ -110,7 +110,7 @@ static fmi2Status begin_status(component* c, fmu_function function, const void* 
   }
   if (!has_answer) {
     const log_text text = log_start(call_name(function), "no such status: every step is carried out at once");
-    log_send(&c->log, FMU_DISCARD, LOG_STATUS_WARNING, &text);
+    log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
     return fmi2Discard;
   }
   return fmi2OK;
@@ -119,7 +119,7 @@ static fmi2Status begin_status(component* c, fmu_function function, const void* 
 fmi2Status fmi2GetStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2Status* value) {
   const fmi2Status status = begin_status(instance, CALL_GET_STATUS, value, kind == fmi2DoStepStatus);
   if (status == fmi2OK) {
-    *value = fmi2OK;
+    *value = (fmi2Status)((const component*)instance)->step_status;
   }
   return status;
 }

@@ -107,7 +107,7 @@ static void put_flag(fmi3Boolean* flag) {
   }
 }
 
-/* Every step is carried out to its end, and none asks for an event or for the end of the simulation. */
+/* Every step is carried out to its end or not at all, and none asks for an event or for the end of the simulation. */
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean* eventHandlingNeeded,
                       fmi3Boolean* terminateSimulation, fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {

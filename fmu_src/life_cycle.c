@@ -33,14 +33,16 @@ static component* refuse_resource(const log_target* log, const char* reason) {
 /* the model of the resource, after a check that resource and variable table are those of the modelDescription.xml */
 static model* create_model(const log_target* log, const void* resource, size_t size, const char* identifier,
                            const char* resources) {
-  char expected[39] = "", message[256] = "";
-  model* m = model_create(resource, size, message, sizeof message);
+  char expected[39] = "", of_end[39] = "", message[256] = "";
+  model_guid(resource, size, 0, expected);
+  model_guid(resource, size, 1, of_end);
+  const int at_end = identifier && strcmp(identifier, of_end) == 0;
+  model* m = model_create(resource, size, at_end, message, sizeof message);
   if (!m) {
     refuse_resource(log, message);
     return NULL;
   }
-  model_guid(resource, size, expected);
-  if (!identifier || strcmp(identifier, expected) != 0) {
+  if (!identifier || (!at_end && strcmp(identifier, expected) != 0)) {
     log_text reason = {.bytes = ""};
     log_append(&reason, this_fmi.identifier);
     log_append(&reason, " is not that of this FMU: expected ");
@@ -164,18 +166,42 @@ fmu_status life_enter_initialisation(component* c) {
   return FMU_OK;
 }
 
+/* The model has taken a sample. */
+static void show_sample(component* c) {
+  model_fetch_outputs(c->model, &c->values);
+  c->waiting = c->outputs_pending = 0;
+}
+
+/* Inputs that nobody has set are tried alone: parameters that do not go together are refused here. */
+static model_answer initialise(component* c) {
+  if (c->inputs_given || !model_text.needs_inputs) {
+    return model_initialise(c->model, &c->values, c->start_time);
+  }
+  const model_answer answer = model_begin_trial(c->model, &c->values, c->start_time);
+  if (answer == MODEL_OK) {
+    model_end_trial(c->model);
+  }
+  return answer;
+}
+
+/* With inputs that nobody has set, or that are bad, the first step initialises. */
 fmu_status life_exit_initialisation(component* c) {
-  if (!component_may_call(c, CALL_EXIT_INITIALIZATION_MODE)) {
+  const fmu_function function = CALL_EXIT_INITIALIZATION_MODE;
+  fmu_status status = FMU_OK;
+  if (!component_may_call(c, function)) {
     return FMU_ERROR;
   }
-  if (model_initialise(c->model, &c->values, c->start_time)) {
-    return component_fail_because(c, call_name(CALL_EXIT_INITIALIZATION_MODE), model_last_error(c->model));
+  switch (initialise(c)) {
+    case MODEL_OK: break;
+    case MODEL_BAD_INPUTS: status = component_warn(c, function, ""); break;
+    default: return component_fail_because(c, call_name(function), model_last_error(c->model));
   }
-  model_fetch_outputs(c->model, &c->values);
+  if (model_is_initialised(c->model)) {
+    show_sample(c);
+  }
   c->phase = PHASE_STEP_COMPLETE;
-  c->outputs_pending = 0;
-  log_event(c, CALL_EXIT_INITIALIZATION_MODE, model_text.initialised, "");
-  return FMU_OK;
+  log_event(c, function, c->waiting ? model_text.waits : model_text.initialised, "");
+  return status;
 }
 
 fmu_status life_terminate(component* c) {
@@ -198,6 +224,21 @@ fmu_status life_reset(component* c) {
 
 /* --- steps -------------------------------------------------------------------------------------------------------- */
 
+/* A master that repeats a discarded step with the same inputs would never end: fmpy 0.3.32 does. */
+enum { MOST_REFUSALS = 1000 };
+
+static fmu_status discard_step(component* c, double time) {
+  log_text text = log_start(call_name(CALL_DO_STEP), model_last_error(c->model));
+  c->refusals = c->refusals && time == c->refused_at ? c->refusals + 1 : 1;
+  c->refused_at = time;
+  if (c->refusals > MOST_REFUSALS) {
+    log_append(&text, "; the step was tried 1000 times");
+    return component_fail(c, &text);
+  }
+  log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
+  return c->step_status = FMU_DISCARD;
+}
+
 /* Why there is no step from `time` over `step`; NULL when there is one. Clients round: their last step is the one that
  * ends nearest to the stop time. */
 static const char* refuse_step(const component* c, double time, double step) {
@@ -206,6 +247,9 @@ static const char* refuse_step(const component* c, double time, double step) {
   }
   if (c->stop_time_defined && time + step > c->stop_time + 0.5 * step) {
     return "expected a step that ends at the stop time or before";
+  }
+  if (c->waiting && time < c->start_time) {
+    return "expected a currentCommunicationPoint not before the start time";
   }
   return model_refuse_step(c->model, time, step);
 }
@@ -221,15 +265,20 @@ fmu_status life_step(component* c, double time, double step) {
     log_append_number(&text, time);
     log_append(&text, " s and step ");
     log_append_number(&text, step);
-    log_append(&text, " s, after the sample at ");
-    log_append_number(&text, model_get_time(c->model));
-    log_append(&text, " s");
+    log_append(&text, c->waiting ? " s, before the first sample" : " s, after the sample at ");
+    if (!c->waiting) {
+      log_append_number(&text, model_get_time(c->model));
+      log_append(&text, " s");
+    }
     return component_fail(c, &text);
   }
-  if (model_step(c->model, &c->values, time, step)) {
-    return component_fail_because(c, call_name(CALL_DO_STEP), model_last_error(c->model));
+  switch (model_step(c->model, &c->values, time, step)) {
+    case MODEL_OK: break;
+    case MODEL_BAD_INPUTS: return discard_step(c, time);
+    default: return component_fail_because(c, call_name(CALL_DO_STEP), model_last_error(c->model));
   }
-  model_fetch_outputs(c->model, &c->values);
+  show_sample(c);
+  component_forget_steps(c);
   c->end_of_step = time + step;
   return FMU_OK;
 }

@@ -67,26 +67,22 @@ static void put_flags(void* values, value_format format, size_t at, const unsign
 
 /* --- reading ------------------------------------------------------------------------------------------------------ */
 
-/* In initialisation mode outputs follow the inputs; before it there are none. */
-static int update_outputs(component* c, fmu_function function, const variable* found) {
-  if (c->phase > PHASE_INITIALISATION || variable_causality_of(found) != CAUSALITY_OUTPUT) {
-    return 0; /* a step brings the outputs with it */
+/* Until the first sample is taken outputs follow the inputs; before the initialisation mode there are none. */
+static fmu_status update_outputs(component* c, fmu_function function, const variable* found) {
+  if (!c->waiting || variable_causality_of(found) != CAUSALITY_OUTPUT) {
+    return FMU_OK; /* a step brings the outputs with it */
   }
   if (!c->failed && c->phase == PHASE_INSTANTIATED) {
-    fail_at(c, function, found, "an output has no value before the initialisation mode");
-    return -1;
+    return fail_at(c, function, found, "an output has no value before the initialisation mode");
   }
-  if (component_update_outputs(c)) {
-    component_fail_because(c, call_name(function), model_last_error(c->model));
-    return -1;
-  }
-  return 0;
+  return component_update_outputs(c, function);
 }
 
 fmu_status values_get(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, void* values, size_t value_count) {
   value_run run;
   size_t at = 0;
+  fmu_status status = FMU_OK;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
@@ -97,16 +93,21 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
       put_numbers(values, format, at, &c->end_of_step, 1);
       continue;
     }
-    if (find_run(c, function, type, references + i, count - i, &run) || update_outputs(c, function, &run.first)) {
+    if (find_run(c, function, type, references + i, count - i, &run)) {
       return FMU_ERROR;
     }
+    const fmu_status updated = update_outputs(c, function, &run.first);
+    if (updated == FMU_ERROR) {
+      return updated;
+    }
+    status = updated > status ? updated : status;
     if (variable_is_flag(&run.first)) {
       put_flags(values, format, at, c->values.flag[run.first.id] + run.first.index, run.elements);
     } else {
       put_numbers(values, format, at, variables_number(&c->values, &run.first), run.elements);
     }
   }
-  return FMU_OK;
+  return status;
 }
 
 /* --- writing ------------------------------------------------------------------------------------------------------ */
@@ -123,27 +124,17 @@ static int refuse_fixed(component* c, fmu_function function, const variable* fou
 
 /* 0 when the variable may be written now, whatever the value */
 static int check_writable(component* c, fmu_function function, const variable* found) {
-  switch (variable_causality_of(found)) {
-    case CAUSALITY_INPUT: return 0;
-    case CAUSALITY_OUTPUT: fail_at(c, function, found, "an output is not written"); return -1;
-    default: break;
+  if (variable_causality_of(found) == CAUSALITY_OUTPUT) {
+    fail_at(c, function, found, "an output is not written");
+    return -1;
   }
   const int is_fixed = found->group || !model_parameter_range(c->model, found->index).tunable;
   return c->phase == PHASE_STEP_COMPLETE && is_fixed ? refuse_fixed(c, function, found) : 0;
 }
 
-/* Inputs given as doubles, which nothing but their range is asked of: checked and copied as they stand. */
-static int is_block(const value_run* run, value_format format) {
-  return format == VALUES_DOUBLE && variable_causality_of(&run->first) == CAUSALITY_INPUT;
-}
-
-/* variables_accept() of all elements of a run of inputs: what is not a number compares false */
-static int all_accepted(const variable_group* group, const double* values, size_t count) {
-  int accepted = 1;
-  for (size_t i = 0; i < count; ++i) {
-    accepted &= (values[i] >= group->minimum) & (values[i] <= group->maximum);
-  }
-  return accepted;
+/* Inputs, all of them Real: taken as they stand, whatever they are, since the step alone may discard them. */
+static int is_block(const value_run* run) {
+  return variable_causality_of(&run->first) == CAUSALITY_INPUT;
 }
 
 /* 0 when the variable may have the value */
@@ -161,10 +152,7 @@ static int check_value(component* c, fmu_function function, const variable* one,
 static int check_run(component* c, fmu_function function, const value_run* run, const void* values, value_format format,
                      size_t at) {
   const variable_type type = variable_type_of(&run->first);
-  if (is_block(run, format) && all_accepted(run->first.group, (const double*)values + at, run->elements)) {
-    return 0;
-  }
-  for (size_t i = 0; i < run->elements; ++i) { /* one by one: the first that is refused is named */
+  for (size_t i = 0; !is_block(run) && i < run->elements; ++i) { /* one by one: the first that is refused is named */
     const variable one = variables_element(&run->first, i);
     const variable* named = run->first.whole ? &run->first : &one;
     if (check_writable(c, function, named) ||
@@ -180,7 +168,8 @@ static void take_run(component* c, const value_run* run, const void* values, val
   double* numbers = variables_number(&c->values, &run->first);
   const variable_group* group = run->first.group;
   c->outputs_pending = 1;
-  if (is_block(run, format)) {
+  if (is_block(run)) {
+    c->inputs_given = 1;
     memcpy(numbers, (const double*)values + at, run->elements * sizeof *numbers);
     return;
   }

@@ -85,9 +85,14 @@ void variables_destroy(variables* v) {
   free(v->flags);
 }
 
-void variables_start(variables* v, const model* m) {
-  memset(v->numbers, 0, (v->input_count + v->output_count) * sizeof(double));
+void variables_clear_outputs(variables* v) {
+  memset(v->numbers + v->input_count, 0, v->output_count * sizeof(double));
   memset(v->flags, 0, share_out_flags(v, v->flags));
+}
+
+void variables_start(variables* v, const model* m) {
+  memset(v->numbers, 0, v->input_count * sizeof(double));
+  variables_clear_outputs(v);
   variables_fetch_settings(v, m);
   model_get_parameters(m, v->parameters);
   v->parameters_pending = 0;
@@ -114,9 +119,6 @@ static model_range range_of(const model* m, const variable* found) {
 }
 
 int variables_accept(const model* m, const variable* found, double value) {
-  if (found->group && found->group->causality == CAUSALITY_INPUT) {
-    return value >= found->group->minimum && value <= found->group->maximum; /* what is not a number compares false */
-  }
   const model_range range = range_of(m, found);
   return value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum);
 }

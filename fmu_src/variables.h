@@ -37,6 +37,8 @@ void variables_destroy(variables* v);
 /* Inputs to 0, outputs to 0, settings and parameters to those of the model. */
 void variables_start(variables* v, const model* m);
 
+void variables_clear_outputs(variables* v);
+
 /* Settings to those of the model. */
 void variables_fetch_settings(variables* v, const model* m);
 
@@ -99,7 +101,7 @@ static inline double* variables_number(const variables* v, const variable* found
   return (found->group ? v->number[found->id] : v->parameters) + found->index;
 }
 
-/* 1 when the variable may have the value, whatever the others have. */
+/* 1 when the variable may have the value, whatever the others have; what is not a number compares false. */
 int variables_accept(const model* m, const variable* found, double value);
 
 /* Appends "<name> = <value>: expected <range> <unit>". */

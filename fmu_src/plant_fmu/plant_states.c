@@ -53,16 +53,17 @@ static int is_blank(const model* m, const void* bytes) {
   return at == model_state_size(m);
 }
 
-const char* model_check_state(model* m, const void* bytes, int initialised) {
+const char* model_check_state(model* m, const void* bytes, int may_be_initialised) {
   double life[AT_SETTINGS], settings[SETTING_COUNT];
   get(bytes, AT_RUNNING, life, AT_SETTINGS);
   get(bytes, AT_SETTINGS, settings, SETTING_COUNT);
-  if (life[AT_RUNNING] != (double)initialised) {
+  const int running = life[AT_RUNNING] != 0.0;
+  if (running && !may_be_initialised) {
     return "damaged state: its phase does not fit its finger";
   }
-  if (!isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) || !is_flag(life[AT_TOLERANCE_WRITTEN]) ||
-      !settings_are_sound(settings, m->joints) ||
-      (!initialised && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
+  if (!is_flag(life[AT_RUNNING]) || !isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) ||
+      !is_flag(life[AT_TOLERANCE_WRITTEN]) || !settings_are_sound(settings, m->joints) ||
+      (!running && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
     return "damaged state: a number is out of its range";
   }
   return NULL; /* the plant looks at its own bytes when it takes them */
