@@ -82,7 +82,7 @@ fmu_status component_begin_trial(component* c, fmu_function function) {
     return component_fail_because(c, call_name(function), model_last_error(c->model));
   }
   if (answer == MODEL_BAD_INPUTS) {
-    return component_warn(c, function, "; outputs are 0 until then");
+    return component_warn(c, function, "; outputs are 0 with such inputs");
   }
   return FMU_OK;
 }

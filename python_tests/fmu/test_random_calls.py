@@ -1,8 +1,8 @@
 """Random sequences of calls, good and bad, against a twin that gets the good ones only.
 
 The machine below knows the standard's life cycle: the binary must accept and refuse as it says, a refused call and a
-discarded step must leave no trace in the saved state, and outputs are finite. The twin of an FMU of FMI 3.0 is that of FMI 2.0, and the
-other way round: outputs and saved states of both have the same bits, whatever is called.
+discarded step must leave no trace in the saved state, and outputs are finite. The twin of an FMU of FMI 3.0 is that of
+FMI 2.0, and the other way round: outputs and saved states of both have the same bits, whatever is called.
 """
 
 from __future__ import annotations

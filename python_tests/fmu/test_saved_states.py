@@ -191,8 +191,8 @@ def test_a_spoilt_state_is_refused_or_a_sound_one(small_fmu: UnpackedFmu, count:
     assert 0.1 * count < taken < count
 
 
-# Numbers of the FMU's part. Life: 0 phase, 1 whether there is a stop time, 2 start time, 5 whether an input was set; then
-# inputs from 6 on, and of the plant what runs (14, 15), settings (from 18) and state.
+# Numbers of the FMU's part. Life: 0 phase, 1 whether there is a stop time, 2 start time, 5 whether an input was set;
+# then inputs from 6 on, and of the plant what runs (14, 15), settings (from 18) and state.
 IMPOSSIBLE = {
     "friction": [(0, 7.0), (0, 0.0), (0, 1.5), (1, 2.0), (2, NAN), (5, 2.0)],
     "plant": [(0, 1.0), (14, 0.0), (15, NAN), (18, 1.5), (21, 7.0), (51, 1e9)],
