@@ -1,6 +1,6 @@
 // A byte string drives a sequence of calls on one instance. Whatever is called, in whatever state and with whatever
-// arguments: a call that is refused, or that only asks, leaves no trace in the saved state, one that the standard does
-// not allow is refused, messages are one line, and outputs are finite (fuzzed_fmu.hpp holds what is checked). Here is
+// arguments: a call that is refused, a step that is discarded and a call that only asks leave no trace in the saved
+// state, one that the standard does not allow is refused, messages are one line, and outputs are finite (fuzzed_fmu.hpp holds what is checked). Here is
 // what the sequences of all versions of FMI have in common: arguments and saved states.
 #pragma once
 
@@ -321,7 +321,13 @@ class call_sequence {
 template <class Sequence>
 void run_sequence(const std::uint8_t* bytes, std::size_t size) {
   static const std::vector<byte_list> made_of = resources();
-  static const std::deque<unpacked_fmu> fmus(made_of.begin(), made_of.end());
+  static const std::deque<unpacked_fmu> fmus = [] {
+    std::deque<unpacked_fmu> all;
+    for (const byte_list& resource : made_of) {
+      all.emplace_back(resource, all.size() % 2 == 1);  // the second takes samples at the end of steps
+    }
+    return all;
+  }();
   FuzzedDataProvider data(bytes, size);
   const std::size_t which = data.ConsumeIntegralInRange<std::size_t>(0, 7);
   Sequence sequence(data, fmus[which < 6 ? 0 : which - 5], fmus[which < 6 ? 1 : 0]);
