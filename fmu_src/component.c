@@ -51,35 +51,35 @@ void component_forget_steps(component* c) {
 }
 
 int component_refuse_call(component* c, fmu_function function) {
-  log_text text = log_start(call_name(function), "not allowed in state ");
-  log_append(&text, phase_name(c->failed ? PHASE_ERROR : c->phase));
-  const char* separator = ", expected ";
+  log_text expected = {.bytes = ""};
   for (int phase = 0; phase <= PHASE_ERROR; ++phase) {
     if (call_is_allowed(function, (fmu_phase)phase)) {
-      log_append(&text, separator);
-      log_append(&text, phase_name((fmu_phase)phase));
-      separator = " or ";
+      log_append(&expected, "%s%s", *expected.bytes ? " or " : ", expected ", this_fmi.phases[phase]);
     }
   }
-  component_fail(c, &text);
+  const char* present = this_fmi.phases[c->failed ? PHASE_ERROR : c->phase];
+  component_fail(c, call_name(function), "not allowed in state %s%s", present, expected.bytes);
   return 0;
 }
 
-fmu_status component_fail(component* c, const log_text* text) {
+fmu_status component_fail(component* c, const char* function, const char* format, ...) {
+  log_text text = log_line("%s: ", function);
+  va_list arguments;
+  va_start(arguments, format);
+  log_append_list(&text, format, arguments);
+  va_end(arguments);
   c->failed = 1;
-  log_send(&c->log, FMU_ERROR, LOG_STATUS_ERROR, text);
-  return FMU_ERROR;
+  return log_send(&c->log, FMU_ERROR, LOG_STATUS_ERROR, &text);
 }
 
-fmu_status component_fail_because(component* c, const char* function, const char* reason) {
-  const log_text text = log_start(function, reason);
-  return component_fail(c, &text);
+fmu_status component_fail_as_model(component* c, fmu_function function) {
+  return component_fail(c, call_name(function), "%s", model_last_error(c->model));
 }
 
 fmu_status component_begin_trial(component* c, fmu_function function) {
   const model_answer answer = model_begin_trial(c->model, &c->values, c->start_time);
   if (answer == MODEL_FAILED) {
-    return component_fail_because(c, call_name(function), model_last_error(c->model));
+    return component_fail_as_model(c, function);
   }
   if (answer == MODEL_BAD_INPUTS) {
     return component_warn(c, function, "; outputs are 0 with such inputs");
@@ -88,10 +88,8 @@ fmu_status component_begin_trial(component* c, fmu_function function) {
 }
 
 fmu_status component_warn(component* c, fmu_function function, const char* consequence) {
-  log_text text = log_start(call_name(function), model_last_error(c->model));
-  log_append(&text, consequence);
-  log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
-  return FMU_WARNING;
+  const log_text text = log_line("%s: %s%s", call_name(function), model_last_error(c->model), consequence);
+  return log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
 }
 
 fmu_status component_update_outputs(component* c, fmu_function function) {

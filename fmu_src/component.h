@@ -47,10 +47,10 @@ static inline int component_may_call(component* c, fmu_function function) {
   return c && (call_is_allowed(function, c->failed ? PHASE_ERROR : c->phase) || component_refuse_call(c, function));
 }
 
-/* Logs the text as an error, enters the state "error" and returns FMU_ERROR. */
-fmu_status component_fail(component* c, const log_text* text);
-/* The same with "<function>: <reason>". */
-fmu_status component_fail_because(component* c, const char* function, const char* reason);
+/* Logs "<function>: <line>" as an error, enters the state "error" and returns FMU_ERROR. */
+fmu_status component_fail(component* c, const char* function, const char* format, ...) LOG_FORMAT(3);
+/* The same with the model's words. */
+fmu_status component_fail_as_model(component* c, fmu_function function);
 
 /* Logs "<function>: <why the model refused the inputs><consequence>" and returns FMU_WARNING. */
 fmu_status component_warn(component* c, fmu_function function, const char* consequence);

@@ -22,34 +22,29 @@ static variables lay_out(const component* c) {
 
 /* --- finding ------------------------------------------------------------------------------------------------------ */
 
-/* 0 when the reference is a Real input or output, as wanted */
-static int find_for_derivative(component* c, fmu_function function, unsigned reference, variable_causality wanted,
-                               variable* found) {
+/* A Real input or output, as wanted. */
+static fmu_status find_for_derivative(component* c, fmu_function function, unsigned reference,
+                                      variable_causality wanted, variable* found) {
   if (find_of_type(c, function, VARIABLE_REAL, reference, found)) {
-    return -1;
+    return FMU_ERROR;
   }
   if (variable_causality_of(found) != wanted) {
-    fail_at(c, function, found,
-            wanted == CAUSALITY_INPUT ? "not a known: derivatives are by the inputs"
-                                      : "not an unknown: derivatives are those of the Real outputs");
-    return -1;
+    return fail_at(c, function, found,
+                   wanted == CAUSALITY_INPUT ? "not a known: derivatives are by the inputs"
+                                             : "not an unknown: derivatives are those of the Real outputs");
   }
-  if (found->group->discrete) {
-    fail_at(c, function, found, "discrete: it has no derivative");
-    return -1;
-  }
-  return 0;
+  return found->group->discrete ? fail_at(c, function, found, "discrete: it has no derivative") : FMU_OK;
 }
 
-static int check_references(component* c, fmu_function function, const unsigned references[], size_t count,
-                            variable_causality wanted) {
+static fmu_status check_references(component* c, fmu_function function, const unsigned references[], size_t count,
+                                   variable_causality wanted) {
   variable found = {0};
   for (size_t i = 0; i < count; ++i) {
     if (find_for_derivative(c, function, references[i], wanted, &found)) {
-      return -1;
+      return FMU_ERROR;
     }
   }
-  return 0;
+  return FMU_OK;
 }
 
 /* 1 when the call is allowed and the request is one; otherwise logs and fails. `in` are the variables of the seed. */
@@ -66,7 +61,7 @@ static int is_sound(component* c, fmu_function function, const partials* p, cons
   }
   for (size_t i = 0; i < p->seed_count; ++i) {
     if (!isfinite(p->seed[i])) {
-      component_fail_because(c, call_name(function), "a number of the seed (dvKnown) is not finite");
+      component_fail(c, call_name(function), "a number of the seed (dvKnown) is not finite");
       return 0;
     }
   }
@@ -105,7 +100,7 @@ static fmu_status end_derivatives(component* c, fmu_function function, tendonfmu
   if (c->waiting && !c->failed) {
     model_end_trial(c->model);
   }
-  return status == TENDONFMU_OK ? FMU_OK : component_fail_because(c, call_name(function), model_last_error(c->model));
+  return status == TENDONFMU_OK ? FMU_OK : component_fail_as_model(c, function);
 }
 
 static tendonfmu_status derive(component* c, const variables* view) {

@@ -50,7 +50,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                     .instance_name = instanceName ? instanceName : "",
                     .wanted = LOG_EVERYTHING};
   component* c = fmuType == fmi2CoSimulation ? life_create(&log, fmuGUID, fmuResourceLocation)
-                                             : life_refuse(&log, "fmuType: expected fmi2CoSimulation", "");
+                                             : life_refuse(&log, "fmuType: expected fmi2CoSimulation");
   if (c) {
     c->log.wanted = loggingOn ? LOG_EVERYTHING : LOG_NOTHING;
   }
@@ -106,12 +106,11 @@ static fmi2Status begin_status(component* c, fmu_function function, const void* 
     return fmi2Error;
   }
   if (!value) {
-    return (fmi2Status)component_fail_because(c, call_name(function), "value is NULL");
+    return (fmi2Status)component_fail(c, call_name(function), "value is NULL");
   }
   if (!has_answer) {
-    const log_text text = log_start(call_name(function), "no such status: every step is carried out at once");
-    log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
-    return fmi2Discard;
+    const log_text text = log_line("%s: no such status: every step is carried out at once", call_name(function));
+    return (fmi2Status)log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
   }
   return fmi2OK;
 }

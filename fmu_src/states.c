@@ -6,14 +6,12 @@
 #include "component_state.h"
 
 static fmu_status fail(component* c, fmu_function function, const char* reason) {
-  return component_fail_because(c, call_name(function), reason);
+  return component_fail(c, call_name(function), "%s", reason);
 }
 
 /* "<function>: <what the version calls a state> is NULL" */
 static fmu_status fail_without_state(component* c, fmu_function function) {
-  log_text text = log_start(call_name(function), this_fmi.state);
-  log_append(&text, " is NULL");
-  return component_fail(c, &text);
+  return component_fail(c, call_name(function), "%s is NULL", this_fmi.state);
 }
 
 /* A block of another FMU may be shorter than those of this one. */
@@ -88,12 +86,8 @@ static int has_bytes(component* c, fmu_function function, const void* bytes, siz
   if (bytes && size == component_state_size(c)) {
     return 1;
   }
-  log_text text = log_start(call_name(function), bytes ? "size = " : "serializedState is NULL, size = ");
-  log_append_count(&text, size);
-  log_append(&text, ": expected ");
-  log_append_count(&text, component_state_size(c));
-  log_append(&text, " bytes");
-  component_fail(c, &text);
+  component_fail(c, call_name(function), "%ssize = %zu: expected %zu bytes", bytes ? "" : "serializedState is NULL, ",
+                 size, component_state_size(c));
   return 0;
 }
 

@@ -12,15 +12,15 @@ typedef struct value_run {
   size_t elements;   /* their numbers */
 } value_run;
 
-/* 0 with the run that begins with references[0] [count]; otherwise says what is wrong with that one and fails */
-static int find_run(component* c, fmu_function function, variable_type type, const unsigned references[], size_t count,
-                    value_run* run) {
+/* The run that begins with references[0] [count]; otherwise says what is wrong with that one and fails. */
+static fmu_status find_run(component* c, fmu_function function, variable_type type, const unsigned references[],
+                           size_t count, value_run* run) {
   if (find_of_type(c, function, type, references[0], &run->first)) {
-    return -1;
+    return FMU_ERROR;
   }
   run->references = variables_run(&c->values, &run->first, references, count);
   run->elements = run->first.whole ? c->values.count[run->first.id] : run->references;
-  return 0;
+  return FMU_OK;
 }
 
 /* --- elements of arrays of the importer --------------------------------------------------------------------------- */
@@ -112,24 +112,16 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
 
 /* --- writing ------------------------------------------------------------------------------------------------------ */
 
-static int refuse_fixed(component* c, fmu_function function, const variable* found) {
-  log_text reason;
-  reason.bytes[0] = 0;
-  log_append(&reason, "a fixed parameter is written before ");
-  log_append(&reason, call_name(CALL_EXIT_INITIALIZATION_MODE));
-  log_append(&reason, " only");
-  fail_at(c, function, found, reason.bytes);
-  return -1;
-}
-
-/* 0 when the variable may be written now, whatever the value */
-static int check_writable(component* c, fmu_function function, const variable* found) {
+/* Whether the variable may be written now, whatever the value. */
+static fmu_status check_writable(component* c, fmu_function function, const variable* found) {
   if (variable_causality_of(found) == CAUSALITY_OUTPUT) {
-    fail_at(c, function, found, "an output is not written");
-    return -1;
+    return fail_at(c, function, found, "an output is not written");
   }
-  const int is_fixed = found->group || !model_parameter_range(c->model, found->index).tunable;
-  return c->phase == PHASE_STEP_COMPLETE && is_fixed ? refuse_fixed(c, function, found) : 0;
+  if (c->phase != PHASE_STEP_COMPLETE || (!found->group && model_parameter_range(c->model, found->index).tunable)) {
+    return FMU_OK;
+  }
+  return component_fail(c, call_name(function), "%s: a fixed parameter is written before %s only",
+                        variables_name(c->model, found).bytes, call_name(CALL_EXIT_INITIALIZATION_MODE));
 }
 
 /* Inputs, all of them Real: taken as they stand, whatever they are, since the step alone may discard them. */
@@ -137,30 +129,21 @@ static int is_block(const value_run* run) {
   return variable_causality_of(&run->first) == CAUSALITY_INPUT;
 }
 
-/* 0 when the variable may have the value */
-static int check_value(component* c, fmu_function function, const variable* one, double value) {
-  if (variables_accept(c->model, one, value)) {
-    return 0;
-  }
-  log_text text = log_start(call_name(function), "");
-  variables_append_refusal(&text, c->model, one, value);
-  component_fail(c, &text);
-  return -1;
-}
-
-/* 0 when every variable of the run may have its value, which stand in `values` from `at` on */
-static int check_run(component* c, fmu_function function, const value_run* run, const void* values, value_format format,
-                     size_t at) {
+/* Whether every variable of the run may have its value, which stand in `values` from `at` on. */
+static fmu_status check_run(component* c, fmu_function function, const value_run* run, const void* values,
+                            value_format format, size_t at) {
   const variable_type type = variable_type_of(&run->first);
   for (size_t i = 0; !is_block(run) && i < run->elements; ++i) { /* one by one: the first that is refused is named */
     const variable one = variables_element(&run->first, i);
-    const variable* named = run->first.whole ? &run->first : &one;
-    if (check_writable(c, function, named) ||
-        check_value(c, function, &one, given_value(values, format, at + i, type))) {
-      return -1;
+    const double value = given_value(values, format, at + i, type);
+    if (check_writable(c, function, run->first.whole ? &run->first : &one)) {
+      return FMU_ERROR;
+    }
+    if (!variables_accept(c->model, &one, value)) {
+      return component_fail(c, call_name(function), "%s", variables_refusal(c->model, &one, value).bytes);
     }
   }
-  return 0;
+  return FMU_OK;
 }
 
 /* Values that check_run() took. */
@@ -192,7 +175,7 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
   }
   for (size_t i = 0; i < count; i += run.references, at += run.elements) { /* all or none */
     if (is_time(references[i], type)) {
-      return component_fail_because(c, call_name(function), "time: the independent variable is not written");
+      return component_fail(c, call_name(function), "time: the independent variable is not written");
     }
     if (find_run(c, function, type, references + i, count - i, &run) ||
         check_run(c, function, &run, values, format, at)) {

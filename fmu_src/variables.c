@@ -123,33 +123,20 @@ int variables_accept(const model* m, const variable* found, double value) {
   return value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum);
 }
 
-void variables_append_refusal(log_text* text, const model* m, const variable* found, double value) {
+log_text variables_refusal(const model* m, const variable* found, double value) {
   const model_range range = range_of(m, found);
-  variables_append_name(text, m, found);
-  log_append(text, " = ");
-  log_append_number(text, value);
-  log_append(text, range.above_minimum ? ": expected above " : ": expected ");
-  log_append_number(text, range.minimum);
-  log_append(text, range.above_minimum ? " and at most " : " to ");
-  log_append_number(text, range.maximum);
-  if (range.unit && *range.unit) {
-    log_append(text, " ");
-    log_append(text, range.unit);
-  }
+  const char* from = range.above_minimum ? "above " : "";
+  const char* to = range.above_minimum ? "and at most" : "to";
+  const int has_unit = range.unit && *range.unit;
+  return log_line("%s = %g: expected %s%g %s %g%s%s", variables_name(m, found).bytes, value, from, range.minimum, to,
+                  range.maximum, has_unit ? " " : "", has_unit ? range.unit : "");
 }
 
-void variables_append_name(log_text* text, const model* m, const variable* found) {
+log_text variables_name(const model* m, const variable* found) {
   char path[128];
   if (!found->group) {
-    if (model_parameter_path(m, found->index, path, sizeof path) == 0) {
-      log_append(text, path);
-    }
-    return;
+    return log_line("%s", model_parameter_path(m, found->index, path, sizeof path) == 0 ? path : "");
   }
-  log_append(text, found->group->name);
-  if (found->group->size != SIZE_SCALAR && !found->whole) {
-    log_append(text, "[");
-    log_append_count(text, found->index + 1);
-    log_append(text, "]");
-  }
+  return found->group->size == SIZE_SCALAR || found->whole ? log_line("%s", found->group->name)
+                                                           : log_line("%s[%zu]", found->group->name, found->index + 1);
 }

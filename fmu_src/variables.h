@@ -104,8 +104,8 @@ static inline double* variables_number(const variables* v, const variable* found
 /* 1 when the variable may have the value, whatever the others have; what is not a number compares false. */
 int variables_accept(const model* m, const variable* found, double value);
 
-/* Appends "<name> = <value>: expected <range> <unit>". */
-void variables_append_refusal(log_text* text, const model* m, const variable* found, double value);
+/* "<name> = <value>: expected <range> <unit>" */
+log_text variables_refusal(const model* m, const variable* found, double value);
 
 /* Name as in the XML, such as "tendon_force[2]" or "contact"; of a whole group "tendon_force". */
-void variables_append_name(log_text* text, const model* m, const variable* found);
+log_text variables_name(const model* m, const variable* found);

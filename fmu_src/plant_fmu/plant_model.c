@@ -185,10 +185,8 @@ static model_answer check_inputs(model* m, const variables* values) {
     const size_t count = group->causality == CAUSALITY_INPUT ? values->count[g] : 0;
     for (size_t i = 0; i < count; ++i) {
       const variable input = {group, (variable_group_id)g, i, 0};
-      log_text text = {.bytes = ""};
       if (!variables_accept(m, &input, values->number[g][i])) {
-        variables_append_refusal(&text, m, &input, values->number[g][i]);
-        snprintf(m->error, sizeof m->error, "%s", text.bytes);
+        snprintf(m->error, sizeof m->error, "%s", variables_refusal(m, &input, values->number[g][i]).bytes);
         return MODEL_BAD_INPUTS;
       }
     }
