@@ -1,8 +1,9 @@
 #include "component_state.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
+
+#include "bytes.h"
 
 /* byte offsets of the header; the checksum covers all that follows it */
 enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, IDENTITY = 32, NUMBERS = 40 };
@@ -13,47 +14,16 @@ enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, AT_INPUTS_GIVEN, LI
 
 static const unsigned char magic[8] = {'T', 'F', 'M', 'U', 'F', 'M', 'I', '2'};
 
-static void put_u64(unsigned char* to, uint64_t value) {
-  for (int i = 0; i < 8; ++i) {
-    to[i] = (unsigned char)(value >> (8 * i));
-  }
-}
-
-static uint64_t get_u64(const unsigned char* from) {
-  uint64_t value = 0;
-  for (int i = 0; i < 8; ++i) {
-    value |= (uint64_t)from[i] << (8 * i);
-  }
-  return value;
-}
-
-static void put_number(unsigned char* to, size_t index, double value) {
-  uint64_t bits;
-  memcpy(&bits, &value, sizeof bits);
-  put_u64(to + NUMBERS + 8 * index, bits);
-}
-
 static double get_number(const unsigned char* from, size_t index) {
-  const uint64_t bits = get_u64(from + NUMBERS + 8 * index);
-  double value;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
-static uint64_t fnv_1a(const unsigned char* bytes, size_t size) {
-  uint64_t hash = 0xcbf29ce484222325u;
-  for (size_t i = 0; i < size; ++i) {
-    hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  }
-  return hash;
+  return load_f64(from + NUMBERS + 8 * index);
 }
 
 static uint64_t checksum(const unsigned char* bytes, size_t size) {
-  return fnv_1a(bytes + IDENTITY, size - IDENTITY);
+  return hash_bytes(bytes + IDENTITY, size - IDENTITY, 0);
 }
 
 uint64_t component_identity(const char* identifier) {
-  return fnv_1a((const unsigned char*)identifier, strlen(identifier));
+  return hash_bytes(identifier, strlen(identifier), 0);
 }
 
 static size_t model_offset(const component* c) {
@@ -65,27 +35,21 @@ size_t component_state_size(const component* c) {
 }
 
 void component_save(const component* c, void* bytes) {
-  unsigned char* to = bytes;
+  unsigned char *to = bytes, *numbers = to + NUMBERS;
   const variables* v = &c->values;
   const size_t size = component_state_size(c);
   const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase, [AT_STOP_DEFINED] = c->stop_time_defined,
                                    [AT_START] = c->start_time,    [AT_STOP] = c->stop_time,
                                    [AT_END] = c->end_of_step,     [AT_INPUTS_GIVEN] = c->inputs_given};
   memcpy(to + MAGIC, magic, sizeof magic);
-  put_u64(to + VERSION, STATE_VERSION);
-  put_u64(to + SIZE, size);
-  put_u64(to + IDENTITY, c->identity);
-  for (size_t i = 0; i < LIFE_COUNT; ++i) {
-    put_number(to, i, life[i]);
-  }
-  for (size_t i = 0; i < v->input_count; ++i) {
-    put_number(to, LIFE_COUNT + i, v->numbers[i]);
-  }
-  for (size_t i = 0; i < v->parameter_count; ++i) {
-    put_number(to, LIFE_COUNT + v->input_count + i, v->parameters[i]);
-  }
+  store_u64(to + VERSION, STATE_VERSION);
+  store_u64(to + SIZE, size);
+  store_u64(to + IDENTITY, c->identity);
+  store_doubles(numbers, life, LIFE_COUNT);
+  store_doubles(numbers + 8 * LIFE_COUNT, v->numbers, v->input_count);
+  store_doubles(numbers + 8 * (LIFE_COUNT + v->input_count), v->parameters, v->parameter_count);
   model_save(c->model, to + model_offset(c));
-  put_u64(to + CHECKSUM, checksum(to, size));
+  store_u64(to + CHECKSUM, checksum(to, size));
 }
 
 static int is_flag(double x) {
@@ -113,10 +77,10 @@ static int parameters_are_sound(const component* c, const unsigned char* from) {
 
 const char* component_refuse_block(const component* c, const void* bytes) {
   const unsigned char* from = bytes;
-  if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || get_u64(from + VERSION) != STATE_VERSION) {
+  if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || load_u64(from + VERSION) != STATE_VERSION) {
     return "not a state of an FMU of this kind and version";
   }
-  if (get_u64(from + SIZE) != component_state_size(c) || get_u64(from + IDENTITY) != c->identity) {
+  if (load_u64(from + SIZE) != component_state_size(c) || load_u64(from + IDENTITY) != c->identity) {
     return "state of another FMU";
   }
   return NULL;
@@ -130,7 +94,7 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
   if (reason) {
     return reason;
   }
-  if (get_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
+  if (load_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
     return "damaged state: its checksum does not match";
   }
   if (!life_is_sound(bytes) || !parameters_are_sound(c, bytes)) {
@@ -161,12 +125,8 @@ const char* component_restore(component* c, const void* bytes) {
   c->end_of_step = get_number(from, AT_END);
   c->inputs_given = get_number(from, AT_INPUTS_GIVEN) != 0.0;
   component_forget_steps(c);
-  for (size_t i = 0; i < v->input_count; ++i) {
-    v->numbers[i] = get_number(from, LIFE_COUNT + i);
-  }
-  for (size_t i = 0; i < v->parameter_count; ++i) {
-    v->parameters[i] = get_number(from, LIFE_COUNT + v->input_count + i);
-  }
+  load_doubles(v->numbers, from + NUMBERS + 8 * LIFE_COUNT, v->input_count);
+  load_doubles(v->parameters, from + NUMBERS + 8 * (LIFE_COUNT + v->input_count), v->parameter_count);
   if (!c->waiting) {
     model_fetch_outputs(c->model, v);
   }

@@ -109,16 +109,8 @@ def test_damaged_states_are_refused_and_change_nothing(kind: Kind) -> None:
             assert instance.restore(good) == OK
 
 
-def hash_of_bytes(data: bytes) -> int:
-    """FNV-1a."""
-    value = 0xCBF29CE484222325
-    for byte in data:
-        value = (value ^ byte) * 0x100000001B3 % 2**64
-    return value
-
-
 def hash_of_words(data: bytes) -> int:
-    """That of the core's own states (hash_bytes in bytes.c), whose length is a multiple of 8."""
+    """The core's (hash_bytes in bytes.c), of states, whose length is a multiple of 8."""
     value = 0xCBF29CE484222325 ^ len(data)
     for (word,) in struct.iter_unpack("<Q", data):
         value = (value ^ word) * 0x9E3779B97F4A7C15 % 2**64
@@ -134,7 +126,7 @@ def sealed(state: bytes | bytearray) -> bytes:
     core = changed.find(b"TFMUSTA", 40)
     if core >= 0:
         changed[core + 24 : core + 32] = struct.pack("<Q", hash_of_words(changed[core + 32 :]))
-    changed[24:32] = struct.pack("<Q", hash_of_bytes(changed[32:]))
+    changed[24:32] = struct.pack("<Q", hash_of_words(changed[32:]))
     return bytes(changed)
 
 
@@ -142,7 +134,7 @@ def with_number(state: bytes, index: int, value: float) -> bytes:
     """The state with another number, from byte 40 on, and the FMU's checksum that belongs to it."""
     changed = bytearray(state)
     changed[40 + 8 * index : 48 + 8 * index] = struct.pack("<d", value)
-    changed[24:32] = struct.pack("<Q", hash_of_bytes(changed[32:]))
+    changed[24:32] = struct.pack("<Q", hash_of_words(changed[32:]))
     return bytes(changed)
 
 
