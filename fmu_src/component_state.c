@@ -31,7 +31,7 @@ static size_t model_offset(const component* c) {
 }
 
 size_t component_state_size(const component* c) {
-  return model_offset(c) + model_state_size(c->model);
+  return model_offset(c) + model_get_shape(c->model).state_size;
 }
 
 void component_save(const component* c, void* bytes) {

@@ -8,8 +8,8 @@
 
 struct model {
   tendonfmu_finger* finger;
-  void* scratch; /* [state_size] a state of the finger to go back to */
-  size_t state_size, parameter_count;
+  model_shape shape;
+  void* scratch;           /* [state_size] a state of the finger to go back to */
   size_t* changed_indices; /* [p] parameters to hand over */
   double* changed_values;  /* [p] */
   double* derivatives;     /* [inputs + outputs] */
@@ -42,12 +42,16 @@ model* model_create(const void* resource, size_t size, int at_end, char* message
     return NULL;
   }
   m->at_end = at_end;
-  m->state_size = tendonfmu_state_size(m->finger);
-  m->parameter_count = tendonfmu_parameter_count(m->finger);
-  m->scratch = malloc(m->state_size);
-  m->changed_indices = malloc((m->parameter_count + 1) * sizeof *m->changed_indices);
-  m->changed_values = malloc((m->parameter_count + 1) * sizeof *m->changed_values);
-  m->derivatives = calloc(GROUP_COUNT * (model_joint_count(m) + model_tendon_count(m) + 1), sizeof *m->derivatives);
+  m->shape = (model_shape){.joints = tendonfmu_joint_count(m->finger),
+                           .tendons = tendonfmu_tendon_count(m->finger),
+                           .parameters = tendonfmu_parameter_count(m->finger),
+                           .state_size = tendonfmu_state_size(m->finger),
+                           .has_links = tendonfmu_has_links(m->finger),
+                           .watches_sensors = tendonfmu_watches_sensors(m->finger)};
+  m->scratch = malloc(m->shape.state_size);
+  m->changed_indices = malloc((m->shape.parameters + 1) * sizeof *m->changed_indices);
+  m->changed_values = malloc((m->shape.parameters + 1) * sizeof *m->changed_values);
+  m->derivatives = calloc(GROUP_COUNT * (m->shape.joints + m->shape.tendons + 1), sizeof *m->derivatives);
   if (!m->scratch || !m->changed_indices || !m->changed_values || !m->derivatives) {
     say(message, message_size, "out of memory");
     model_destroy(m);
@@ -73,20 +77,8 @@ void model_guid(const void* resource, size_t size, int at_end, char guid[39]) {
   tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT + (unsigned)at_end, guid);
 }
 
-size_t model_joint_count(const model* m) {
-  return tendonfmu_joint_count(m->finger);
-}
-
-size_t model_tendon_count(const model* m) {
-  return tendonfmu_tendon_count(m->finger);
-}
-
-int model_has_links(const model* m) {
-  return tendonfmu_has_links(m->finger);
-}
-
-int model_watches_sensors(const model* m) {
-  return tendonfmu_watches_sensors(m->finger);
+model_shape model_get_shape(const model* m) {
+  return m->shape;
 }
 
 const char* model_last_error(const model* m) {
@@ -123,12 +115,8 @@ model_range model_setting_range(const model* m, variable_group_id group) {
                        .maximum = variable_groups[group].maximum};
 }
 
-size_t model_parameter_count(const model* m) {
-  return m->parameter_count;
-}
-
 void model_get_parameters(const model* m, double* values) {
-  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, values);
+  tendonfmu_get_parameters(m->finger, m->shape.parameters, NULL, values);
 }
 
 model_range model_parameter_range(const model* m, size_t index) {
@@ -161,8 +149,8 @@ double model_get_time(const model* m) {
  * then hold or not for all together, whatever order they were written in. */
 static tendonfmu_status hand_over_parameters(model* m, const variables* values) {
   size_t changed = 0;
-  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, m->changed_values);
-  for (size_t i = 0; i < m->parameter_count; ++i) {
+  tendonfmu_get_parameters(m->finger, m->shape.parameters, NULL, m->changed_values);
+  for (size_t i = 0; i < m->shape.parameters; ++i) {
     if (values->parameters[i] != m->changed_values[i]) {
       m->changed_indices[changed] = i;
       m->changed_values[changed++] = values->parameters[i];
@@ -190,13 +178,13 @@ static model_answer take_sample(model* m, variables* values, double time) {
     return MODEL_OK; /* taken already: nothing changes, and parameters wait for the next sample */
   }
   if (values->parameters_pending) {
-    tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+    tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
   }
   const model_answer answer = advance(m, values, time);
   if (answer == MODEL_OK) {
     values->parameters_pending = 0;
   } else if (values->parameters_pending) { /* they are not to stay with a finger that refused the sample */
-    tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+    tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
   }
   return answer;
 }
@@ -206,7 +194,7 @@ model_answer model_initialise(model* m, variables* values, double start) {
 }
 
 model_answer model_begin_trial(model* m, variables* values, double start) {
-  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+  tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
   const model_answer answer = advance(m, values, start);
   if (answer != MODEL_OK) {
     model_end_trial(m);
@@ -215,7 +203,7 @@ model_answer model_begin_trial(model* m, variables* values, double start) {
 }
 
 void model_end_trial(model* m) {
-  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+  tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
 }
 
 static double sample_time(const model* m, double time, double step) {
@@ -238,31 +226,27 @@ model_answer model_step(model* m, variables* values, double time, double step) {
 /* --- saved states --------------------------------------------------------------------------------------------------
  */
 
-size_t model_state_size(const model* m) {
-  return m->state_size;
-}
-
 void model_fetch_outputs(const model* m, variables* values) {
   variables_fetch_outputs(values, m->finger);
 }
 
 void model_save(const model* m, void* bytes) {
-  tendonfmu_save_state(m->finger, bytes, m->state_size);
+  tendonfmu_save_state(m->finger, bytes, m->shape.state_size);
 }
 
 const char* model_check_state(model* m, const void* bytes, int may_be_initialised) {
   const char* reason = NULL;
-  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
-  if (tendonfmu_restore_state(m->finger, bytes, m->state_size) != TENDONFMU_OK) {
+  tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
+  if (tendonfmu_restore_state(m->finger, bytes, m->shape.state_size) != TENDONFMU_OK) {
     return tendonfmu_last_error(m->finger);
   }
   if (tendonfmu_is_initialised(m->finger) && !may_be_initialised) {
     reason = "damaged state: its phase does not fit its finger";
   }
-  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+  tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
   return reason;
 }
 
 int model_restore(model* m, const void* bytes) {
-  return tendonfmu_restore_state(m->finger, bytes, m->state_size) == TENDONFMU_OK ? 0 : -1;
+  return tendonfmu_restore_state(m->finger, bytes, m->shape.state_size) == TENDONFMU_OK ? 0 : -1;
 }

@@ -71,21 +71,15 @@ fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefi
   return (fmi2Status)life_set_experiment(instance, CALL_SETUP_EXPERIMENT, &e);
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {
-  return (fmi2Status)life_enter_initialisation(instance);
-}
+#define WITHOUT_ARGUMENTS(function, life)       \
+  fmi2Status function(fmi2Component instance) { \
+    return (fmi2Status)life(instance);          \
+  }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component instance) {
-  return (fmi2Status)life_exit_initialisation(instance);
-}
-
-fmi2Status fmi2Terminate(fmi2Component instance) {
-  return (fmi2Status)life_terminate(instance);
-}
-
-fmi2Status fmi2Reset(fmi2Component instance) {
-  return (fmi2Status)life_reset(instance);
-}
+WITHOUT_ARGUMENTS(fmi2EnterInitializationMode, life_enter_initialisation)
+WITHOUT_ARGUMENTS(fmi2ExitInitializationMode, life_exit_initialisation)
+WITHOUT_ARGUMENTS(fmi2Terminate, life_terminate)
+WITHOUT_ARGUMENTS(fmi2Reset, life_reset)
 
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {

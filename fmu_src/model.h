@@ -28,12 +28,14 @@ void model_reset(model* m);
 /* Identifier of the resource, of the table of variables and of `at_end`. */
 void model_guid(const void* resource, size_t size, int at_end, char guid[39]);
 
-size_t model_joint_count(const model* m);
-size_t model_tendon_count(const model* m);
-
-/* Whether there are the groups of the table that need links. */
-int model_has_links(const model* m);
-int model_watches_sensors(const model* m);
+/* What an instance of a resource never changes. */
+typedef struct model_shape {
+  size_t joints, tendons;
+  size_t parameters;              /* by path, beyond the table's groups */
+  size_t state_size;              /* bytes of a saved state, settings included */
+  int has_links, watches_sensors; /* whether there are the groups of the table that need these */
+} model_shape;
+model_shape model_get_shape(const model* m);
 
 /* One line about the last call that failed. */
 const char* model_last_error(const model* m);
@@ -56,7 +58,6 @@ void model_set_setting(model* m, variable_group_id group, size_t index, double v
 model_range model_setting_range(const model* m, variable_group_id group);
 
 /* Parameters by path, beyond the table's groups; they take effect with the next sample, all together. */
-size_t model_parameter_count(const model* m);
 void model_get_parameters(const model* m, double* values);
 model_range model_parameter_range(const model* m, size_t index);
 /* 0, or -1 when the path is longer than size - 1. */
@@ -97,8 +98,6 @@ void model_fetch_outputs(const model* m, struct variables* values);
 /* --- saved states --------------------------------------------------------------------------------------------------
  */
 
-/* Bytes of a state, settings included; the same for every instance of one FMU. */
-size_t model_state_size(const model* m);
 void model_save(const model* m, void* bytes);
 
 /* Why these bytes cannot be a state; NULL when they can. Before the initialisation `may_be_initialised` is 0. Changes

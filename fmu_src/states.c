@@ -25,6 +25,15 @@ static int is_own_block(component* c, fmu_function function, const void* block) 
   return block && !reason;
 }
 
+/* *state NULL: a new block of this FMU; otherwise it must be one. */
+static fmu_status provide_block(component* c, fmu_function function, void** state) {
+  if (*state) {
+    return is_own_block(c, function, *state) ? FMU_OK : FMU_ERROR;
+  }
+  *state = malloc(component_state_size(c));
+  return *state ? FMU_OK : fail(c, function, "out of memory");
+}
+
 fmu_status states_get(component* c, void** state) {
   if (!component_may_call(c, CALL_GET_FMU_STATE)) {
     return FMU_ERROR;
@@ -32,14 +41,8 @@ fmu_status states_get(component* c, void** state) {
   if (!state) {
     return fail_without_state(c, CALL_GET_FMU_STATE);
   }
-  if (*state && !is_own_block(c, CALL_GET_FMU_STATE, *state)) {
+  if (provide_block(c, CALL_GET_FMU_STATE, state)) {
     return FMU_ERROR;
-  }
-  if (!*state) {
-    *state = malloc(component_state_size(c));
-  }
-  if (!*state) {
-    return fail(c, CALL_GET_FMU_STATE, "out of memory");
   }
   component_save(c, *state);
   return FMU_OK;
@@ -68,10 +71,8 @@ fmu_status states_free(component* c, void** state) {
 }
 
 fmu_status states_serialized_size(component* c, const void* state, size_t* size) {
-  if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE)) {
-    return FMU_ERROR;
-  }
-  if (!is_own_block(c, CALL_SERIALIZED_FMU_STATE_SIZE, state)) {
+  if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE) ||
+      !is_own_block(c, CALL_SERIALIZED_FMU_STATE_SIZE, state)) {
     return FMU_ERROR;
   }
   if (!size) {
@@ -92,10 +93,8 @@ static int has_bytes(component* c, fmu_function function, const void* bytes, siz
 }
 
 fmu_status states_serialize(component* c, const void* state, void* bytes, size_t size) {
-  if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE)) {
-    return FMU_ERROR;
-  }
-  if (!is_own_block(c, CALL_SERIALIZE_FMU_STATE, state) || !has_bytes(c, CALL_SERIALIZE_FMU_STATE, bytes, size)) {
+  if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE) || !is_own_block(c, CALL_SERIALIZE_FMU_STATE, state) ||
+      !has_bytes(c, CALL_SERIALIZE_FMU_STATE, bytes, size)) {
     return FMU_ERROR;
   }
   memcpy(bytes, state, size);
@@ -116,14 +115,8 @@ fmu_status states_deserialize(component* c, const void* bytes, size_t size, void
   if (reason) {
     return fail(c, CALL_DESERIALIZE_FMU_STATE, reason);
   }
-  if (*state && !is_own_block(c, CALL_DESERIALIZE_FMU_STATE, *state)) {
+  if (provide_block(c, CALL_DESERIALIZE_FMU_STATE, state)) {
     return FMU_ERROR;
-  }
-  if (!*state) {
-    *state = malloc(size);
-  }
-  if (!*state) {
-    return fail(c, CALL_DESERIALIZE_FMU_STATE, "out of memory");
   }
   memcpy(*state, bytes, size);
   return FMU_OK;

@@ -4,13 +4,14 @@
 #include <string.h>
 
 /* Elements of a group; 0 where the model does not have what it needs. */
-static size_t count_elements(const variables* v, const variable_group* group) {
-  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
+static size_t count_elements(const model_shape* shape, const variable_group* group) {
+  if ((group->needs == NEEDS_LINKS && !shape->has_links) ||
+      (group->needs == NEEDS_SENSOR_FAULT && !shape->watches_sensors)) {
     return 0;
   }
   switch (group->size) {
-    case SIZE_JOINTS: return v->joints;
-    case SIZE_TENDONS: return v->tendons;
+    case SIZE_JOINTS: return shape->joints;
+    case SIZE_TENDONS: return shape->tendons;
     case SIZE_VECTOR: return 3;
     default: return 1;
   }
@@ -57,13 +58,10 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
 int variables_create(variables* v, const model* m, int arrays) {
   memset(v, 0, sizeof *v);
   v->arrays = arrays;
-  v->joints = model_joint_count(m);
-  v->tendons = model_tendon_count(m);
-  v->parameter_count = model_parameter_count(m);
-  v->has_links = model_has_links(m);
-  v->watches_sensors = model_watches_sensors(m);
+  const model_shape shape = model_get_shape(m);
+  v->parameter_count = shape.parameters;
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    v->count[g] = count_elements(v, &variable_groups[g]);
+    v->count[g] = count_elements(&shape, &variable_groups[g]);
   }
   v->input_count = number_count(v, CAUSALITY_INPUT);
   v->output_count = number_count(v, CAUSALITY_OUTPUT);

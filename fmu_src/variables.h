@@ -7,10 +7,9 @@
 #include "model.h"
 #include "variable_table.h"
 
-/* Arrays of n joints, m tendons, p parameters. All memory is taken by variables_create(). */
+/* All memory is taken by variables_create(). */
 typedef struct variables {
-  size_t joints, tendons, parameter_count;
-  int has_links, watches_sensors;
+  size_t parameter_count;           /* p */
   int arrays;                       /* a value reference stands for a whole group, not for one element */
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */

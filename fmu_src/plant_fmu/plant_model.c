@@ -81,22 +81,9 @@ void model_guid(const void* resource, size_t size, int at_end, char guid[39]) {
   tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT, guid);
 }
 
-size_t model_joint_count(const model* m) {
-  return m->joints;
-}
-
-size_t model_tendon_count(const model* m) {
-  return m->tendons;
-}
-
-int model_has_links(const model* m) {
-  (void)m; /* no group of its table needs any */
-  return 0;
-}
-
-int model_watches_sensors(const model* m) {
-  (void)m; /* nor this */
-  return 0;
+/* Its groups need neither links nor sensors that are watched, and the rig's numbers are no parameters. */
+model_shape model_get_shape(const model* m) {
+  return (model_shape){.joints = m->joints, .tendons = m->tendons, .state_size = plant_model_state_size(m)};
 }
 
 const char* model_last_error(const model* m) {
@@ -136,12 +123,7 @@ const char* model_set_tolerance(model* m, double* tolerance) {
   return NULL;
 }
 
-/* The rig's numbers are no parameters: another rig is another FMU. */
-
-size_t model_parameter_count(const model* m) {
-  (void)m;
-  return 0;
-}
+/* By path there are none: another rig is another FMU. */
 
 void model_get_parameters(const model* m, double* values) {
   (void)m, (void)values;

@@ -24,13 +24,13 @@ static const void* plant_bytes(const model* m, const void* bytes) {
   return (const char*)bytes + plant_offset(m);
 }
 
-size_t model_state_size(const model* m) {
+size_t plant_model_state_size(const model* m) {
   return plant_offset(m) + m->plant_state_size;
 }
 
 void model_save(const model* m, void* bytes) {
   const double life[] = {m->running, m->start, m->running && m->commanded, m->tolerance_written};
-  memset(bytes, 0, model_state_size(m));
+  memset(bytes, 0, plant_model_state_size(m));
   put(bytes, AT_RUNNING, life, AT_SETTINGS);
   put(bytes, AT_SETTINGS, m->wanted, SETTING_COUNT);
   if (m->running) {
@@ -47,10 +47,10 @@ static int is_flag(double x) {
 static int is_blank(const model* m, const void* bytes) {
   const unsigned char* byte = bytes;
   size_t at = AT_INPUTS * sizeof(double);
-  while (at < model_state_size(m) && byte[at] == 0) {
+  while (at < plant_model_state_size(m) && byte[at] == 0) {
     ++at;
   }
-  return at == model_state_size(m);
+  return at == plant_model_state_size(m);
 }
 
 const char* model_check_state(model* m, const void* bytes, int may_be_initialised) {
