@@ -36,32 +36,21 @@ static double given_value(const void* values, value_format format, size_t at, va
   return type == VARIABLE_BOOLEAN ? value != 0.0 : value;
 }
 
-static void put_numbers(void* values, value_format format, size_t at, const double* numbers, size_t count) {
+/* Numbers, or flags in their place, which are read as Booleans: never into doubles. */
+static void put_values(void* values, value_format format, size_t at, const double* numbers, const unsigned char* flags,
+                       size_t count) {
   switch (format) {
     case VALUES_INT:
       for (size_t i = 0; i < count; ++i) {
-        ((int*)values)[at + i] = (int)numbers[i];
+        ((int*)values)[at + i] = flags ? flags[i] : (int)numbers[i];
       }
       break;
     case VALUES_BOOL:
       for (size_t i = 0; i < count; ++i) {
-        ((_Bool*)values)[at + i] = numbers[i] != 0.0;
+        ((_Bool*)values)[at + i] = flags ? flags[i] != 0 : numbers[i] != 0.0;
       }
       break;
     default: memcpy((double*)values + at, numbers, count * sizeof *numbers); break;
-  }
-}
-
-/* flags are read as Booleans: never into doubles */
-static void put_flags(void* values, value_format format, size_t at, const unsigned char* flags, size_t count) {
-  if (format == VALUES_INT) {
-    for (size_t i = 0; i < count; ++i) {
-      ((int*)values)[at + i] = flags[i];
-    }
-    return;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    ((_Bool*)values)[at + i] = flags[i] != 0;
   }
 }
 
@@ -90,7 +79,7 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
   for (size_t i = 0; i < count; i += run.references, at += run.elements) {
     if (is_time(references[i], type)) {
       run.references = run.elements = 1;
-      put_numbers(values, format, at, &c->end_of_step, 1);
+      put_values(values, format, at, &c->end_of_step, NULL, 1);
       continue;
     }
     if (find_run(c, function, type, references + i, count - i, &run)) {
@@ -101,11 +90,9 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
       return updated;
     }
     status = updated > status ? updated : status;
-    if (variable_is_flag(&run.first)) {
-      put_flags(values, format, at, c->values.flag[run.first.id] + run.first.index, run.elements);
-    } else {
-      put_numbers(values, format, at, variables_number(&c->values, &run.first), run.elements);
-    }
+    const int is_flag = variable_is_flag(&run.first);
+    put_values(values, format, at, is_flag ? NULL : variables_number(&c->values, &run.first),
+               is_flag ? c->values.flag[run.first.id] + run.first.index : NULL, run.elements);
   }
   return status;
 }

@@ -42,7 +42,16 @@ struct variable_list {
 
 class unpacked_fmu;
 
+template <class Status>
+fmu_status as_status(Status status) {
+  return static_cast<fmu_status>(status);
+}
+
 // Calls that both versions have, under one name. fuzz_fmi2.cpp and fuzz_fmi3.cpp define them.
+#define VERSION_CALL(name, parameters, call) \
+  fmu_status name parameters {               \
+    return as_status(call);                  \
+  }
 namespace version {
 void* instantiate(const unpacked_fmu& fmu);
 void free_instance(void* component);
