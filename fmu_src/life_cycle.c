@@ -205,12 +205,12 @@ fmu_status life_reset(component* c) {
 enum { MOST_REFUSALS = 1000 };
 
 static fmu_status discard_step(component* c, double time) {
-  const log_text text = log_line("%s: %s", call_name(CALL_DO_STEP), model_last_error(c->model));
   c->refusals = c->refusals && time == c->refused_at ? c->refusals + 1 : 1;
   c->refused_at = time;
   if (c->refusals > MOST_REFUSALS) {
     return component_fail(c, call_name(CALL_DO_STEP), "%s; the step was tried 1000 times", model_last_error(c->model));
   }
+  const log_text text = log_line("%s: %s", call_name(CALL_DO_STEP), model_last_error(c->model));
   return c->step_status = log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
 }
 

@@ -22,26 +22,16 @@ static int has_numbers(const variable_group* group) {
   return group->type != VARIABLE_BOOLEAN || group->causality == CAUSALITY_PARAMETER;
 }
 
-/* Numbers of all groups of one causality. */
-static size_t number_count(const variables* v, variable_causality causality) {
-  size_t count = 0;
+/* Gives each group of one causality its part of a block, NULL to count; returns how many numbers they have. */
+static size_t share_out(variables* v, variable_causality causality, double* block) {
+  size_t used = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      count += v->count[g];
+      v->number[g] = block && v->count[g] ? block + used : NULL;
+      used += v->count[g];
     }
   }
-  return count;
-}
-
-/* Gives each group of one causality its part of the block; returns what is left of it. */
-static double* share_out(variables* v, variable_causality causality, double* block) {
-  for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      v->number[g] = v->count[g] ? block : NULL;
-      block += v->count[g];
-    }
-  }
-  return block;
+  return used;
 }
 
 static size_t share_out_flags(variables* v, unsigned char* block) {
@@ -63,17 +53,18 @@ int variables_create(variables* v, const model* m, int arrays) {
   for (int g = 0; g < GROUP_COUNT; ++g) {
     v->count[g] = count_elements(&shape, &variable_groups[g]);
   }
-  v->input_count = number_count(v, CAUSALITY_INPUT);
-  v->output_count = number_count(v, CAUSALITY_OUTPUT);
-  const size_t settings = number_count(v, CAUSALITY_PARAMETER);
+  v->input_count = share_out(v, CAUSALITY_INPUT, NULL);
+  v->output_count = share_out(v, CAUSALITY_OUTPUT, NULL);
+  const size_t settings = share_out(v, CAUSALITY_PARAMETER, NULL);
   v->numbers = calloc(v->input_count + v->output_count + settings + v->parameter_count, sizeof(double));
   v->flags = calloc(share_out_flags(v, NULL), 1);
   if (!v->numbers || !v->flags) {
     return -1;
   }
   share_out_flags(v, v->flags);
-  double* outputs = share_out(v, CAUSALITY_INPUT, v->numbers);
-  v->parameters = share_out(v, CAUSALITY_PARAMETER, share_out(v, CAUSALITY_OUTPUT, outputs));
+  double* outputs = v->numbers + share_out(v, CAUSALITY_INPUT, v->numbers);
+  double* of_settings = outputs + share_out(v, CAUSALITY_OUTPUT, outputs);
+  v->parameters = of_settings + share_out(v, CAUSALITY_PARAMETER, of_settings);
   variables_start(v, m);
   return 0;
 }
