@@ -41,7 +41,7 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
 
 
 def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
-    """Compute the rms [n] by joint over the samples of a flag ("train", "held_out" or "tracked"); None without any."""
+    """Compute the rms [n] by joint over the samples of a flag ("train" or "held_out"); None without any."""
     chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
     if not any(flags.any() for flags in chosen):
         return None

@@ -99,7 +99,7 @@ def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> 
 
 def _comparison(evaluation: Evaluation) -> dict[str, Any]:
     recording = evaluation.recording
-    return {"label": recording.path.stem, **recording.entry(), **(residual_entry([evaluation], "tracked") or {})}
+    return {"label": recording.path.stem, **recording.entry(), **(residual_entry([evaluation], "train") or {})}
 
 
 def _correlation(covariance: Numbers) -> list[list[float]]:

@@ -53,6 +53,7 @@ from tendonfmu.recordings import (
     routed,
     routing_entry,
     slack_sentences,
+    without_rests,
 )
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `passes`
@@ -183,7 +184,8 @@ class FrictionFit(Configured):
         return self
 
     def _prepared(self, source: RecordingSource, held: Held) -> FitRecording:
-        return prepare(self.start_, read_recording(source), self.options.kinematics, held)
+        prepared = prepare(self.start_, read_recording(source), self.options.kinematics, held)
+        return without_rests(prepared, self.start_)
 
     def _motion_warnings(self, of_recordings: bool) -> list[str]:
         self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))

@@ -55,7 +55,7 @@ def slowest_drift(residual: Numbers, time: Numbers, stretch: Indices, used: Flag
 
     residual: [B, n] (N·m); time: [B] (s); stretch, used: [B]; still: [B] whether all joints stand still.
     """
-    rests = _rests(time, stretch, used & still)
+    rests = _rests(time, stretch, still)
     best = np.inf
     if len(rests) >= FEWEST:
         scale = np.maximum(residual[used].std(axis=0), 1e-12)

@@ -202,14 +202,20 @@ def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: 
     if cover is not None and cause == "slow":
         return f"let joint {drive} turn round slowly: strokes at {cover.threshold:g} to {_stribeck(verdict):.3g} {unit}"
     if cause == "noise":
-        return _more(verdict, cover)
-    partners = ", ".join(verdict.partners) or "others"
-    return f"change the pretension during the recording, or --fix or --share it with {partners}"
+        return _more(verdict, cover, finger)
+    tense = "change the pretension during the recording, or " if _has_pretension(finger) else ""
+    return f"{tense}--fix or --share it with {', '.join(verdict.partners) or 'others'}"
 
 
-def _more(verdict: Verdict, cover: EffectCoverage | None) -> str:
+def _has_pretension(finger: Finger) -> bool:
+    """Return whether any tendon can only pull. A machine without tendons is described by loops."""
+    return not all(tendon.get("bidirectional") for tendon in finger.data["tendons"])
+
+
+def _more(verdict: Verdict, cover: EffectCoverage | None, finger: Finger) -> str:
     """Name what raises a number above the noise: load, or time, since errors fall with its square root."""
-    load = "" if cover is not None and cover.effect.kind == "friction" else "more pretension (tendon force), or "
+    is_joints = cover is not None and cover.effect.kind == "friction"
+    load = "" if is_joints or not _has_pretension(finger) else "more pretension (tendon force), or "
     if verdict.error_alone >= PRIOR / 2:
         return f"nothing in these recordings depends on it: {load}remove it from the description, or --fix it"
     longer = (verdict.error_alone / LIMIT) ** 2

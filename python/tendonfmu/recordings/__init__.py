@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         refuse_stillness,
         require_noise,
         slack_sentences,
+        without_rests,
     )
     from .recording import (
         GROUP_PER,

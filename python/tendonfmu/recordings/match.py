@@ -39,6 +39,7 @@ from tendonfmu.recordings.kinematics import (
     tells,
     velocity_corrections,
 )
+from tendonfmu.recordings.prepared import holds_at_rest, is_at_rest
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
@@ -60,6 +61,7 @@ OPPOSED = 0.5  # the sum of torque and reference leaves less than this share of 
 SAME_RATIO = 1.1  # between the ratios of all springs and that of a unit
 LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 MISLEADS = 5e-3  # rad; numbers that give an angle nearer to the measured one are as good as those of this recording
+MANY_RESTS = 0.1  # of the samples
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
@@ -134,11 +136,19 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
         findings += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
         if not is_silent and not _has_error(findings):
             findings += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
-    return [*findings, *_of_channels(finger, mended, held)]
+    return [*findings, *_of_channels(finger, mended, held), *_of_rests(finger, mended)]
 
 
 def _has_error(findings: Sequence[Finding]) -> bool:
     return any(finding.severity == "error" for finding in findings)
+
+
+def _of_rests(finger: Finger, recording: Recording) -> Iterator[Finding]:
+    velocity = recording.groups.get("joint_velocity")
+    if velocity is not None and holds_at_rest(finger.data):
+        share = float(is_at_rest(finger.data, velocity).mean())
+        if MANY_RESTS < share < 1.0:
+            yield text.rests(recording.path, share)
 
 
 # --- clock and channels -----------------------------------------------------------------------------------------------

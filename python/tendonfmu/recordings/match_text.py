@@ -56,6 +56,13 @@ def repair(path: Path, fitting: Repair) -> Finding:
     return _of_correction(path, correction, seen, probably)
 
 
+def rests(path: Path, share: float) -> Finding:
+    """Describe a log with much rest, of a machine whose motor holds there."""
+    probably = "a motor that holds with any torque up to friction, which says nothing of its size"
+    write = "fit learns from the samples in motion alone"
+    return Finding("warning", "rests", path, ("joint_velocity",), f"{percent(share)} at rest", probably, write)
+
+
 def velocity(path: Path, correction: Correction, slope: float) -> Finding:
     """Describe a joint velocity that does not belong to its angle."""
     seen = f"the angle changes by {slope:.4g} times the integral of the velocity; expected 1"

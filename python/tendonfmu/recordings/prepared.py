@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,17 @@ import numpy as np
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.files import are, counted, percent
-from tendonfmu.model import INPUTS_OF_SOURCE, Finger, inputs_used, moment_arms, number_of, watches_motors
+from tendonfmu.model import (
+    INPUTS_OF_SOURCE,
+    Finger,
+    effects,
+    inputs_used,
+    moment_arms,
+    number_of,
+    sliding_velocity,
+    velocity_threshold,
+    watches_motors,
+)
 from tendonfmu.recordings.faults import (
     SETTLING,
     gap_sentences,
@@ -51,6 +61,7 @@ class FitRecording:
     held_out: Flags
     contact_out: Flags
     faulty: Flags
+    at_rest: Flags  # nothing slides, and a fit does not learn from it: `without_rests`
     parts: list[slice]  # slices without a gap
     model: Model  # what the given finger makes of it
     warnings: list[str]  # sentences about what was left out and what is poor
@@ -68,7 +79,7 @@ class FitRecording:
     @property
     def tracked(self) -> Flags:
         """Samples [N] that the bias filter learns from when a finished fit is judged, as at run time."""
-        return self.train | self.held_out
+        return self.train | self.held_out | self.at_rest
 
     @property
     def external(self) -> Numbers | None:
@@ -103,6 +114,7 @@ class FitRecording:
             "held_out": int(self.held_out.sum()),
             "contact_left_out": int(self.contact_out.sum()),
             "faulty_left_out": int(self.faulty.sum()),
+            "at_rest": int(self.at_rest.sum()),
             "parts": len(self.parts),
             "duration": self.duration,
             "mean_force": self.mean_force,
@@ -144,10 +156,52 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
         held_out=held_out,
         contact_out=contact,
         faulty=faulty,
+        at_rest=np.zeros(len(recording), dtype=bool),
         parts=parts,
         model=run_parts(finger.data, recording.arrays(), parts, usable, kinematics),
         warnings=[*warnings, *sentences],
     )
+
+
+def without_rests(recording: FitRecording, finger: Finger) -> FitRecording:
+    """Let nothing learn from the samples at rest, and let each part begin in motion, where the bias is constant.
+
+    A motor holds a joint that sticks with any torque up to its friction: such a sample says |F| ≤ F(v_min) and no more.
+    A part that begins at rest would take the friction of its first motion into the bias, which keeps it.
+    """
+    rests = is_at_rest(finger.data, recording.model.joint_speed)
+    if not (holds_at_rest(finger.data) and rests.any()) or rests.all():
+        return recording
+    parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in recording.parts]
+    parts = [part for part, whole in zip(parts, recording.parts, strict=True) if not rests[whole].all()]
+    inside = np.zeros(len(rests), dtype=bool)
+    for part in parts:
+        inside[part] = True
+    out = rests | ~inside
+    left = replace(
+        recording,
+        train=recording.train & ~out,
+        held_out=recording.held_out & ~out,
+        at_rest=recording.tracked & out,
+        parts=parts,
+    )
+    _refuse_too_little(left.recording, parts, left.tracked & ~out, left.contact_out)
+    return replace(left, model=left.run(finger.data))
+
+
+def holds_at_rest(data: Mapping[str, Any]) -> bool:
+    """Return whether nothing takes up what a motor holds at rest: the bias is constant, and no friction remembers."""
+    learns = number_of(data, "bias.drift_variance") > 0.0 or (data.get("bias") or {}).get("initial_variance") != 0.0
+    return not learns and not any(row["effect"] == "presliding" for row in data.get("extensions") or ())
+
+
+def is_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:
+    """Return [N] the samples in which no friction slides. joint_velocity: [N, n] (rad/s)."""
+    slides = [
+        np.abs(sliding_velocity(data, effect, joint_velocity)) > velocity_threshold(data, effect)
+        for effect in effects(data)
+    ]
+    return ~np.any(slides, axis=0) if slides else np.zeros(len(joint_velocity), dtype=bool)
 
 
 def _parts(time: Numbers) -> tuple[list[slice], Flags]:

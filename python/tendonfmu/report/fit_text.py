@@ -292,13 +292,13 @@ def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
 def lines(fit: FrictionFit) -> Iterator[str]:
     """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers."""
     report, numbers = fit.report_, fit.numbers_
-    keys = ("used", "held_out", "contact_left_out", "faulty_left_out")
-    used, held, contact, faulty = (sum(recording[key] for recording in report["recordings"]) for key in keys)
+    keys = ("used", "held_out", "contact_left_out", "faulty_left_out", "at_rest")
+    used, held, contact, faulty, rests = (sum(recording[key] for recording in report["recordings"]) for key in keys)
     ended = "converged" if report["converged"] else "NOT converged"
     passes = f", {counted(report['passes'], 'pass', 'passes')}" if report["passes"] else ""
     yield (
         f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {counted(used, 'sample')}, "
-        f"{held} held out, {contact + faulty} left out"
+        f"{held} held out, {contact + faulty} left out" + (f", {rests} at rest" if rests else "")
     )
     innovations = report["innovations"]
     low, high = innovations["nis"]["interval"]

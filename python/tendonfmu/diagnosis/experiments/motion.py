@@ -65,6 +65,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
         held_out=none,
         contact_out=none,
         faulty=none,
+        at_rest=none,
         parts=whole,
         model=run_parts(data, recording.arrays(), whole, ~none, kinematics),
         warnings=[],

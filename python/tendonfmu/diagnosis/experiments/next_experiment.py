@@ -321,6 +321,9 @@ def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
     )
 
 
+_BY_SAMPLE = ("target", "train", "held_out", "contact_out", "faulty", "at_rest")
+
+
 def _shortened(recording: FitRecording) -> FitRecording:
     """Return the beginning of its longest part, thinned to the sample rate that a predicted recording needs."""
     part = max(recording.parts, key=lambda part: recording.time[part.stop - 1] - recording.time[part.start])
@@ -334,7 +337,7 @@ def _shortened(recording: FitRecording) -> FitRecording:
     return replace(
         recording,
         recording=Recording(recording.path, np.ascontiguousarray(recording.time[rows]), groups),
-        **{name: getattr(recording, name)[rows] for name in ("target", "train", "held_out", "contact_out", "faulty")},
+        **{name: getattr(recording, name)[rows] for name in _BY_SAMPLE},
         parts=whole,
         model=Model(**model),
     )

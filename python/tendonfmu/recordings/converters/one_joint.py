@@ -41,10 +41,10 @@ CUTOFF = DEFAULTS["velocity_filter_cutoff"]  # Hz
 SHARE_OF_RATE = 0.2  # of the sample rate; the cut-off is at most this, since central differences fall off above it
 GAP = 10.0  # times the usual step; a longer step interrupts the log, and no filter spans it
 LEAST = 20  # samples
-RESTS = 0.01  # of the largest speed; slower samples before the first motion are a start at rest
 
 STIFFNESS = 1e9  # N/m: the drive is rigid, q = x0
-SLOWEST = 1e-3  # of the largest speed; below, the joint counts as at rest
+SLOWEST, FASTEST = 1e-3, 0.1  # of the largest speed; below, the joint counts as at rest; what noise may make of it
+WINDOW, QUIET, SIGMAS = 0.25, 0.1, 6.0  # s; share of the windows that are quieter than the noise; of it, that is rest
 THRESHOLD = 5.0  # times the residual of the straight line (rms); `tendonfmu tune` finds better thresholds
 # of the drive's largest torque, where nothing is measured; geared drives lose some 5 to 30 % in all
 COULOMB_SHARE, VISCOUS_SHARE, INERTIA_SHARE, NOISE_SHARE = 0.05, 0.02, 0.01, 0.005
@@ -83,7 +83,9 @@ def joint_columns(file: Path, parts: dict[str, Numbers], joint: Joint) -> tuple[
         columns["external_torque[1]"] = parts["known_load"]
     if "contact" in parts:
         columns["contact"] = parts["contact"]
-    begin = first_motion(file, velocity)
+    if not np.any(velocity):
+        raise InputError(f"{file}: the joint does not move; expected a log of motion")
+    begin = int(np.argmax(np.abs(velocity) > slowest_motion(time, velocity, angle, cutoff or CUTOFF)))
     if begin:
         notes.append(f"{file}: {counted(begin, 'sample')} at rest before the first motion {are(begin)} left out")
     return {name: values[begin:] for name, values in columns.items()}, cutoff, notes
@@ -111,14 +113,6 @@ def _smooth(time: Numbers, values: Numbers, cutoff: float) -> Numbers:
 def _pieces(time: Numbers) -> list[NDArray[np.intp]]:
     steps = np.diff(time)
     return np.split(np.arange(len(time)), np.flatnonzero(steps > GAP * float(np.median(steps))) + 1)
-
-
-def first_motion(file: Path, velocity: Numbers) -> int:
-    """Return the number of samples before the first motion."""
-    speed = np.abs(velocity)
-    if not speed.max() > 0.0:
-        raise InputError(f"{file}: the joint does not move; expected a log of motion")
-    return int(np.argmax(speed > RESTS * np.quantile(speed, 0.99)))
 
 
 def _cutoff(file: Path, time: Numbers, wanted: float | None) -> float:
@@ -193,7 +187,7 @@ def joint_description(
 def _measured(name: str, columns: dict[str, Numbers], cutoff: float, moment_arm: float) -> dict[str, Any]:
     """Return the description whose numbers are those of the straight line."""
     velocity = columns["joint_velocity[1]"]
-    slowest = slowest_motion(velocity, columns["joint_position[1]"], cutoff)
+    slowest = slowest_motion(columns["time"], velocity, columns["joint_position[1]"], cutoff)
     numbers = starting_numbers(columns, slowest)
     known = "external_torque[1]" in columns
     return _description(name, numbers, slowest, float(np.abs(velocity).max()) / 10, cutoff, moment_arm, known)
@@ -241,10 +235,21 @@ def description_text(description: dict[str, Any]) -> str:
     return json.dumps(description, indent=1) + "\n"
 
 
-def slowest_motion(velocity: Numbers, angle: Numbers, cutoff: float) -> float:
-    """Return the speed (rad/s) below which the joint is at rest."""
-    step = 2 * np.pi * cutoff * value_step(angle)
-    return float(f"{max(step, value_step(velocity), SLOWEST * np.abs(velocity).max()):.3g}")
+def slowest_motion(time: Numbers, velocity: Numbers, angle: Numbers, cutoff: float) -> float:
+    """Return the speed (rad/s) below which the joint is at rest: a step of the encoder, or noise."""
+    largest = float(np.abs(velocity).max())
+    step = max(2 * np.pi * cutoff * value_step(angle), value_step(velocity))
+    noise = min(SIGMAS * _speed_noise(velocity, float(np.median(np.diff(time)))), FASTEST * largest)
+    return float(f"{max(step, noise, SLOWEST * largest):.3g}")
+
+
+def _speed_noise(velocity: Numbers, step: float) -> float:
+    """Return the noise of a velocity [N]: what parabolas leave of its quietest windows. step: s."""
+    count = min(max(LEAST, round(WINDOW / step)), len(velocity))
+    windows = velocity[: len(velocity) // count * count].reshape(-1, count).T
+    parabola = np.vander(np.linspace(-1.0, 1.0, count), 3)
+    left = windows - parabola @ np.linalg.lstsq(parabola, windows, rcond=None)[0]
+    return float(np.quantile(np.sqrt(np.mean(left**2, axis=0)), QUIET))
 
 
 def starting_numbers(columns: dict[str, Numbers], slowest: float) -> dict[str, float]:

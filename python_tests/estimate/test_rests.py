@@ -1,0 +1,131 @@
+"""Logs of machines that move and rest: what a motor holds at rest says nothing of the friction's size.
+
+SIGMAS of `one_joint` was chosen on the seeds 1 to 5; the seeds here are others.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import servo
+from command import Call
+from map_cases import TURNING, edited
+from optional_parts import DATA, needs
+from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.recordings import convert_table, describe_joint, joint_description
+from tendonfmu.recordings.prepared import is_at_rest
+
+pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
+CASE = DATA.parent / "cases" / "24-moves-and-rests"
+
+
+def written(folder: Path, log: dict[str, Any], known: bool = False) -> tuple[Path, Path]:
+    wanted = edited(TURNING, "joint/known_load", {"column": "known", "unit": "N.m"}) if known else TURNING
+    pd.DataFrame({name: values for name, values in log.items() if name != "sticks"}).to_csv(folder / "log.csv")
+    (folder / "map.json").write_text(json.dumps(wanted))
+    return folder / "log.csv", folder / "map.json"
+
+
+def fitted(log: Path, columns: Path, **options: Any) -> tuple[FrictionFit, dict[str, Any]]:
+    """The fit, and the description that it began with."""
+    converted = convert_table(log, columns)
+    data = describe_joint(converted)
+    return FrictionFit(data, kinematics=3, threads=1, **options).fit(pd.DataFrame(converted.columns)), data
+
+
+def numbers(fit: FrictionFit) -> dict[str, float]:
+    return {path.rpartition(".")[2]: value for path, value in fit.parameters_.items()}
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"share": 0.0},
+        {"share": 0.2},
+        {"share": 0.5},
+        {"share": 0.8},
+        {"share": 0.5, "begins_at_rest": False, "offset": 0.1},
+        {"share": 0.5, "angle_noise": 2e-4},
+        {"share": 0.8, "angle_noise": 2e-4, "rate": 500.0},
+        {"share": 0.8, "noise": 0.03},
+    ],
+    ids=lambda options: ",".join(f"{name}={value:g}" for name, value in options.items()),
+)
+def test_the_truth_is_found_whatever_the_share_at_rest(tmp_path: Path, options: dict[str, Any], seed: int) -> None:
+    log = servo.servo_log(seed, duration=40.0, **options)
+    fit, _ = fitted(*written(tmp_path, {name: log[name] for name in ("t", "torque", "angle")}))
+    found = numbers(fit)
+    assert found["coulomb"] == pytest.approx(servo.COULOMB, rel=0.05)
+    assert found["viscous"] == pytest.approx(servo.VISCOUS, rel=0.05)
+    assert found["initial_torque[1]"] == pytest.approx(options.get("offset", 0.0), abs=0.01)
+    share = fit.report_["recordings"][0]["at_rest"] / fit.report_["recordings"][0]["samples"]
+    assert share == pytest.approx(log["sticks"], abs=0.1)
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize("method", ["batch", "ekf"])
+def test_a_known_load_leaves_the_friction(tmp_path: Path, seed: int, method: str) -> None:
+    """Without extensions both methods learn sample by sample; friction grows with the weight that it is given."""
+    log = servo.servo_log(seed, duration=40.0, load=0.5)
+    fit, _ = fitted(*written(tmp_path, log, known=True), method=method)
+    found = numbers(fit)
+    assert servo.COULOMB < found["coulomb"] < servo.COULOMB + servo.LOAD_SHARE * 0.5
+    assert found["viscous"] == pytest.approx(servo.VISCOUS, rel=0.05)
+
+
+def test_what_is_held_out_and_compared_is_motion(tmp_path: Path) -> None:
+    """The share of rests does not dilute an error: with the truth, noise alone is left."""
+    log, columns = written(tmp_path, servo.servo_log(14, duration=60.0, noise=0.02))
+    converted = convert_table(log, columns)
+    table = pd.DataFrame(converted.columns)
+    half = len(table) // 2
+    fit = FrictionFit(describe_joint(converted), kinematics=3, threads=1, holdout=0.3)
+    fit.fit(table[:half].reset_index(drop=True), table[half:].reset_index(drop=True))
+    residual = fit.report_["residual"]
+    for judged in (residual["train"], residual["held_out"], residual["comparisons"][0]):
+        assert judged["rms"][0] == pytest.approx(0.02, rel=0.2)
+
+
+def test_check_and_fit_name_the_share_at_rest(call: Call, tmp_path: Path) -> None:
+    log = servo.servo_log(15, duration=30.0)
+    log, columns = written(tmp_path, {name: log[name] for name in ("t", "torque", "angle")})
+    converted = call("convert", "table", log.name, "--map", columns.name, "-o", "rec.parquet", "--finger", "f.json")
+    assert converted.status == 0, converted.err
+    data = json.loads((tmp_path / "f.json").read_text())
+    velocity = pd.read_parquet(tmp_path / "rec.parquet")["joint_velocity[1]"].to_numpy()[:, None]
+    share = f"{100 * is_at_rest(data, velocity).mean():.2g} % at rest"
+    assert share in call("check", "f.json", "rec.parquet").out
+    answer = call("fit", "f.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json")
+    assert share in answer.err
+    assert "pretension" not in answer.out
+
+
+def test_a_machine_without_tendons_gets_no_advice_about_pretension(tmp_path: Path) -> None:
+    """Five seconds with much noise: numbers are not identified, and the advice is time."""
+    fit, _ = fitted(*written(tmp_path, servo.servo_log(16, duration=4.0, begins_at_rest=False, noise=0.5)))
+    advice = [number["advice"] for number in fit.report_["parameters"] if number["advice"]]
+    assert advice and not any("pretension" in each for each in advice), advice
+
+
+def test_at_rest_means_that_no_friction_slides() -> None:
+    data = describe_joint_of(0.02)
+    speed = np.array([[0.0], [0.02], [-0.02], [0.021], [-0.021]])
+    assert is_at_rest(data, speed).tolist() == [True, True, True, False, False]
+
+
+def describe_joint_of(threshold: float) -> dict[str, Any]:
+    data = joint_description("axis", 4.0, 5.0)
+    return data | {"velocity_threshold": {"tendon": threshold, "joint": threshold}}
+
+
+@needs("cases")
+def test_the_case_is_right() -> None:
+    found = numbers(fitted(CASE / "rest_1s.csv", CASE / "map.json")[0])
+    assert (found["coulomb"], found["viscous"]) == pytest.approx((0.300, 0.250), rel=0.05)
