@@ -19,7 +19,7 @@ from map_cases import TURNING, edited
 from optional_parts import DATA, needs
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.recordings import convert_table, describe_joint, joint_description
-from tendonfmu.recordings.prepared import is_at_rest
+from tendonfmu.recordings.prepared import left_at_rest
 
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 CASE = DATA.parent / "cases" / "24-moves-and-rests"
@@ -93,6 +93,37 @@ def test_what_is_held_out_and_compared_is_motion(tmp_path: Path) -> None:
         assert judged["rms"][0] == pytest.approx(0.02, rel=0.2)
 
 
+RESTING_BIAS = ({}, {"forget_rate": 0.0}, {"forgetting": "absorption"}, {"drift_variance": 1e-9})
+
+
+@pytest.mark.parametrize("bias", RESTING_BIAS, ids=str)
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_a_finger_with_tendons_and_a_learning_bias(bias: dict[str, Any], share: float) -> None:
+    """Two tendons hold the torque of the servo at a pretension; a bias would follow what it sees at rest."""
+    log = servo.servo_log(21, duration=40.0, share=share, noise=0.0)
+    torque, arm, stiffness = log["torque"] - log["known"], 0.01, 1e5
+    noise = np.random.default_rng(21).normal(0.0, 0.1, (len(torque), 2))
+    force = 50.0 + np.outer(torque, [0.5 / arm, -0.5 / arm])
+    position = np.outer(log["angle"], [arm, -arm]) + force / stiffness
+    table = pd.DataFrame({"time": log["t"]})
+    columns = [f"tendon_{what}[{i}]" for what in ("force", "position") for i in (1, 2)]
+    table[columns] = np.hstack([force + noise, position])
+    table["joint_position[1]"] = log["angle"]
+    table["joint_velocity[1]"] = log["velocity"]
+    law = {"static": 0.2, "coulomb": 0.2, "stribeck_velocity": 0.1, "viscous": 0.1}
+    tendons = [{"name": str(way), "stiffness": stiffness, "moment_arms": [way * arm]} for way in (1, -1)]
+    finger = {
+        "format": "tendonfmu-finger-1",
+        "name": "finger",
+        "joints": [{"name": "joint", "friction": law}],
+        "tendons": tendons,
+        "bias": {"noise_std": 1e-3, **bias},
+        "contact": {"threshold": [0.1]},
+    }
+    found = numbers(FrictionFit(finger, kinematics=3, threads=1).fit(table))
+    assert (found["coulomb"], found["viscous"]) == pytest.approx((servo.COULOMB, servo.VISCOUS), rel=0.05)
+
+
 def test_check_and_fit_name_the_share_at_rest(call: Call, tmp_path: Path) -> None:
     log = servo.servo_log(15, duration=30.0)
     log, columns = written(tmp_path, {name: log[name] for name in ("t", "torque", "angle")})
@@ -100,7 +131,7 @@ def test_check_and_fit_name_the_share_at_rest(call: Call, tmp_path: Path) -> Non
     assert converted.status == 0, converted.err
     data = json.loads((tmp_path / "f.json").read_text())
     velocity = pd.read_parquet(tmp_path / "rec.parquet")["joint_velocity[1]"].to_numpy()[:, None]
-    share = f"{100 * is_at_rest(data, velocity).mean():.2g} % at rest"
+    share = f"{100 * left_at_rest(data, velocity).mean():.2g} % at rest"
     assert share in call("check", "f.json", "rec.parquet").out
     answer = call("fit", "f.json", "rec.parquet", "--kinematics", "3", "-o", "fitted.json")
     assert share in answer.err
@@ -117,7 +148,7 @@ def test_a_machine_without_tendons_gets_no_advice_about_pretension(tmp_path: Pat
 def test_at_rest_means_that_no_friction_slides() -> None:
     data = describe_joint_of(0.02)
     speed = np.array([[0.0], [0.02], [-0.02], [0.021], [-0.021]])
-    assert is_at_rest(data, speed).tolist() == [True, True, True, False, False]
+    assert left_at_rest(data, speed).tolist() == [True, True, True, False, False]
 
 
 def describe_joint_of(threshold: float) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def servo_log(
     load: float = 0.0,
     offset: float = 0.0,
 ) -> dict[str, Any]:
-    """Return t, torque, angle, known load and the share of samples that stick.
+    """Return t, torque, angle, velocity (exact), known load and the share of samples that stick.
 
     share: of the time at rest; noise: N·m; angle_noise: rad, 0: an encoder; load: N·m, amplitude of a known weight.
     """
@@ -57,14 +57,15 @@ def servo_log(
         velocity = after
         angle += velocity * FINE
         if k % every == 0:
-            rows.append((k * FINE, torque, angle, weight + INERTIA * acceleration, velocity == 0.0))
-    time, torque, position, known, sticks = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+            rows.append((k * FINE, torque, angle, velocity, weight + INERTIA * acceleration, velocity == 0.0))
+    time, torque, position, speed, known, sticks = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     torque += offset + random.normal(0.0, noise, len(time))
     if angle_noise:
         position += random.normal(0.0, angle_noise, len(time))
     else:
         position = np.round(position / ENCODER) * ENCODER
-    return {"t": time, "torque": torque, "angle": position, "known": known, "sticks": float(sticks.mean())}
+    signals = {"t": time, "torque": torque, "angle": position, "velocity": speed, "known": known}
+    return {**signals, "sticks": float(sticks.mean())}
 
 
 def _reference(

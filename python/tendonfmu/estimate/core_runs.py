@@ -68,15 +68,15 @@ class CoreRuns:
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
-        self.used, counts = (
-            np.concatenate([_used(recordings[each.recording], each, self.grid.step, rests) for each in segments])
-            for rests in (False, True)
+        self.used: Flags = np.concatenate(
+            [_used(recordings[each.recording], each, self.grid.step) for each in segments]
         )
         self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
         self.time: Numbers = self.grid.means([recording.time for recording in recordings])
         self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
         fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
         self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
+        counts = self.used | (self.grid.means([recording.at_rest for recording in recordings]) == 1.0)
         self.still: Flags = counts & np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
         self.added: Numbers | float = 0.0  # torque that is measured beyond that of the runs' forces, N·m [B, n]
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
@@ -143,10 +143,15 @@ class _Instances:
         self._idle[image].append(finger)
 
 
+def image_that_holds(data: Data) -> bytes:
+    """Return the image of a description whose friction at rest is held, however long."""
+    bias = {**(data.get("bias") or {}), "forget_rate": 0.0, "forgetting": "time"}
+    return native.image_from_json(json.dumps({**data, "bias": bias}))
+
+
 def _image(data: Data) -> bytes:
     """Return the image of a description whose bias neither learns nor forgets, without contact detection."""
-    bare = without_learning(data)
-    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
+    return image_that_holds(without_learning(data))
 
 
 def _stretch(recording: FitRecording, segment: Segment, rate: float) -> Stretch:
@@ -175,10 +180,9 @@ def _turned(recording: FitRecording, segment: Segment, step: float) -> float:
     return float(min(waits.max(initial=0), MOST * segment.count))
 
 
-def _used(recording: FitRecording, segment: Segment, step: float, rests: bool) -> Flags:
-    """Return [count] the blocks that may be learned from, or also those at rest that may not."""
-    flags = recording.train | recording.at_rest if rests else recording.train
-    used = segment.mean(flags[segment.part]) == 1.0
+def _used(recording: FitRecording, segment: Segment, step: float) -> Flags:
+    """Return [count] the blocks that may be learned from."""
+    used = segment.mean(recording.train[segment.part]) == 1.0
     longest, share = SETTLED
     used[: int(max(min(longest / step, share * segment.count), _turned(recording, segment, step)))] = False
     return np.asarray(used)

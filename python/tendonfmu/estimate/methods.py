@@ -18,6 +18,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, NothingLeftError
+from tendonfmu.estimate.core_runs import image_that_holds
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.learning import (
     FitProgress,
@@ -39,10 +40,13 @@ from tendonfmu.statistics import sample_weights
 Start = Callable[[Sequence[str]], Numbers]
 
 
-def _estimator(structure: Structure) -> Estimator:
+def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Estimator:
     """Build the estimator. Raises InputError if nothing gives the size of a number."""
+    # a bias that does not learn at rest must not forget there what it holds
+    rests = any(recording.at_rest.any() for recording in recordings)
     try:
-        return Estimator(structure.start.image, structure.group, structure.scale)
+        image = image_that_holds(structure.start.data) if rests else structure.start.image
+        return Estimator(image, structure.group, structure.scale)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None
 
@@ -102,7 +106,7 @@ def learn_batch(
 ) -> Learned:
     """Estimate by maximum likelihood."""
     # start: [u]
-    estimator = _estimator(structure)
+    estimator = _estimator(structure, recordings)
     begin = _starting_point(estimator, start)
     if structure.needs_runs:
         return learn_with_memory(structure, estimator, recordings, watch, settings, begin)
@@ -148,7 +152,7 @@ def learn_batch(
 
 def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Learned:
     """Return what recordings tell of numbers that were fitted to them; the estimate is the start of the structure."""
-    estimator, settings = _estimator(structure), Settings(FrictionFitOptions(), passes=1)
+    estimator, settings = _estimator(structure, recordings), Settings(FrictionFitOptions(), passes=1)
     if structure.needs_runs:
         return learned_with_memory_at(structure, estimator, recordings, settings)
     added = _add_recordings(estimator, recordings)
@@ -221,7 +225,7 @@ def learn_ekf(
             f"{structure.start.path}: {what}: the Kalman filter has no derivatives of it; expected --method batch, or "
             f"{'a description without presliding' if has_memory(structure.start.data) else '--fix extensions*'}"
         )
-    estimator = _estimator(structure)
+    estimator = _estimator(structure, recordings)
     learner = _learner(structure, estimator, settings, start)
     innovations: list[Numbers] = []
     for number in range(1, settings.passes + 1):

@@ -191,6 +191,7 @@ def _cause(verdict: Verdict, cover: EffectCoverage | None) -> str:
 def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: Finger) -> str:
     drive = finger.joint_names[cover.effect.drive - 1] if cover is not None else ""
     unit = "m/s" if cover is not None and cover.effect.tendon else "rad/s"
+    pulls = not all(tendon.get("bidirectional") for tendon in finger.data["tendons"])  # else it has no pretension
     if cover is not None and cause == "never_moves":
         return f"move joint {drive} and those after it so that it slides faster than {cover.threshold:g} {unit}"
     if cause == "side":
@@ -202,20 +203,15 @@ def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: 
     if cover is not None and cause == "slow":
         return f"let joint {drive} turn round slowly: strokes at {cover.threshold:g} to {_stribeck(verdict):.3g} {unit}"
     if cause == "noise":
-        return _more(verdict, cover, finger)
-    tense = "change the pretension during the recording, or " if _has_pretension(finger) else ""
+        return _more(verdict, cover, pulls)
+    tense = "change the pretension during the recording, or " if pulls else ""
     return f"{tense}--fix or --share it with {', '.join(verdict.partners) or 'others'}"
 
 
-def _has_pretension(finger: Finger) -> bool:
-    """Return whether any tendon can only pull. A machine without tendons is described by loops."""
-    return not all(tendon.get("bidirectional") for tendon in finger.data["tendons"])
-
-
-def _more(verdict: Verdict, cover: EffectCoverage | None, finger: Finger) -> str:
+def _more(verdict: Verdict, cover: EffectCoverage | None, pulls: bool) -> str:
     """Name what raises a number above the noise: load, or time, since errors fall with its square root."""
     is_joints = cover is not None and cover.effect.kind == "friction"
-    load = "" if is_joints or not _has_pretension(finger) else "more pretension (tendon force), or "
+    load = "more pretension (tendon force), or " if pulls and not is_joints else ""
     if verdict.error_alone >= PRIOR / 2:
         return f"nothing in these recordings depends on it: {load}remove it from the description, or --fix it"
     longer = (verdict.error_alone / LIMIT) ** 2

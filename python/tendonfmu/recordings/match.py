@@ -39,7 +39,7 @@ from tendonfmu.recordings.kinematics import (
     tells,
     velocity_corrections,
 )
-from tendonfmu.recordings.prepared import holds_at_rest, is_at_rest
+from tendonfmu.recordings.prepared import MANY_RESTS, left_at_rest
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
@@ -61,7 +61,6 @@ OPPOSED = 0.5  # the sum of torque and reference leaves less than this share of 
 SAME_RATIO = 1.1  # between the ratios of all springs and that of a unit
 LEAST_KEPT = 0.2  # of the samples; the equations use at least as many
 MISLEADS = 5e-3  # rad; numbers that give an angle nearer to the measured one are as good as those of this recording
-MANY_RESTS = 0.1  # of the samples
 LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
@@ -136,19 +135,11 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
         findings += _of_pushing(finger, mended, {column for finding in kinematic for column in finding.columns})
         if not is_silent and not _has_error(findings):
             findings += list(_of_power(finger, mended)) or list(_of_reference(finger, mended))
-    return [*findings, *_of_channels(finger, mended, held), *_of_rests(finger, mended)]
+    return [*findings, *_of_channels(finger, mended, held)]
 
 
 def _has_error(findings: Sequence[Finding]) -> bool:
     return any(finding.severity == "error" for finding in findings)
-
-
-def _of_rests(finger: Finger, recording: Recording) -> Iterator[Finding]:
-    velocity = recording.groups.get("joint_velocity")
-    if velocity is not None and holds_at_rest(finger.data):
-        share = float(is_at_rest(finger.data, velocity).mean())
-        if MANY_RESTS < share < 1.0:
-            yield text.rests(recording.path, share)
 
 
 # --- clock and channels -----------------------------------------------------------------------------------------------
@@ -171,6 +162,9 @@ def _of_channels(finger: Finger, recording: Recording, held: Sequence[Finding]) 
     stuck = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in repeating]
     if stuck or coarse:  # the other channels do not give a reliable position then
         clipped = [channel for channel in clipped if channel.column.startswith("tendon_force")]
+    velocity = recording.groups.get("joint_velocity", np.zeros((1, finger.joints)))
+    if (share := float(left_at_rest(finger.data, velocity).mean())) > MANY_RESTS:
+        yield text.rests(recording.path, share)
     yield from stuck
     reported = {finding.columns[0] for finding in stuck}
     for channel in clipped:

@@ -57,10 +57,9 @@ def repair(path: Path, fitting: Repair) -> Finding:
 
 
 def rests(path: Path, share: float) -> Finding:
-    """Describe a log with much rest, of a machine whose motor holds there."""
-    probably = "a motor that holds with any torque up to friction, which says nothing of its size"
-    write = "fit learns from the samples in motion alone"
-    return Finding("warning", "rests", path, ("joint_velocity",), f"{percent(share)} at rest", probably, write)
+    """Describe a log with much rest."""
+    why = "a motor that holds with any torque up to friction", "fit learns from the samples in motion alone"
+    return Finding("warning", "rests", path, ("joint_velocity",), f"{percent(share)} at rest", *why)
 
 
 def velocity(path: Path, correction: Correction, slope: float) -> Finding:

@@ -37,6 +37,7 @@ from tendonfmu.recordings.residuals import Model, run_parts
 
 FEWEST = 20  # samples of a part; fewer say nothing of a bias, let alone of friction
 _LOOKED_AT = 50_000  # about so many samples are used to describe the motion
+MANY_RESTS = 0.15  # of the samples
 SHORTEST_BLOCK = 1.0  # s; of a held-out block
 
 
@@ -61,7 +62,7 @@ class FitRecording:
     held_out: Flags
     contact_out: Flags
     faulty: Flags
-    at_rest: Flags  # nothing slides, and a fit does not learn from it: `without_rests`
+    at_rest: Flags  # left out by `without_rests`
     parts: list[slice]  # slices without a gap
     model: Model  # what the given finger makes of it
     warnings: list[str]  # sentences about what was left out and what is poor
@@ -164,44 +165,35 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
 
 
 def without_rests(recording: FitRecording, finger: Finger) -> FitRecording:
-    """Let nothing learn from the samples at rest, and let each part begin in motion, where the bias is constant.
-
-    A motor holds a joint that sticks with any torque up to its friction: such a sample says |F| ≤ F(v_min) and no more.
-    A part that begins at rest would take the friction of its first motion into the bias, which keeps it.
-    """
-    rests = is_at_rest(finger.data, recording.model.joint_speed)
-    if not (holds_at_rest(finger.data) and rests.any()) or rests.all():
+    """Let nothing learn from samples at rest. With a constant bias, parts begin in motion: it keeps all it takes up."""
+    rests, parts = left_at_rest(finger.data, recording.model.joint_speed), recording.parts
+    train, held_out = recording.train & ~rests, recording.held_out & ~rests
+    if not rests.any() or not train.any():
         return recording
-    parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in recording.parts]
-    parts = [part for part, whole in zip(parts, recording.parts, strict=True) if not rests[whole].all()]
-    inside = np.zeros(len(rests), dtype=bool)
-    for part in parts:
-        inside[part] = True
-    out = rests | ~inside
-    left = replace(
-        recording,
-        train=recording.train & ~out,
-        held_out=recording.held_out & ~out,
-        at_rest=recording.tracked & out,
-        parts=parts,
-    )
-    _refuse_too_little(left.recording, parts, left.tracked & ~out, left.contact_out)
+    if bias_is_constant(finger.data):
+        parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in parts if not rests[part].all()]
+    _refuse_too_little(recording.recording, parts, train | held_out, recording.contact_out)
+    left = replace(recording, train=train, held_out=held_out, at_rest=recording.tracked & rests, parts=parts)
     return replace(left, model=left.run(finger.data))
 
 
-def holds_at_rest(data: Mapping[str, Any]) -> bool:
-    """Return whether nothing takes up what a motor holds at rest: the bias is constant, and no friction remembers."""
-    learns = number_of(data, "bias.drift_variance") > 0.0 or (data.get("bias") or {}).get("initial_variance") != 0.0
-    return not learns and not any(row["effect"] == "presliding" for row in data.get("extensions") or ())
+def left_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:
+    """Return [N] the samples at rest that a fit leaves out. joint_velocity: [N, n] (rad/s).
+
+    A motor holds a joint that sticks with any torque up to its friction, |F| ≤ F(v_min), unless friction has a memory
+    that says more. Few rests are no harm to a bias that learns.
+    """
+    rests = np.ones(len(joint_velocity), dtype=bool)
+    for effect in effects(data):
+        rests &= np.abs(sliding_velocity(data, effect, joint_velocity)) <= velocity_threshold(data, effect)
+    remembers = any(row["effect"] == "presliding" for row in data.get("extensions") or ())
+    are_few = rests.mean() <= MANY_RESTS and not bias_is_constant(data)
+    return rests & (not (remembers or are_few or rests.all()))
 
 
-def is_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:
-    """Return [N] the samples in which no friction slides. joint_velocity: [N, n] (rad/s)."""
-    slides = [
-        np.abs(sliding_velocity(data, effect, joint_velocity)) > velocity_threshold(data, effect)
-        for effect in effects(data)
-    ]
-    return ~np.any(slides, axis=0) if slides else np.zeros(len(joint_velocity), dtype=bool)
+def bias_is_constant(data: Mapping[str, Any]) -> bool:
+    """Return whether the bias learns nothing."""
+    return number_of(data, "bias.drift_variance") == 0.0 and (data.get("bias") or {}).get("initial_variance") == 0.0
 
 
 def _parts(time: Numbers) -> tuple[list[slice], Flags]:

@@ -321,9 +321,6 @@ def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
     )
 
 
-_BY_SAMPLE = ("target", "train", "held_out", "contact_out", "faulty", "at_rest")
-
-
 def _shortened(recording: FitRecording) -> FitRecording:
     """Return the beginning of its longest part, thinned to the sample rate that a predicted recording needs."""
     part = max(recording.parts, key=lambda part: recording.time[part.stop - 1] - recording.time[part.start])
@@ -333,11 +330,12 @@ def _shortened(recording: FitRecording) -> FitRecording:
     rows = np.arange(part.start, part.stop)[time - time[0] <= _OLD_SECONDS][::every]
     groups = {name: np.ascontiguousarray(values[rows]) for name, values in recording.recording.groups.items()}
     whole = [slice(0, len(rows))]
+    by_sample = ("target", "train", "held_out", "contact_out", "faulty", "at_rest")
     model = {each.name: np.ascontiguousarray(getattr(recording.model, each.name)[rows]) for each in fields(Model)}
     return replace(
         recording,
         recording=Recording(recording.path, np.ascontiguousarray(recording.time[rows]), groups),
-        **{name: getattr(recording, name)[rows] for name in _BY_SAMPLE},
+        **{name: getattr(recording, name)[rows] for name in by_sample},
         parts=whole,
         model=Model(**model),
     )
