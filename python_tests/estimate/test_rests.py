@@ -55,6 +55,7 @@ def numbers(fit: FrictionFit) -> dict[str, float]:
         {"share": 0.5, "angle_noise": 2e-4},
         {"share": 0.8, "angle_noise": 2e-4, "rate": 500.0},
         {"share": 0.8, "noise": 0.03},
+        {"share": 0.5, "rate": 25.0},
     ],
     ids=lambda options: ",".join(f"{name}={value:g}" for name, value in options.items()),
 )
@@ -93,10 +94,10 @@ def test_what_is_held_out_and_compared_is_motion(tmp_path: Path) -> None:
         assert judged["rms"][0] == pytest.approx(0.02, rel=0.2)
 
 
-RESTING_BIAS = ({}, {"forget_rate": 0.0}, {"forgetting": "absorption"}, {"drift_variance": 1e-9})
+BIASES: tuple[dict[str, Any], ...] = ({}, {"forget_rate": 0.0}, {"forgetting": "absorption"}, {"drift_variance": 1e-9})
 
 
-@pytest.mark.parametrize("bias", RESTING_BIAS, ids=str)
+@pytest.mark.parametrize("bias", BIASES, ids=str)
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
 def test_a_finger_with_tendons_and_a_learning_bias(bias: dict[str, Any], share: float) -> None:
     """Two tendons hold the torque of the servo at a pretension; a bias would follow what it sees at rest."""
@@ -125,8 +126,8 @@ def test_a_finger_with_tendons_and_a_learning_bias(bias: dict[str, Any], share: 
 
 
 def test_check_and_fit_name_the_share_at_rest(call: Call, tmp_path: Path) -> None:
-    log = servo.servo_log(15, duration=30.0)
-    log, columns = written(tmp_path, {name: log[name] for name in ("t", "torque", "angle")})
+    made = servo.servo_log(15, duration=30.0)
+    log, columns = written(tmp_path, {name: made[name] for name in ("t", "torque", "angle")})
     converted = call("convert", "table", log.name, "--map", columns.name, "-o", "rec.parquet", "--finger", "f.json")
     assert converted.status == 0, converted.err
     data = json.loads((tmp_path / "f.json").read_text())

@@ -42,7 +42,6 @@ from tendonfmu.recordings import (
     Held,
     RecordingSource,
     admit,
-    bias_is_constant,
     listed_sources,
     motion_of,
     prepare,
@@ -186,8 +185,7 @@ class FrictionFit(Configured):
 
     def _prepared(self, source: RecordingSource, held: Held) -> FitRecording:
         prepared = prepare(self.start_, read_recording(source), self.options.kinematics, held)
-        by_samples = self.options.method == "ekf" and not bias_is_constant(self.start_.data)
-        return prepared if by_samples else without_rests(prepared, self.start_)
+        return without_rests(prepared, self.start_, is_batch=self.options.method == "batch")
 
     def _motion_warnings(self, of_recordings: bool) -> list[str]:
         self.coverage_: list[EffectCoverage] = coverage_of(self.start_.data, *motion_of(self.recordings_))

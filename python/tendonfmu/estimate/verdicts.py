@@ -210,8 +210,7 @@ def _advice(cause: str, verdict: Verdict, cover: EffectCoverage | None, finger: 
 
 def _more(verdict: Verdict, cover: EffectCoverage | None, pulls: bool) -> str:
     """Name what raises a number above the noise: load, or time, since errors fall with its square root."""
-    is_joints = cover is not None and cover.effect.kind == "friction"
-    load = "more pretension (tendon force), or " if pulls and not is_joints else ""
+    load = "" if not pulls or (cover and cover.effect.kind == "friction") else "more pretension (tendon force), or "
     if verdict.error_alone >= PRIOR / 2:
         return f"nothing in these recordings depends on it: {load}remove it from the description, or --fix it"
     longer = (verdict.error_alone / LIMIT) ** 2

@@ -164,13 +164,14 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
     )
 
 
-def without_rests(recording: FitRecording, finger: Finger) -> FitRecording:
-    """Let nothing learn from samples at rest. With a constant bias, parts begin in motion: it keeps all it takes up."""
+def without_rests(recording: FitRecording, finger: Finger, is_batch: bool) -> FitRecording:
+    """Let nothing learn from samples at rest, but for a filter whose bias does. Where it is constant, begin in motion."""
+    is_constant = bias_is_constant(finger.data)
     rests, parts = left_at_rest(finger.data, recording.model.joint_speed), recording.parts
     train, held_out = recording.train & ~rests, recording.held_out & ~rests
-    if not rests.any() or not train.any():
+    if not (is_batch or is_constant) or not rests.any() or not train.any():
         return recording
-    if bias_is_constant(finger.data):
+    if is_constant:
         parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in parts if not rests[part].all()]
     _refuse_too_little(recording.recording, parts, train | held_out, recording.contact_out)
     left = replace(recording, train=train, held_out=held_out, at_rest=recording.tracked & rests, parts=parts)
@@ -218,7 +219,7 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
         return
     why = f"{int(contact.sum())} of {len(recording)} are labelled contact and there is no column external_torque"
     if not contact.any():
-        why = "the others are left out for a stuck sensor"
+        why = "the others are at rest, or left out for a stuck sensor"
     raise NothingLeftError(
         f"{recording.path}: {counted(int(usable.sum()), 'sample')} to fit to: {why}; expected at least "
         f"{FEWEST} without contact"

@@ -43,7 +43,7 @@ GAP = 10.0  # times the usual step; a longer step interrupts the log, and no fil
 LEAST = 20  # samples
 
 STIFFNESS = 1e9  # N/m: the drive is rigid, q = x0
-SLOWEST, FASTEST = 1e-3, 0.1  # of the largest speed; below, the joint counts as at rest; what noise may make of it
+SLOWEST, FASTEST = 1e-3, 0.1  # of the largest speed; below, the joint counts as at rest; the most for noise and filter
 WINDOW, QUIET, SIGMAS = 0.25, 0.1, 6.0  # s; share of the windows that are quieter than the noise; of it, that is rest
 THRESHOLD = 5.0  # times the residual of the straight line (rms); `tendonfmu tune` finds better thresholds
 # of the drive's largest torque, where nothing is measured; geared drives lose some 5 to 30 % in all
@@ -236,11 +236,12 @@ def description_text(description: dict[str, Any]) -> str:
 
 
 def slowest_motion(time: Numbers, velocity: Numbers, angle: Numbers, cutoff: float) -> float:
-    """Return the speed (rad/s) below which the joint is at rest: a step of the encoder, or noise."""
+    """Return the speed (rad/s) below which the joint is at rest: the encoder's step, noise, or the filter's smear."""
     largest = float(np.abs(velocity).max())
     step = max(2 * np.pi * cutoff * value_step(angle), value_step(velocity))
-    noise = min(SIGMAS * _speed_noise(velocity, float(np.median(np.diff(time)))), FASTEST * largest)
-    return float(f"{max(step, noise, SLOWEST * largest):.3g}")
+    noise = SIGMAS * _speed_noise(velocity, float(np.median(np.diff(time))))
+    smear = SLOWEST * largest * max(1.0, CUTOFF / cutoff) ** 2  # a move of 1 s ends with t², and the filter prolongs it
+    return float(f"{max(step, min(max(noise, smear), FASTEST * largest)):.3g}")
 
 
 def _speed_noise(velocity: Numbers, step: float) -> float:
