@@ -260,3 +260,13 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   recall_rows(finger);
   forget_views(finger);
 }
+
+void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared) {
+  memmove(finger->parameters, prepared->parameters, finger->prepared_bytes);
+  finger->derived.settings = prepared->derived.settings;
+  finger->memory.compliance = prepared->memory.compliance;
+  finger->memory.relaxes = prepared->memory.relaxes;
+  finger->memory.step = prepared->memory.step;
+  recall_rows(finger);
+  forget_views(finger);
+}

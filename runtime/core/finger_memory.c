@@ -32,13 +32,6 @@ static double* part(double** run, size_t count) {
   return place;
 }
 
-static void lay_out_parameters(tendonfmu_finger* f, cursor* c) {
-  const size_t p = f->shape.parameter_count;
-  f->start = take_numbers(c, p);
-  f->parameters = take_numbers(c, p);
-  f->candidate = take_numbers(c, p);
-}
-
 static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   derived_numbers* d = &f->derived;
   const size_t n = f->joints, lanes = f->tendon_lanes, joints = f->joint_lanes;
@@ -77,11 +70,11 @@ static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
   d->links.offset = take_numbers(c, 3 * links);
   d->links.tip = take_numbers(c, links ? 3 : 0);
   d->least_link = take(c, links * sizeof(int));
+  d->axis_cosine = take_numbers(c, f->shape.extension_count ? n * n : 0);
 }
 
-static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
-  finger_scratch* s = &f->scratch;
-  const size_t slots = f->shape.elements ? f->slots : 0, stretching = f->shape.stretches ? slots : 0;
+static void lay_out_elements(tendonfmu_finger* f, cursor* c) {
+  const size_t slots = f->shape.elements ? f->slots : 0;
   f->memory.remembers = take_numbers(c, slots);
   for (size_t e = 0; e < f->shape.elements; ++e) {
     friction_element* element = &f->memory.element[e];
@@ -91,7 +84,24 @@ static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
       *rows[i] = take_numbers(c, slots);
     }
   }
-  f->memory.sections = take_numbers(c, stretching);
+  f->memory.sections = take_numbers(c, f->shape.stretches ? slots : 0);
+}
+
+/* the parameters in force and all arrays that follow from them: one run, which another finger may take over */
+static void lay_out_prepared(tendonfmu_finger* f, cursor* c) {
+  const size_t p = f->shape.parameter_count;
+  f->start = take_numbers(c, p);
+  f->candidate = take_numbers(c, p);
+  const size_t begin = c->used;
+  f->parameters = take_numbers(c, p);
+  lay_out_derived(f, c);
+  lay_out_elements(f, c);
+  f->prepared_bytes = c->used - begin;
+}
+
+static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
+  finger_scratch* s = &f->scratch;
+  const size_t slots = f->shape.elements ? f->slots : 0, stretching = f->shape.stretches ? slots : 0;
   s->travelled = take_numbers(c, slots);
   s->own_limit = take_numbers(c, slots ? f->joint_lanes : 0);
   s->element = take_numbers(c, f->shape.elements * 2 * slots);
@@ -102,7 +112,6 @@ static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
 
 static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
   f->extensions.row = take(c, f->shape.extension_count * sizeof(extension_row));
-  f->derived.axis_cosine = take_numbers(c, f->shape.extension_count ? f->joints * f->joints : 0);
   f->scratch.extension = take_numbers(c, f->shape.extension_memory);
   const size_t slots = f->shape.extension_count ? f->slots : 0;
   f->scratch.grip = take_numbers(c, slots);
@@ -229,8 +238,7 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   f->tendon_lanes = (f->tendons + 3) / 4 * 4;
   f->slots = f->joints * f->tendon_lanes + f->joint_lanes;
   *words = take(&c, sizeof(uint32_t) * (shape->word_count + (size_t)MODEL_EXTENSION_WORDS * shape->extension_count));
-  lay_out_parameters(f, &c);
-  lay_out_derived(f, &c);
+  lay_out_prepared(f, &c);
   lay_out_state(f, &c);
   lay_out_extensions(f, &c);
   lay_out_scratch(f, &c);

@@ -270,7 +270,8 @@ struct tendonfmu_finger {
   size_t slots;                     /* n·M + N */
   uint64_t image_id;                /* checksum of the image */
   const step_kernel* kernel;
-  double *start, *parameters, *candidate; /* [p] of the image, in force, being checked */
+  double *start, *candidate, *parameters; /* [p] of the image, being checked, in force */
+  size_t prepared_bytes;                  /* from `parameters` on: these and all arrays that follow from them */
   double* state;                          /* [state_count], what `remembered` points into */
   size_t state_count;
   extension_rows extensions;
