@@ -87,6 +87,12 @@ PARTS = {
     "valgrind": _program("memory as valgrind sees it", "Debian: valgrind", "valgrind"),
     "wine": _program("Windows binaries", "Debian: wine64", "wine64", "wine"),
     "qemu": _program("binaries for aarch64", "Debian: qemu-user-static", "qemu-aarch64-static"),
+    "arm gcc": _program(
+        "the core on a microcontroller",
+        "Debian: gcc-arm-none-eabi, libnewlib-arm-none-eabi",
+        "arm-none-eabi-gcc",
+    ),
+    "qemu-system-arm": _program("the core on a microcontroller", "Debian: qemu-system-arm", "qemu-system-arm"),
     "aarch64 library": _file("binaries for aarch64", Path("/usr/aarch64-linux-gnu"), "Debian: libc6-arm64-cross"),
     "nm": _program("symbols of the binaries", "Debian: binutils", "nm"),
     "objdump": _program("code of the binaries", "Debian: binutils", "objdump"),

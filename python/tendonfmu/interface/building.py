@@ -26,6 +26,7 @@ def build(
     ssv: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     binaries: str | os.PathLike[str] | None = None,
     fmi: int = 2,
+    c_array: bool = False,
 ) -> Path:
     """Pack a co-simulation FMU, of FMI 2.0 or 3.0. Needs no compiler; the same input gives the same bytes.
 
@@ -34,7 +35,7 @@ def build(
     finger
         A finger, its description, or the file of it; or the file of a rig, for the FMU of the simulated finger.
     output
-        The FMU to write, with a name that ends in .fmu.
+        The FMU to write, with a name that ends in .fmu; with `c_array` a C source, .c or .h.
     reference
         A recording of the finger: the FMU then carries its inputs, the outputs over it, and the tolerance of a
         comparison, and its default experiment has the span and step of the recording. None: the FMU carries no
@@ -46,6 +47,8 @@ def build(
         Folder of binaries by FMI platform. None: those installed.
     fmi
         Version of FMI: 2, or 3 for a finger. With 3, forces, positions and torques are arrays.
+    c_array
+        Write the finger as a C array for a microcontroller, in place of an FMU. It takes no other option.
 
     Returns
     -------
@@ -56,7 +59,7 @@ def build(
     ------
     InputError
         The description, the recording or a parameter set is refused, binaries are missing, the output cannot be
-        written or does not end in .fmu, or `fmi` is 3 with a rig.
+        written or has another suffix, or `fmi` is 3 with a rig.
 
     Warns
     -----
@@ -72,10 +75,12 @@ def build(
         from tendonfmu.simulate import is_rig
 
         file = finger_file(finger)
-        if is_rig(file):
+        if is_rig(file) and not options.c_array:
             return _build_plant(file, target, folder, others, options.fmi, alone=reference is None and not sets)
         others.insert(0, file)
     check_output(target, *others)
+    if options.c_array:
+        return _write_c_array(finger, target, alone=reference is None and not sets and folder is None, fmi=options.fmi)
     _check_suffix(target)
     model = read_finger(finger)
     files: dict[str, bytes] = {}
@@ -99,6 +104,16 @@ def _build_plant(
         raise InputError(f"{rig}: a rig; expected a finger description with a reference or parameter sets")
     _check_suffix(target)
     return build_plant_fmu(rig, target, binaries=binaries)
+
+
+def _write_c_array(finger: FingerSource, output: Path, *, alone: bool, fmi: int) -> Path:
+    from tendonfmu.fmu import write_c_array
+
+    if not alone or fmi != 2:
+        raise InputError("c_array: a C source has no FMU's options; expected it without reference, ssv, binaries, fmi")
+    if output.suffix.lower() not in (".c", ".h"):
+        raise InputError(f"{output}: expected a name that ends in .c or .h")
+    return write_c_array(read_finger(finger), output)
 
 
 def _check_suffix(output: Path) -> None:
