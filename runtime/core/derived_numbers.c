@@ -236,7 +236,9 @@ static void derive_flags(tendonfmu_finger* f) {
 
 void forget_views(tendonfmu_finger* finger) {
   for (size_t k = 0; k < finger->slots / 4; ++k) {
-    finger->scratch.view[k].key[0] = -1.0;
+    for (size_t lane = 0; lane < 4; ++lane) {
+      finger->scratch.view[k].key[lane] = -1.0;
+    }
   }
 }
 

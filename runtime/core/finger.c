@@ -561,5 +561,6 @@ tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name
                 "processor and build have it");
   }
   finger->kernel = kernel;
+  forget_views(finger); /* the kernels fill them by one or by four */
   return TENDONFMU_OK;
 }

@@ -207,9 +207,9 @@ extern const size_t state_row_count;
  * working points among which the joint before stands. A view is valid until a velocity changes sign or the angle leaves
  * [low, high); most samples find it valid. Rows of four lanes; laws by number (LAW_COULOMB, …). */
 typedef struct slot_view {
-  double key[4];                      /* lane 0: bits of the negative sides; −1: to be filled */
-  double blends[4];                   /* lane 0: 1 where any lane stands between two working points */
-  double low[4], high[4];             /* rad */
+  double key[4];          /* bits of the negative sides; −1: to be filled. This and the next in lane 0 for */
+  double blends[4];       /* all, in plain C in each lane; 1 where one stands between two working points */
+  double low[4], high[4]; /* rad */
   double begin[4], inverse_length[4]; /* of the segment: rad, 1/rad; 0 outside the grid */
   double below[LAW_SIDE_NUMBERS][4];  /* F_B at the working point below; joints: T_jv0 */
   double above[LAW_SIDE_NUMBERS][4];  /* F_B at the one above */

@@ -3,7 +3,7 @@
 #include "friction_law.h"
 
 double law_exponential(double x) {
-  return exp_of_minus(quad_set(x)).lane[0];
+  return exp_of_minus(x);
 }
 
 double law_one_minus_exponential(double x) {
