@@ -207,19 +207,19 @@ static void find_what_can_hold(tendonfmu_finger* f) {
 }
 
 static void derive_routing(tendonfmu_finger* f) {
-  double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS] = {0}, inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
+  double matrix[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS]; /* R, then R⁺ */
   const size_t n = f->joints, m = f->tendons, lanes = f->tendon_lanes;
   for (size_t i = 0; i < m; ++i) {
     for (size_t j = 0; j < n; ++j) {
-      rows[i * n + j] = f->derived.moment_arm[j * lanes + i];
+      matrix[i * n + j] = f->derived.moment_arm[j * lanes + i];
     }
   }
   for (size_t at = 0; f->derived.settings.has_bands && at < n * lanes; ++at) {
     f->derived.load_arm[at] = f->derived.moment_arm[at] * f->derived.stiffness[at % lanes];
   }
-  pseudo_inverse(m, n, rows, inverse);
+  pseudo_inverse(m, n, matrix, matrix);
   for (size_t j = 0; j < n; ++j) {
-    memcpy(f->derived.inverse_routing + j * lanes, inverse + j * m, m * sizeof(double));
+    memcpy(f->derived.inverse_routing + j * lanes, matrix + j * m, m * sizeof(double));
   }
 }
 

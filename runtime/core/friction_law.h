@@ -29,6 +29,9 @@ law_slopes law_with_slopes(const double* side, double speed);
 double law_exponential(double x);
 double law_one_minus_exponential(double x);
 
+/* ln x of a normal x > 0, within an ulp, without the host's libm. */
+double law_logarithm(double x);
+
 /* Fills one side of a law from the numbers of a description. */
 void law_pack_side(double* side, double fs, double fc, double vs, double fv);
 

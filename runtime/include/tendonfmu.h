@@ -66,7 +66,7 @@ size_t tendonfmu_memory_size(const void* image, size_t image_size);
 /* Places a finger into memory of the caller: no allocation, for microcontrollers and real-time start-up.
  *   memory        [memory_size >= tendonfmu_memory_size()] bytes, any alignment; must not be moved while in use
  * The image is copied and may be freed afterwards. Creation, tendonfmu_reset(), restoring a state with other parameters
- * and writing moment arms use up to 32 KiB of stack; every other call less than 8 KiB. Returns NULL when refused, with
+ * and writing moment arms use up to 24 KiB of stack; every other call less than 8 KiB. Returns NULL when refused, with
  * the reason in message. */
 tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* image, size_t image_size, char* message,
                                   size_t message_size);

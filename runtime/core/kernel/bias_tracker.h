@@ -5,8 +5,6 @@
 #include "extensions.h"
 #include "force_propagation.h"
 
-#include <math.h>
-
 /* Four slots at a transition. */
 typedef struct transition {
   quad_mask stops, starts;
@@ -188,7 +186,7 @@ HOT_INLINE double noise_variance(const finger_settings* settings, double mean_fo
 
 /* Λ: what the filter absorbs */
 HOT_INLINE void count_absorbed(tendonfmu_finger* f, double left) {
-  const double absorbed = left > 0.0 ? -log(left) : 700.0;
+  const double absorbed = left > 0.0 ? -law_logarithm(left) : 700.0;
   f->remembered.scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
 }
 

@@ -2,6 +2,8 @@
  * (docs/reference/semantics/detection.md). */
 #pragma once
 
+#include <math.h>
+
 #include "bias_tracker.h"
 #include "contact_bands.h"
 

@@ -2,6 +2,8 @@
  * measured angles) have it (docs/reference/semantics/sensors.md). */
 #pragma once
 
+#include <math.h>
+
 #include "kinematics.h"
 #include "rows_in_use.h"
 
