@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,9 +77,8 @@ def run(program: Path, finger: Path, recording: Path, samples: int | None = None
     """Run the program over a recording in QEMU. Raises SystemExit where one bit differs from the host's."""
     frame = tf.read_recording(recording).frame.iloc[:samples]
     inputs = [name for name in frame.columns if name.startswith(("tendon_force[", "tendon_position["))]
-    frame[["time", *sorted(inputs, key=lambda name: (name.split("[")[0], int(name[:-1].split("[")[1])))]].to_numpy(
-        "<f8"
-    ).tofile(program.parent / "samples.bin")
+    columns = ["time", *sorted(inputs, key=lambda name: (name.split("[")[0], int(name[:-1].split("[")[1])))]
+    frame[columns].to_numpy("<f8").tofile(program.parent / "samples.bin")
     call(*QEMU.split(), program, folder=program.parent)
     host = tf.run(finger, tf.Recording.from_frame(frame)).frame
     joints = sum(name.startswith("joint_torque[") for name in host.columns)
@@ -86,12 +86,10 @@ def run(program: Path, finger: Path, recording: Path, samples: int | None = None
         [*((name, "<f8", (joints,)) for name in OUTPUTS), ("joint_contact", "u1", (joints,)), ("contact", "u1")]
     )
     outputs = np.fromfile(program.parent / "outputs.bin", row)
-    for name in (*OUTPUTS, "joint_contact"):
-        expected = host[[f"{name}[{j + 1}]" for j in range(joints)]].to_numpy()
-        if len(outputs) != len(host) or not np.array_equal(outputs[name], expected.astype(outputs[name].dtype)):
+    wanted = {name: [f"{name}[{j + 1}]" for j in range(joints)] for name in (*OUTPUTS, "joint_contact")}
+    for name, columns in (wanted | {"contact": ["contact"]}).items():
+        if outputs[name].tobytes() != host[columns].to_numpy().astype(row[name].base).tobytes():
             raise SystemExit(f"{finger.name}: {name} of the microcontroller is not that of the host")
-    if not np.array_equal(outputs["contact"], host["contact"]):
-        raise SystemExit(f"{finger.name}: contact of the microcontroller is not that of the host")
     return Measured(*MEASURED.unpack((program.parent / "measured.bin").read_bytes()))
 
 
@@ -112,25 +110,36 @@ def flash(program: Path) -> Counter[str]:
     return sizes
 
 
+HEAD = (
+    *("finger", "FPU", "core, bytes", "image and loop", "libraries", "RAM of the finger", "stack to place it"),
+    *("stack of a step", "instructions a step", "most"),
+)
+
+
+def line(finger: Path, recording: Path, fpu: str, folder: Path) -> tuple[list[object], Counter[str]]:
+    """A row of the table, and what the flash holds."""
+    program = build(finger, fpu, folder)
+    found, parts = run(program, finger, recording), flash(program)
+    core = sum(size for name, size in parts.items() if name.startswith("core/"))
+    return [
+        *(finger.stem, FPUS[fpu], core, parts["image and loop"], parts["libraries"]),
+        *(found.memory, found.stack_to_place, found.stack_of_step),
+        *(round(found.instructions / found.samples), found.most_instructions),
+    ], parts
+
+
 def main(folder: Path) -> None:
     """Print the tables."""
-    rows, parts = [], []
-    for fpu, precision in FPUS.items():
+    rows: list[Sequence[object]] = [HEAD, ["---"] * 2 + ["---:"] * (len(HEAD) - 2)]
+    cores = {}
+    for fpu in FPUS:
         for finger, recording in CASES:
-            program = build(finger, fpu, folder / fpu / finger.stem)
-            sizes = flash(program)
-            core = sum(size for name, size in sizes.items() if name.startswith("core/"))
-            found = run(program, finger, recording)
-            rows.append(
-                f"| {finger.stem} | {precision} | {core:,} | {sizes['image and loop']:,} | {sizes['libraries']:,} "
-                f"| {found.memory:,} | {found.stack_to_place:,} | {found.stack_of_step:,} "
-                f"| {found.instructions / found.samples:,.0f} | {found.most_instructions:,} |"
-            )
-        parts.append(
-            f"{precision}: "
-            + ", ".join(f"{name[5:]} {size:,}" for name, size in sizes.most_common() if name[:5] == "core/")
-        )
-    print("\n".join([*rows, *parts]))
+            row, cores[fpu] = line(finger, recording, fpu, folder / fpu / finger.stem)
+            rows.append([f"{cell:,}" if isinstance(cell, int) else cell for cell in row])
+    for each in rows:
+        print("|", " | ".join(map(str, each)), "|")
+    for fpu, parts in cores.items():
+        print(f"\n{FPUS[fpu]}:", ", ".join(f"{name} {size:,}" for name, size in parts.most_common()))
 
 
 if __name__ == "__main__":
@@ -138,5 +147,5 @@ if __name__ == "__main__":
     if len(sys.argv) > 1:
         main(Path(sys.argv[1]).resolve())
     else:
-        with tempfile.TemporaryDirectory() as folder:
-            main(Path(folder))
+        with tempfile.TemporaryDirectory() as temporary:
+            main(Path(temporary))

@@ -77,6 +77,10 @@ def test_microcontroller_gives_the_bits_of_the_host(tmp_path: Path, case: int, f
     assert found.memory <= native.memory_size(tf.read_finger(finger).image)  # as the C source says
     assert found.stack_to_place < 24576
     assert found.stack_of_step < 4096
+    changed = tmp_path / "changed.json"
+    tf.read_finger(finger).replace({"velocity_filter_cutoff": 19.0}).write(changed)
+    with pytest.raises(SystemExit, match="_torque of the microcontroller is not that of the host"):
+        measure_m7.run(program, changed, recording, samples=50)
     names = measure_m7.symbols(program)
     assert not {name for name in names if name in UNWANTED or "printf" in name}
     assert ("__aeabi_ddiv" in names) == (fpu == "fpv5-sp-d16")
