@@ -1,9 +1,9 @@
 """The rule for failing sensors, learned from free motion (docs/reference/semantics/sensors.md).
 
-The resolutions are those of the sensors. The margins are twice the largest difference between a force and its spring in
-free motion: within a sample, due to noise and sampling, and within a tenth of a second, due to springs and cords that
-differ from their description. A force may stand for twice as long as it ever did. The finger as it runs must find no
-fault.
+The resolutions are those of the sensors. The margin of a sensor that stands is twice the largest difference between a
+force and its spring within a tenth of a second of free motion, due to springs and cords that differ from their
+description. The margin of a jump is that or less: five times the largest difference within a sample, due to noise and
+sampling. A force may stand for twice as long as it ever did. The finger as it runs must find no fault.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from tendonfmu.options import KinematicsSource
 HOLD_TIME, HOLD_SAMPLES = 0.02, 5
 RECOVERY_TIME = DEFAULTS["sensor_fault.recovery_time"]  # s
 WINDOW = 0.1  # s in which a spring is compared with its force: a sound force changes within it in motion
+PUSHED = 5.0  # times the largest jump in free motion: a push moves tendons faster
 AMPLE = 2.0  # times the largest observed difference and the longest stand: later ones may be larger
 LONGEST_STAND = 1.0  # s; a force that stands for half as long has no noise, and stands at rest
 TAUT = 1.0  # N; below, a tendon may be slack, and the others do not give its length
@@ -57,14 +58,14 @@ def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
         "hold_time": round(max(HOLD_TIME, HOLD_SAMPLES * step), 6),
         "force_resolution": _resolution([part.arrays["tendon_force"] for part in parts]),
         "position_resolution": _resolution([part.arrays["tendon_position"] for part in parts]),
-        "jump_margin": float(f"{max(AMPLE * jump, 1e-6):.3g}"),
+        "jump_margin": float(f"{max(min(PUSHED * jump, AMPLE * largest), 1e-6):.3g}"),
         "spring_margin": float(f"{max(AMPLE * largest, 1e-6):.3g}"),
         "recovery_time": RECOVERY_TIME,
     }
     stand = max(_longest_stand(part, keys["force_resolution"]) for part in parts)
     if AMPLE * stand < LONGEST_STAND and all(_is_noisy(part.arrays["tendon_force"]) for part in parts):
         keys["longest_stand"] = float(f"{max(AMPLE * stand, keys['hold_time']):.3g}")
-    widest = WIDEST * min(float(part.mean_force.mean()) for part in parts)
+    widest = WIDEST * float(np.mean(np.concatenate([part.mean_force for part in parts])))
     while keys["spring_margin"] <= widest:
         if not finds_a_fault(data, parts, keys):
             return SensorRule(keys, largest, "")
