@@ -190,8 +190,7 @@ static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
   double** const band_rows[] = {&s->slip_torque, &s->limit, &s->motor_load, &s->unknown};
   double** const limit_rows[] = {&s->edge_limit, &s->pulley_limit};
   const int banded = (f->shape.options & MODEL_DETECTS_BY_BANDS) != 0;
-  double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,
-                               &s->edge_loss, &s->pulley_loss, &s->force_at,  &s->force_between};
+  double** const matrices[] = {&s->edge, &s->pulley, &s->edge_bias, &s->pulley_bias, &s->force_at, &s->force_between};
   for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
     *tendon_rows[i] = take_numbers(c, f->tendon_lanes);
   }

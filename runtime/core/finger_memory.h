@@ -237,18 +237,17 @@ typedef struct finger_scratch {
   double* residual_variance;         /* [N] S, (N·m)²; of a guided sample only */
   double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
   double* watch;  /* [N] likewise */
-  double* inverse_routing;         /* [n × M] R⁺ of the rows in use */
-  double* leverage;                /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;              /* [M] 1: the others determine the angles */
-  double* row_in_use;              /* [M] 1 or 0 */
-  double* angle_shift;             /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;           /* no row in use belongs to a failing sensor */
-  int unwell;                      /* as in the state, after this sample */
-  double* extension;               /* the memory of the extensions after this sample */
-  double *edge_loss, *pulley_loss; /* [n × M] N, what a tendon loses there */
-  double *grip, *bias_grip;        /* [n × M + N] what friction rows make of F and b; with extensions only */
-  double* own_limit;               /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
-  double* travelled;               /* [n × M + N] Δ; this and the next with a memory only */
+  double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
+  double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;       /* [M] 1: the others determine the angles */
+  double* row_in_use;       /* [M] 1 or 0 */
+  double* angle_shift;      /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;    /* no row in use belongs to a failing sensor */
+  int unwell;               /* as in the state, after this sample */
+  double* extension;        /* the memory of the extensions after this sample */
+  double *grip, *bias_grip; /* [n × M + N] what friction rows make of F and b; with extensions only */
+  double* own_limit;        /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
+  double* travelled;        /* [n × M + N] Δ; this and the next with a memory only */
   double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
   effect_sample sample;                              /* as the extensions see it */
 } finger_scratch;
