@@ -56,7 +56,9 @@ def test_resolutions_and_margin() -> None:
     assert rule.keys is not None and not rule.why
     assert rule.keys["force_resolution"] == pytest.approx(0.5 * NOISE, rel=0.1)
     assert rule.keys["position_resolution"] == pytest.approx(QUANTUM)
-    assert rule.keys["jump_margin"] == pytest.approx(AMPLE * rule.largest, rel=0.01)
+    assert rule.keys["spring_margin"] == pytest.approx(AMPLE * rule.largest, rel=0.01)
+    assert 5.0 * NOISE < rule.keys["jump_margin"] <= rule.keys["spring_margin"]
+    assert 0.02 <= rule.keys["longest_stand"] < 0.3
     assert 5.0 * NOISE < rule.largest < 15.0 * NOISE
 
 
@@ -75,6 +77,24 @@ def test_a_failing_sensor_is_found(tendon: int) -> None:
     for name in ("tendon_force", "tendon_position"):
         assert finds_a_fault(FINGER, [changed(sound, tendon, sound.arrays[name][half, tendon], name)], rule.keys)
     assert finds_a_fault(FINGER, [changed(sound, tendon, 0.0)], rule.keys)
+
+
+@pytest.mark.parametrize("noise", [0.0, NOISE])
+def test_a_force_that_stands_is_found_by_its_noise_where_it_has_some(noise: float) -> None:
+    rule = learn_sensors(FINGER, [part(1, noise)])
+    assert rule.keys is not None
+    sound = part(3, noise)
+    rest = {key: values.copy() for key, values in sound.arrays.items()}
+    first = len(sound.time) // 2
+    for name in ("tendon_force", "tendon_position"):
+        rest[name][first:] = rest[name][first]
+        if name == "tendon_force" and noise:
+            rest[name][first:] += np.random.default_rng(0).normal(0.0, noise, rest[name][first:].shape)
+    still = FreePart("rest", rest, sound.mean_force, sound.counted, sound.seconds)
+    assert ("longest_stand" in rule.keys) == (noise > 0.0)
+    assert not finds_a_fault(FINGER, [still], rule.keys)
+    frozen = changed(still, 1, rest["tendon_force"][first, 1])
+    assert finds_a_fault(FINGER, [frozen], rule.keys) == (noise > 0.0)
 
 
 def test_a_sensor_that_fails_in_free_motion_leaves_the_key_out() -> None:

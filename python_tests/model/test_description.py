@@ -73,7 +73,7 @@ def with_everything() -> dict[str, Any]:
     description["tip"] = [0.02, 0.0, 0.0]
     bands = [{"noise": [0.02, 0.02], "friction": [0.0, 0.5], "motor_load": [0.1, 0.1]} for _ in range(4)]
     description["contact"] |= {"method": "bands", "watches_motors": True, "bands": bands}
-    description["sensor_fault"] = {"hold_time": 0.1, "jump_margin": 0.5, "force_resolution": 0.01}
+    description["sensor_fault"] = {"hold_time": 0.1, "jump_margin": 0.5, "spring_margin": 0.5, "force_resolution": 0.01}
     description["joints"][0]["load_friction"] = {"static": 1e-4, "coulomb": 8e-5, "stribeck_velocity": 0.1}
     return description
 

@@ -20,7 +20,7 @@ from random_fingers import random_case
 from runners import NATIVE, Runner, assert_state_continues
 
 SHORT, LONG = (0.004, 0.02, 0.06, 0.5), (0.05, 0.3, 1.0, 10.0)  # A, M
-HOME, HELD = 3.0, 10.0
+HELD = 10.0
 SETTLED = 60.0  # s; nothing is left of the start
 DT = 0.001
 NEVER = 1e6
@@ -67,9 +67,9 @@ def change(n: Any, k: int, long: float = math.nan, dt: float = DT) -> Array:
 
 
 def counted(n: Any, k: int, long: float = math.nan) -> Array:
-    """What counts of it: at most the distance from home, which follows the second mean with 3 s."""
+    """What counts of it: at most the distance from home, which follows the second mean with 10 s."""
     a, quick = (1.0 - np.exp(-np.asarray(n) * DT / SHORT[each]) for each in (k, 1))
-    return np.minimum(change(n, k, long), a - (quick - change(n, 1, HOME)))
+    return np.minimum(change(n, k, long), a - (quick - change(n, 1, HELD)))
 
 
 # --- step 2: forgetting
@@ -244,6 +244,22 @@ def test_a_contact_ends_with_the_push(runner: Runner) -> None:
     assert contact[end:] == [0] * (1402 - end), "and does not begin again as the references go back"
 
 
+def test_the_slow_end_of_a_push_is_no_contact(runner: Runner) -> None:
+    """0.1 N·m within 5 s and back: the contact ends on the way, and the rest of the way leads home."""
+    way = np.linspace(0.0, 0.1, 500)
+    push = np.concatenate([[0.0, 0.0], way, np.full(100, 0.1), way[::-1], np.zeros(500)])
+    contact = contact_of(of(runner, bands([0.01] * 4), settled(np.full(len(push) - 2, 0.01)), push))
+    assert np.count_nonzero(np.diff(contact) > 0) == 1 and not any(contact[1100:])
+
+
+def test_what_goes_beyond_home_ends_when_it_is_home(runner: Runner) -> None:
+    """0.05 unseen for 0.5 s, then −0.04: this contact ends on the way to 0, far from 0.05."""
+    way = np.linspace(0.0, 0.05, 100)
+    e = np.concatenate([[0.0, 0.0], way, np.full(50, 0.05), np.full(50, -0.04), np.zeros(100)])
+    contact = contact_of(of(runner, one_band(1, 0.015), settled(np.full(len(e) - 2, 0.01)), e))
+    assert 152 <= contact.index(1) < 162 and not any(contact[212:])
+
+
 def test_a_load_that_is_held_is_forgotten(runner: Runner) -> None:
     """The reference follows with 10 s: 0.4 of the peak is left after 10·ln(1/0.4) s = 9.2 s."""
     steps = np.concatenate([np.full(300, DT), np.full(150, 0.1)])
@@ -276,7 +292,7 @@ def test_no_rounding_of_a_clock_changes_a_contact(runner: Runner, clock: str) ->
 
 
 def test_contact_at_any_joint_holds_all_references(runner: Runner) -> None:
-    """Joint 2's step comes while joint 1 is in contact: its reference follows with 10 s, home with 3 s."""
+    """Joint 2's step comes while joint 1 is in contact: its reference follows with 10 s, and home stays."""
     arms: list[Any] = [{"moment_arms": [ARM, 0.0]}, {"moment_arms": [0.0, ARM]}]
     contact = bands([NEVER, 0.01, NEVER, NEVER])
     for row in contact["bands"]:
@@ -288,7 +304,7 @@ def test_contact_at_any_joint_holds_all_references(runner: Runner) -> None:
     out = runner(finger(arms, 2, contact=contact | {"threshold": [NEVER] * 2}), samples, 3)
     assert out["joint_contact"][20:, 0].all() and not out["joint_contact"][:, 1].any()
     n = np.arange(1, 201)
-    distance = np.max([0.04 * counted(n, k, HELD) for k in range(4)], axis=0)
+    distance = np.max([0.04 * change(n, k, HELD) for k in range(4)], axis=0)
     close(out["contact_level"][102:, 1], distance, within=1e-12)
 
 

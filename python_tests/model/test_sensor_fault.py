@@ -22,6 +22,7 @@ FAULT = {
     "force_resolution": 0.01,
     "position_resolution": 1e-6,
     "jump_margin": 0.5,
+    "spring_margin": 0.5,
     "recovery_time": 2 * DT,
 }
 LEARNS = {"drift_variance": 1.0, "noise_std": 0.1, "initial_variance": 0.0}
@@ -178,7 +179,7 @@ def test_no_key_no_outputs_and_nothing_else_changes() -> None:
     description, recording = random_case(500, 300, detection=True)
     plain = NATIVE(description, recording, 1)
     assert not {"sensor_fault", "contact_observable"} & set(plain)
-    watched = NATIVE(description | {"sensor_fault": {"jump_margin": 1e9}}, recording, 1)
+    watched = NATIVE(description | {"sensor_fault": {"jump_margin": 1e9, "spring_margin": 1e9}}, recording, 1)
     for name, values in plain.items():
         np.testing.assert_array_equal(watched[name], values, err_msg=name)
 

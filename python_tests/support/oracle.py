@@ -141,7 +141,7 @@ class FingerOracle:
         unwatched = np.asarray(self.watch.blind) | np.asarray(self.watch.anew) | first
         r = np.where(unwatched, 0.0, tau - T_eff)
         B = self._held_at_most(limits * f)
-        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, B, np.abs(friction))
+        signals = Signals(tau - T - self.jumps, r, self._driven(x0), T, B, np.abs(friction), q)
         joint_contact = self.detector.take(signals, mean_force, time, dt, unwatched, out)
         if not first:
             correction = self._gain(dt, noise, time, bool(joint_contact.any())) * r

@@ -21,8 +21,9 @@ Array = NDArray[Any]
 
 SHORT = (0.004, 0.02, 0.06, 0.5)  # A_k, s
 LONG = (0.05, 0.3, 1.0, 10.0)  # M_k, s
-LEAK, HOME, FORGET = 10.0, 3.0, 1.0  # s
+LEAK, FORGET = 10.0, 1.0  # s
 LEAST_TIME, END = 0.02, 0.4  # s, of the peak
+MOVED = 0.1  # rad
 HIGHEST = 1e150  # level
 NUMBERS = ("noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve")
 
@@ -39,7 +40,7 @@ def level_of(distance: float, bound: float) -> float:
 
 @dataclass
 class Signals:
-    """What step 5 takes of a sample, each [n], N·m: e, r, x, T, B, Q."""
+    """What step 5 takes of a sample, each [n], N·m: e, r, x, T, B, Q; and q, rad."""
 
     e: Array
     r: Array
@@ -47,6 +48,7 @@ class Signals:
     T: Array
     B: Array
     Q: Array
+    q: Array
 
     def of(self, j: int) -> tuple[float, ...]:
         """e, x, T, B, U of a joint."""
@@ -70,7 +72,7 @@ class Band:
 
 @dataclass
 class Joint:
-    """What the method bands remembers of a joint. band: None without contact."""
+    """What the method bands remembers of a joint. base: None without contact."""
 
     bands: list[Band] = field(default_factory=list)
     start: float = math.nan  # t_0
@@ -78,7 +80,8 @@ class Joint:
     V: float = 0.0
     has_moved: bool = False
     turned: float = 0.0
-    band: int | None = None
+    q_0: float = 0.0
+    base: float | None = None
     sign: float = 0.0
     begun: float = math.nan
     peak: float = 0.0
@@ -87,7 +90,7 @@ class Joint:
         """Begin anew; S stays."""
         before = [band.S for band in self.bands] or [0.0] * len(SHORT)
         self.bands = [Band(e, e, x, x, T, T, S=S) for S in before]
-        self.start, self.band = time, None
+        self.start, self.base = time, None
 
 
 class Detector:
@@ -127,7 +130,7 @@ class Detector:
         found = np.zeros(self.n, dtype=bool)
         for j in range(self.n):
             if self.by_bands:
-                found[j] = self._by_bands(j, of.of(j), time, dt, before, bool(anew[j]), out)
+                found[j] = self._by_bands(j, of.of(j), time, dt, before, bool(anew[j]), float(of.q[j]), out)
             else:
                 bound = float(self.threshold[j] + self.threshold_per_force[j] * mean_force)
                 distance = 0.0 if anew[j] else abs(float(of.r[j]))
@@ -141,7 +144,8 @@ class Detector:
         return np.asarray(np.sqrt(P + (self.deviation + self.deviation_per_force * mean_force) ** 2))
 
     def _by_bands(
-        self, j: int, sample: tuple[float, ...], time: float, dt: float, held: bool, anew: bool, out: Step
+        self, j: int, sample: tuple[float, ...], time: float, dt: float, held: bool, anew: bool, q: float,
+        out: Step
     ) -> bool:  # fmt: skip
         """Whether joint j is in contact. held: any was at the sample before."""
         e, x, T, B, U = sample
@@ -149,13 +153,13 @@ class Detector:
         if anew:
             joint.bands = []
             joint.begin(e, x, T, time)
-            joint.h, joint.V, joint.has_moved, joint.turned = e, B, False, 0.0
+            joint.h, joint.V, joint.has_moved, joint.turned, joint.q_0 = e, B, False, 0.0, q
             self.terms[j] = self._nothing(T, B)
             return False
         self._follow(joint, sample, time, dt, held)
         if not joint.has_moved:
             joint.turned = max(joint.turned, B - U)
-        waits = not joint.has_moved and joint.band is None
+        waits = not joint.has_moved and joint.base is None
         if waits and out.above(("moves", j), joint.turned, 0.5 * B):
             joint.bands = []
             joint.begin(e, x, T, time)
@@ -163,16 +167,19 @@ class Detector:
             self.terms[j] = self._nothing(T, B)
             self.branches["moves_first"] += 1
             return False
+        if not joint.has_moved and out.above(("moves_away", j), abs(q - joint.q_0), MOVED):
+            joint.has_moved, joint.turned = True, 0.0
+            self.branches["moves_away"] += 1
         distances, bounds = zip(*(self._measure(j, k, abs(T), B) for k in range(len(SHORT))), strict=True)
         levels = [level_of(distance, bound) for distance, bound in zip(distances, bounds, strict=True)]
         self.level[j] = max(levels)
-        if joint.band is None:
+        if joint.base is None:
             self._begin_contact(j, levels, bounds, time, out)
         elif self._ends(j, time, dt, out):
             joint.begin(e, x, T, time)
             joint.V, self.terms[j] = joint.peak, self._nothing(T, B)
             self.branches["contact_ends"] += 1
-        return joint.band is not None
+        return joint.base is not None
 
     @staticmethod
     def _nothing(T: float, B: float) -> list[float]:
@@ -197,8 +204,9 @@ class Detector:
             fade = math.exp(-dt / long)
             band.D = max(band.D * fade, abs(band.x_short - band.x_long))
             band.S = max(band.S * fade, U)
-        joint.h += (1.0 - math.exp(-dt / HOME)) * (joint.bands[1].a - joint.h)
-        self.branches["held_by_another" if held and joint.band is None else "own_pace"] += 1
+        if not held:
+            joint.h += (1.0 - math.exp(-dt / LEAK)) * (joint.bands[1].a - joint.h)
+        self.branches["held_by_another" if held and joint.base is None else "own_pace"] += 1
 
     def _measure(self, j: int, k: int, T: float, B: float) -> tuple[float, float]:
         """Rules 6 and 7 of a band: distance and bound. T: its magnitude."""
@@ -227,16 +235,19 @@ class Detector:
             return
         gap = min((levels[k] - level for level in levels if level != levels[k]), default=1.0)
         joint = self.joints[j]
-        joint.band = out.decide(("band", j), k, gap * bounds[k])
-        joint.sign = math.copysign(1.0, joint.bands[k].a - joint.bands[k].m)
+        band = joint.bands[out.decide(("band", j), k, gap * bounds[k])]
+        joint.sign = math.copysign(1.0, band.a - band.m)
+        joint.base = joint.sign * max(joint.sign * band.m, joint.sign * joint.h)
+        self.branches["from_home"] += joint.base != band.m
         joint.begun, joint.peak = time, 0.0
         self.branches[f"begins_in_band_{k + 1}"] += 1
 
     def _ends(self, j: int, time: float, dt: float, out: Step) -> bool:
         """Rule 8 of a joint in contact."""
         joint = self.joints[j]
-        assert joint.band is not None
-        d = (joint.bands[2].a - joint.bands[joint.band].m) * joint.sign
+        assert joint.base is not None
+        joint.base += (1.0 - math.exp(-dt / LEAK)) * (joint.bands[2].a - joint.base)
+        d = (joint.bands[2].a - joint.base) * joint.sign
         joint.peak = max(joint.peak, d)
         if not longer(time - joint.begun, LEAST_TIME, dt):
             self.branches["too_early_to_end"] += 1

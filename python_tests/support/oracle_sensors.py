@@ -69,7 +69,9 @@ class SensorWatch:
         self.hold_time = float(given(settings, "hold_time", 0.05))
         self.force_resolution = float(given(settings, "force_resolution", 0.01))
         self.position_resolution = float(given(settings, "position_resolution", 2e-6))
-        self.margin = float(given(settings, "jump_margin", 1.0))
+        self.jump_margin = float(given(settings, "jump_margin", 1.0))
+        self.margin = float(given(settings, "spring_margin", 1.0))
+        self.longest_stand = float(given(settings, "longest_stand", 1e9))
         self.recovery_time = float(given(settings, "recovery_time", 0.5))
         self.R, self.source, self.branches = R, source, branches
         self.tendons = [
@@ -187,7 +189,7 @@ class SensorWatch:
         assert tendon.last is not None and w is not None
         f_last, x_last, w_last = tendon.last
         stretched = abs(x - x_last) + abs(w - w_last)
-        bound = (1.0 + SPRING_ERROR) * tendon.stiffness * stretched + self.margin
+        bound = (1.0 + SPRING_ERROR) * tendon.stiffness * stretched + self.jump_margin
         return above(("jump", i), abs(f - f_last), bound)
 
     def _long(self, held: tuple[float, float] | None, time: float) -> bool:
@@ -208,7 +210,12 @@ class SensorWatch:
             tendon.held_force = f, time
         if well and w is not None and self._is_taut(i, f) and (left or lost or not had):
             tendon.taut = f, tendon.spring(x, w)
-        if not (well and again and had and self._long(tendon.held_force, time)):
+        assert tendon.held_force is not None
+        if not (well and again and had):
+            return False
+        if self._is_taut(i, f) and longer(time - tendon.held_force[1], self.longest_stand, self.dt):
+            return True
+        if not self._long(tendon.held_force, time):
             return False
         assert w is not None
         missed = abs(tendon.expected(tendon.spring(x, w)) - f)

@@ -376,6 +376,8 @@ def failing_case(seed: int) -> tuple[Description, Recording]:
         "force_resolution": rng.uniform(0.002, 0.02),
         "position_resolution": rng.uniform(1e-7, 1e-6),
         "jump_margin": rng.uniform(0.2, 1.0),
+        "spring_margin": rng.uniform(0.2, 1.0),
+        "longest_stand": step * rng.uniform(2.0, 20.0),
         "recovery_time": step * rng.uniform(2.0, 15.0),
     }
     kept = {key: value for key, value in fault.items() if key == "recovery_time" or rng.random() < 0.9}

@@ -160,6 +160,8 @@ static void derive_sensors(derivation* d, const model_item* item) {
     case ITEM_FAULT_FORCE_RESOLUTION: settings->force_resolution = value; break;
     case ITEM_FAULT_POSITION_RESOLUTION: settings->position_resolution = value; break;
     case ITEM_FAULT_JUMP_MARGIN: settings->jump_margin = value; break;
+    case ITEM_FAULT_SPRING_MARGIN: settings->spring_margin = value; break;
+    case ITEM_FAULT_LONGEST_STAND: settings->longest_stand = value; break;
     default: settings->recovery_time = value; break;
   }
 }

@@ -35,8 +35,9 @@ typedef struct finger_settings {
   int has_initial_torque, has_tendon_zero;
   int forgets_by_absorption;
   int has_bands, watches_motors, watches_sensors;
-  double fault_hold_time, recovery_time;                     /* s */
-  double force_resolution, jump_margin, position_resolution; /* N, N, m */
+  double fault_hold_time, longest_stand, recovery_time; /* s */
+  double force_resolution, jump_margin, spring_margin;  /* N */
+  double position_resolution;                           /* m */
 } finger_settings;
 
 /* One row of the description's extensions. */

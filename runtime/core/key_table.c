@@ -56,6 +56,8 @@ static const key_row rows[] = {
   {"sensor_fault.force_resolution", "N", 0.0, 1000000000.0, 0, 1, 1, 0.01, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
   {"sensor_fault.position_resolution", "m", 0.0, 1000000000.0, 0, 1, 1, 2e-06, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
   {"sensor_fault.jump_margin", "N", 0.0, 1000000000.0, 1, 1, 1, 1.0, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
+  {"sensor_fault.spring_margin", "N", 0.0, 1000000000.0, 1, 1, 1, 1.0, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
+  {"sensor_fault.longest_stand", "s", 0.0, 1000000000.0, 1, 1, 1, 1000000000.0, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
   {"sensor_fault.recovery_time", "s", 0.0, 1000000000.0, 0, 1, 1, 0.5, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
 };
 
@@ -97,7 +99,9 @@ static const struct { uint32_t first, count; } items[ITEM_EXTENSION] = {
   [ITEM_FAULT_FORCE_RESOLUTION] = {46, 1},
   [ITEM_FAULT_POSITION_RESOLUTION] = {47, 1},
   [ITEM_FAULT_JUMP_MARGIN] = {48, 1},
-  [ITEM_FAULT_RECOVERY_TIME] = {49, 1},
+  [ITEM_FAULT_SPRING_MARGIN] = {49, 1},
+  [ITEM_FAULT_LONGEST_STAND] = {50, 1},
+  [ITEM_FAULT_RECOVERY_TIME] = {51, 1},
 };
 
 const key_row* key_row_of(model_item_kind kind, uint32_t offset) {

@@ -50,6 +50,8 @@ typedef enum model_item_kind {
   ITEM_FAULT_FORCE_RESOLUTION, /* sensor_fault.force_resolution */
   ITEM_FAULT_POSITION_RESOLUTION, /* sensor_fault.position_resolution */
   ITEM_FAULT_JUMP_MARGIN, /* sensor_fault.jump_margin */
+  ITEM_FAULT_SPRING_MARGIN, /* sensor_fault.spring_margin */
+  ITEM_FAULT_LONGEST_STAND, /* sensor_fault.longest_stand */
   ITEM_FAULT_RECOVERY_TIME, /* sensor_fault.recovery_time */
   ITEM_EXTENSION /* as many as the effect has */
 } model_item_kind;

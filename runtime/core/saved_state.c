@@ -79,15 +79,14 @@ static const unsigned char* saved_row(const tendonfmu_finger* f, const unsigned 
   return state + 8 * (size_t)(row - f->state);
 }
 
-/* what indexes, and times that may not lie ahead */
+/* times that may not lie ahead */
 static int bands_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const double time = load_f64(state + 8 * STATE_TIME);
   for (size_t j = 0; f->derived.settings.has_bands && j < f->joints; ++j) {
     band_memory joint;
     const unsigned char* from = saved_row(f, state, (const double*)(const void*)bands_of(f, j));
     load_doubles((double*)(void*)&joint, from, sizeof joint / sizeof(double));
-    const int whole = joint.band == (double)(int)joint.band;
-    if (!whole || joint.band < 0.0 || joint.band >= BANDS || joint.begun_at > time || joint.touched_at > time) {
+    if (joint.begun_at > time || joint.touched_at > time) {
       return 0;
     }
   }

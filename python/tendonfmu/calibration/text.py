@@ -236,7 +236,7 @@ def sensor_sentence(report: Report) -> str:
     if found["keys"] is None:
         return f"Sensor faults are not watched: {found['left_out']}."
     return (
-        f"A tendon force that differs from that of its spring by more than {found['keys']['jump_margin']:.2g} N is "
+        f"A tendon force that differs from that of its spring by more than {found['keys']['spring_margin']:.2g} N is "
         "reported as a sensor fault, not as contact; free motion shows differences of up to "
         f"{found['largest_difference']:.2g} N."
     )

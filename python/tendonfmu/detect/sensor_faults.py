@@ -1,8 +1,9 @@
 """The rule for failing sensors, learned from free motion (docs/reference/semantics/sensors.md).
 
-The resolutions are those of the sensors. The margin is twice the largest difference between a force and its spring in
-free motion, due to noise, sampling and springs that differ from their description. The finger as it runs must find no
-fault.
+The resolutions are those of the sensors. The margin of a sensor that stands is twice the largest difference between a
+force and its spring within a tenth of a second of free motion, due to springs and cords that differ from their
+description. The margin of a jump is that or less: five times the largest difference within a sample, due to noise and
+sampling. A force may stand for twice as long as it ever did. The finger as it runs must find no fault.
 """
 
 from __future__ import annotations
@@ -22,10 +23,13 @@ from tendonfmu.options import KinematicsSource
 HOLD_TIME, HOLD_SAMPLES = 0.02, 5
 RECOVERY_TIME = DEFAULTS["sensor_fault.recovery_time"]  # s
 WINDOW = 0.1  # s in which a spring is compared with its force: a sound force changes within it in motion
-AMPLE = 2.0  # times the largest observed difference: later ones may be larger
+PUSHED = 5.0  # times the largest jump in free motion: a push moves tendons faster
+AMPLE = 2.0  # times the largest observed difference and the longest stand: later ones may be larger
+LONGEST_STAND = 1.0  # s; a force that stands for half as long has no noise, and stands at rest
 TAUT = 1.0  # N; below, a tendon may be slack, and the others do not give its length
 WIDEST = 0.25  # of the mean tendon force; a wider margin would hide faults
 LEAST_FREEDOM = 0.1  # as in the runtime: least 1 − leverage of a tendon whose length the others give
+WHITE = 1.5  # least third over second difference of noise; white noise has 1.83, motion much less
 NOISE_SHARE = 0.5  # of the noise of a sample: a smaller change counts as none
 ROUNDING = 1e-9  # of the largest value: smaller steps are rounding errors
 RAISE = 1.5  # factor on the margin until no fault is found
@@ -47,20 +51,26 @@ def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
     gaps = [gap for part in parts for gap in _gaps(data, part)]
     if not any(each.known.any() for each in gaps):
         return SensorRule(None, np.nan, "no tendon's length follows from the others")
-    largest = max(max(each.jump(), each.span()) for each in gaps)
+    jump = max(each.jump() for each in gaps)
+    largest = max(jump, *(each.span() for each in gaps))
     step = max(float(np.median(np.diff(part.time))) for part in parts)
     keys = {
         "hold_time": round(max(HOLD_TIME, HOLD_SAMPLES * step), 6),
         "force_resolution": _resolution([part.arrays["tendon_force"] for part in parts]),
         "position_resolution": _resolution([part.arrays["tendon_position"] for part in parts]),
-        "jump_margin": float(f"{max(AMPLE * largest, 1e-6):.3g}"),
+        "jump_margin": float(f"{max(min(PUSHED * jump, AMPLE * largest), 1e-6):.3g}"),
+        "spring_margin": float(f"{max(AMPLE * largest, 1e-6):.3g}"),
         "recovery_time": RECOVERY_TIME,
     }
-    widest = WIDEST * min(float(part.mean_force.mean()) for part in parts)
-    while keys["jump_margin"] <= widest:
+    stand = max(_longest_stand(part, keys["force_resolution"]) for part in parts)
+    if AMPLE * stand < LONGEST_STAND and all(_is_noisy(part.arrays["tendon_force"]) for part in parts):
+        keys["longest_stand"] = float(f"{max(AMPLE * stand, keys['hold_time']):.3g}")
+    widest = WIDEST * float(np.mean(np.concatenate([part.mean_force for part in parts])))
+    while keys["spring_margin"] <= widest:
         if not finds_a_fault(data, parts, keys):
             return SensorRule(keys, largest, "")
-        keys["jump_margin"] = float(f"{RAISE * keys['jump_margin']:.3g}")
+        for name in ("jump_margin", "spring_margin"):
+            keys[name] = float(f"{RAISE * keys[name]:.3g}")
     why = f"a sensor seems to fail in free motion, by more than {widest:.2g} N"
     if AMPLE * largest > widest:
         why = (
@@ -130,6 +140,30 @@ def _joint_side(R: Numbers, spring_end: Numbers, angle: Numbers | None) -> tuple
     all_together = spring_end @ inverse.T @ R.T
     ratio = np.where(is_known, leverage / np.where(is_known, 1.0 - leverage, 1.0), 0.0)
     return np.asarray(all_together - ratio * (spring_end - all_together)), np.asarray(is_known)
+
+
+def _longest_stand(part: FreePart, resolution: float) -> float:
+    """Return the longest time for which a force keeps within the resolution (s)."""
+    longest = 0.0
+    for force in part.arrays["tendon_force"].T.tolist():
+        held, since = force[0], 0
+        for k, value in enumerate(force):
+            if abs(value - held) > resolution:
+                held, since = value, k
+            elif part.time[k] - part.time[since] > longest:
+                longest = float(part.time[k] - part.time[since])
+    return longest
+
+
+def _is_noisy(values: Numbers) -> bool:
+    """Tell whether every tendon's force moves at rest, too: by white noise larger than the steps it is read in."""
+    if len(values) < 4:
+        return False
+    step = np.abs(np.diff(values, axis=0))
+    bend, turn = (np.median(np.abs(np.diff(values, order, axis=0)), axis=0) for order in (2, 3))
+    smallest = float(step[step > ROUNDING * np.abs(values).max()].min(initial=np.inf))
+    noise = bend / (0.6745 * np.sqrt(6.0))
+    return bool((turn >= WHITE * bend).all() and (NOISE_SHARE * noise >= smallest).all())
 
 
 def _resolution(arrays: Sequence[Numbers]) -> float:

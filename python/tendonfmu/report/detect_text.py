@@ -166,5 +166,5 @@ def tune_lines(tuning: ContactTuning) -> Iterator[str]:
     else:
         yield (
             f"sensor faults: forces differ from those of their springs by up to {sensors['largest_difference']:.2g} N "
-            f"in free motion, {sensors['keys']['jump_margin']:.3g} N are allowed"
+            f"in free motion, {sensors['keys']['spring_margin']:.3g} N are allowed"
         )

@@ -9,12 +9,12 @@
 static const double mean_time[BANDS] = {0.004, 0.02, 0.06, 0.5};    /* A, s */
 static const double reference_time[BANDS] = {0.05, 0.3, 1.0, 10.0}; /* M, s */
 
-#define HELD_TIME    10.0  /* s, H: with which references follow in contact */
-#define HOME_TIME    3.0   /* s */
+#define HELD_TIME    10.0  /* s, H: with which home follows, and references and bases in contact */
 #define UNKNOWN_TIME 1.0   /* s */
 #define SHORTEST     0.02  /* s, of a contact */
 #define HIGHEST      1e300 /* square of a level */
-#define TURNED       0.5   /* of all that friction can hold: then the start is behind */
+#define TURNED       0.5   /* of all that friction can hold: then the start is behind, */
+#define MOVED        0.1   /* rad; or so far from it */
 #define END          0.4   /* of its peak, below which a contact has ended */
 
 enum { HOME_BAND = 1, END_BAND = 2, RESERVE_BAND = 2 };
@@ -39,10 +39,9 @@ void band_find_shares(band_shares* shares, double step) {
   for (size_t k = 0; k < BANDS; ++k) {
     shares->mean[k] = share_of(step, mean_time[k]);
     shares->reference[k] = share_of(step, reference_time[k]);
-    shares->held[k] = share_of(step, larger(HELD_TIME, reference_time[k]));
     shares->kept[k] = 1.0 - shares->reference[k];
   }
-  shares->home = share_of(step, HOME_TIME);
+  shares->held = share_of(step, HELD_TIME);
   shares->unknown = 1.0 - share_of(step, UNKNOWN_TIME);
 }
 
@@ -57,9 +56,10 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
   joint->home = first ? sample->residual : joint->home;
   joint->has_moved = first ? 0.0 : joint->has_moved;
   joint->turned = first ? 0.0 : joint->turned;
+  joint->start = first ? sample->angle : joint->start;
   joint->unknown = unknown;
   joint->begun_at = joint->touched_at = time;
-  joint->band = joint->sign = joint->peak = 0.0;
+  joint->base = joint->sign = joint->peak = 0.0;
   joint->friction = fabs(sample->torque);
   joint->limit = sample->limit;
 }
@@ -82,16 +82,21 @@ static void follow(double* mean, double* reference, double value, const double* 
 
 static void follow_sample(band_memory* joint, const band_sample* sample, const band_shares* shares, double age,
                           int any) {
-  double quick[BANDS], slow[BANDS];
+  double quick[BANDS], slow[BANDS], own[BANDS];
   find_shares_since(shares, age, quick, slow);
-  follow(joint->mean, joint->reference, sample->residual, quick, any ? shares->held : slow);
+  for (size_t k = 0; k < BANDS; ++k) {
+    own[k] = any ? shares->held : slow[k];
+  }
+  follow(joint->mean, joint->reference, sample->residual, quick, own);
   follow(joint->load, joint->load_reference, sample->load, quick, slow);
   follow(joint->torque, joint->torque_reference, sample->torque, quick, slow);
   for (size_t k = 0; k < BANDS; ++k) {
     joint->driven[k] = larger(joint->driven[k] * shares->kept[k], fabs(joint->load[k] - joint->load_reference[k]));
     joint->reserve[k] = larger(joint->reserve[k] * shares->kept[k], sample->reserve);
   }
-  joint->home += shares->home * (joint->mean[HOME_BAND] - joint->home);
+  if (!any) {
+    joint->home += shares->held * (joint->mean[HOME_BAND] - joint->home);
+  }
   joint->unknown *= shares->unknown;
   joint->friction = fabs(sample->torque);
   joint->limit = sample->limit;
@@ -141,6 +146,10 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
       joint->has_moved = 1.0;
       return 0.0;
     }
+    if (fabs(sample->angle - joint->start) > MOVED) {
+      joint->turned = 0.0;
+      joint->has_moved = 1.0;
+    }
   }
   for (size_t k = 0; k < BANDS; ++k) {
     double size, bound;
@@ -154,19 +163,21 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
   return sqrt(smaller(most / bound_of_most, HIGHEST));
 }
 
-int band_decide(band_memory* joint, const band_sample* sample, double time, double rounding, int before, double level,
-                size_t band) {
+int band_decide(band_memory* joint, const band_sample* sample, const band_shares* shares, double time, double rounding,
+                int before, double level, size_t band) {
   if (!before) {
     if (!(level > 1.0)) {
       return 0;
     }
-    joint->band = (double)band;
-    joint->sign = joint->mean[band] < joint->reference[band] ? -1.0 : 1.0;
+    const double reference = joint->reference[band], home = joint->home;
+    joint->sign = joint->mean[band] < reference ? -1.0 : 1.0;
+    joint->base = joint->sign < 0.0 ? smaller(reference, home) : larger(reference, home);
     joint->peak = 0.0;
     joint->touched_at = time;
     return 1;
   }
-  const double now = (joint->mean[END_BAND] - joint->reference[(size_t)joint->band]) * joint->sign;
+  joint->base += shares->held * (joint->mean[END_BAND] - joint->base);
+  const double now = (joint->mean[END_BAND] - joint->base) * joint->sign;
   joint->peak = larger(joint->peak, now);
   if (time - joint->touched_at > SHORTEST + rounding && now < END * joint->peak) {
     band_begin(joint, sample, time, joint->peak, 0);

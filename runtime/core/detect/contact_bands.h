@@ -19,29 +19,30 @@ typedef struct band_memory {
   double home;                                   /* h, N·m */
   double unknown;                                /* V: what friction holds since a touch is not known, N·m */
   double begun_at, touched_at;                   /* t_0, begin of the contact: s */
-  double band, sign, peak;                       /* of the contact: 0 to 3, ±1, N·m */
+  double base, sign, peak;                       /* of the contact: N·m, ±1, N·m */
   double friction, limit;                        /* |T|, B of the last sample: N·m */
   double has_moved;                              /* 0 until friction has turned over */
   double turned;                                 /* W: the largest friction until then, N·m */
-  double spare;                                  /* to a multiple of 4 */
+  double start;                                  /* q at the first sample, rad */
 } band_memory;
 
-/* A joint at one sample, N·m. */
+/* A joint at one sample. */
 typedef struct band_sample {
-  double residual; /* e */
+  double residual; /* e, N·m */
   double load;     /* x */
   double torque;   /* T */
   double limit;    /* B */
   double reserve;  /* U */
+  double angle;    /* q, rad */
 } band_sample;
 
 /* What depends on the step alone. */
 typedef struct band_shares {
   double step;                          /* s */
   double mean[BANDS], reference[BANDS]; /* of a new value */
-  double held[BANDS];                   /* the same of a reference in contact */
   double kept[BANDS];                   /* of D and S */
-  double home, unknown;
+  double held;                          /* of a reference in contact, a base, and home without contact */
+  double unknown;
 } band_shares;
 
 /* Fills the shares unless they are those of this step. */
@@ -55,8 +56,8 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
                  const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band);
 
 /* Whether a joint is in contact now, from whether it was, its level and the band that has it. */
-int band_decide(band_memory* joint, const band_sample* sample, double time, double step, int before, double level,
-                size_t band);
+int band_decide(band_memory* joint, const band_sample* sample, const band_shares* shares, double time, double rounding,
+                int before, double level, size_t band);
 
 /* max(V, W): friction whose state nobody knows, N·m. */
 double band_unknown(const band_memory* joint);

@@ -38,7 +38,8 @@ HOT_INLINE int exceed_thresholds(tendonfmu_finger* f, double mean_force) {
 HOT_INLINE band_sample sample_of_bands(const tendonfmu_finger* f, size_t j) {
   const finger_scratch* s = &f->scratch;
   const double reserve = s->limit[j] - fabs(s->slip_torque[j]);
-  return (band_sample){.residual = s->torque[j] - s->friction[j] - f->remembered.jumped[j],
+  return (band_sample){.angle = s->angle[j],
+                       .residual = s->torque[j] - s->friction[j] - f->remembered.jumped[j],
                        .load = s->motor_load[j],
                        .torque = s->friction[j],
                        .limit = s->limit[j],
@@ -69,7 +70,8 @@ HOT_INLINE int exceed_bands(tendonfmu_finger* f, double time, double step) {
     size_t band = 0;
     const int touched = s->joint_contact[j] != 0.0;
     s->level[j] = band_take(bands_of(f, j), &sample, &f->scratch.shares, squares, time, touched, before, &band);
-    s->joint_contact[j] = band_decide(bands_of(f, j), &sample, time, CLOCK_ROUNDING * step, touched, s->level[j], band);
+    s->joint_contact[j] = band_decide(bands_of(f, j), &sample, &f->scratch.shares, time, CLOCK_ROUNDING * step, touched,
+                                      s->level[j], band);
     any |= s->joint_contact[j] != 0.0;
   }
   return any;

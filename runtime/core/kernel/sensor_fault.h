@@ -25,7 +25,7 @@ HOT_INLINE quad_mask is_set(const double* row) {
 
 /* lanes that pull, or that may push as well: what they say of the angles is right */
 HOT_INLINE quad_mask is_taut(const tendonfmu_finger* f, size_t i) {
-  const quad_mask pulls = quad_greater(quad_load(f->scratch.force + i), quad_set(f->derived.settings.jump_margin));
+  const quad_mask pulls = quad_greater(quad_load(f->scratch.force + i), quad_set(f->derived.settings.spring_margin));
   return quad_either(pulls, is_set(f->derived.bidirectional + i));
 }
 
@@ -114,9 +114,13 @@ HOT_INLINE quad force_of_spring(const tendonfmu_finger* f, const watched* w, siz
   return quad_drop(quad_only_first(pushes, is_set(f->derived.bidirectional + i)), force);
 }
 
+/* stands for longer than this (s) */
+HOT_INLINE quad_mask stood_for(double longest, quad since, double time, double step) {
+  return quad_greater(quad_sub(quad_set(time), since), quad_set(longest + CLOCK_ROUNDING * step));
+}
+
 HOT_INLINE quad_mask stood_long(const tendonfmu_finger* f, quad since, double time, double step) {
-  return quad_greater(quad_sub(quad_set(time), since),
-                      quad_set(f->derived.settings.fault_hold_time + CLOCK_ROUNDING * step));
+  return stood_for(f->derived.settings.fault_hold_time, since, time, step);
 }
 
 /* since when f0 is where it is, the last sample with a taut tendon, and whether it stands against its spring */
@@ -142,9 +146,11 @@ HOT_INLINE quad_mask force_stands(tendonfmu_finger* f, const watched* w, size_t 
   const quad_mask stands = quad_both(quad_both(w->well, w->taut), stood_long(f, since, time, step));
   *standing |= quad_mask_bits(stands);
   const quad missed = difference(force_of_spring(f, w, i), w->force);
-  const quad bound = quad_set(settings->jump_margin + LEAST_RESOLUTIONS * settings->force_resolution);
-  const quad_mask judged = quad_both(quad_both(w->again, w->well), quad_both(known, stood_long(f, since, time, step)));
-  return quad_both(judged, quad_greater(missed, bound));
+  const quad bound = quad_set(settings->spring_margin + LEAST_RESOLUTIONS * settings->force_resolution);
+  const quad_mask judged = quad_both(quad_both(w->again, w->well), known);
+  const quad_mask contradicts = quad_both(stood_long(f, since, time, step), quad_greater(missed, bound));
+  const quad_mask too_long = quad_both(w->taut, stood_for(settings->longest_stand, since, time, step));
+  return quad_both(judged, quad_either(contradicts, too_long));
 }
 
 /* since when x0 is where it is, and whether f0 and w contradict it */
@@ -165,8 +171,8 @@ HOT_INLINE quad_mask position_stands(tendonfmu_finger* f, const watched* w, size
   quad_store(sensor_row(f, now, SENSOR_JOINT_SIDE_THEN) + i, joint_side);
   const quad pulled = quad_mul(w->stiffness, quad_sub(w->joint_side, joint_side));
   const quad resolved = quad_mul(quad_set(LEAST_RESOLUTIONS * settings->position_resolution), w->stiffness);
-  const quad allowed =
-      quad_add(quad_add(resolved, quad_set(settings->jump_margin)), quad_mul(quad_set(SPRING_ERROR), quad_abs(pulled)));
+  const quad allowed = quad_add(quad_add(resolved, quad_set(settings->spring_margin)),
+                                quad_mul(quad_set(SPRING_ERROR), quad_abs(pulled)));
   const quad missed = quad_abs(quad_add(quad_sub(w->force, force), pulled));
   const quad_mask judged = quad_both(quad_both(w->again, w->well), stood_long(f, since, time, step));
   return quad_both(judged, quad_greater(missed, allowed));
@@ -202,7 +208,7 @@ COLD_STATIC quad_mask agrees_again(const tendonfmu_finger* f, const watched* w, 
   const quad resolved =
       quad_add(quad_set(settings->force_resolution), quad_mul(quad_set(settings->position_resolution), w->stiffness));
   const quad allowed =
-      quad_add(quad_add(quad_set(settings->jump_margin), quad_mul(quad_set(LEAST_RESOLUTIONS), resolved)),
+      quad_add(quad_add(quad_set(settings->spring_margin), quad_mul(quad_set(LEAST_RESOLUTIONS), resolved)),
                quad_mul(quad_set(SPRING_ERROR), grown));
   const quad_mask near = quad_at_least(allowed, difference(force_of_spring(f, w, i), w->force));
   return quad_both(quad_both(w->known, w->taut), quad_both(moved, near));
