@@ -159,10 +159,9 @@ typedef struct finger_state {
   /* [M] per tendon */
   double *force, *slack;
   /* [n × M + N] per slot, fig. 5 */
-  double* moving;                   /* 1 or 0 at the last sample */
-  double* side;                     /* sgn(v) of the last moving sample; 0: never moved */
-  double* side_before;              /* side before the last sample */
-  double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
+  double* moving; /* 1 or 0 at the last sample */
+  double* side;   /* sgn(v) of the last moving sample; 0: never moved */
+  double* event;  /* of the last sample: 1 came to rest, s − 2 began to move after moving to side s, 0 neither */
   double *stuck_since, *last_stuck; /* s */
   double* jumped;                   /* [N] Σ Δb, N·m; this and the next with contact.bands only */
   double* bands;                    /* [N] band_memory */
@@ -313,6 +312,12 @@ static inline double* sensor_row(const tendonfmu_finger* finger, double* sensor,
 /* R⁺ as the kinematics use it */
 static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
   return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
+}
+
+/* Side before the last sample of a slot that rested then, or rests now. */
+static inline double side_before(const tendonfmu_finger* finger, size_t slot) {
+  const double event = finger->remembered.event[slot];
+  return event < 0.0 ? event + 2.0 : finger->remembered.side[slot];
 }
 
 /* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted

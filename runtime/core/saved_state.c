@@ -10,7 +10,7 @@
 #include "parameters.h"
 #include "rows_in_use.h"
 
-enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 1 };
+enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 2 };
 
 static const char magic[8] = "TFMUSTA";
 
@@ -113,7 +113,7 @@ static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state
 static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_line message) {
   const size_t size = saved_state_size(f), p = f->shape.parameter_count;
   if (memcmp(from, magic, sizeof magic) != 0 || load_u32(from + 8) != STATE_VERSION) {
-    return refuse(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 1");
+    return refuse(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 2");
   }
   if (load_u32(from + 12) != 0 || load_u64(from + 16) != size || load_u64(from + 32) != f->image_id) {
     return refuse(message, "saved state of another finger: size or model image differ");

@@ -160,7 +160,7 @@ double sample_rows::read_friction(const friction_place& p, double acting) {
  * not forgotten of the side before */
 double sample_rows::read_jump(const friction_place& p) {
   const finger_state& s = finger_->remembered;
-  const double before = s.side_before[p.slot], now = s.side[p.slot], event = s.event[p.slot];
+  const double before = side_before(finger_, p.slot), now = s.side[p.slot], event = s.event[p.slot];
   const double gripped = grip(finger_->scratch.bias_grip, p.slot);
   if (event == 0.0 || gripped == 0.0 || remembers(p.slot) || (event > 0.0 && before == 0.0)) {
     return 0.0;
