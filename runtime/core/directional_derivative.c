@@ -122,7 +122,7 @@ static dual friction_at(const linearisation* l, const effect_laws* laws, size_t 
   const dual grip = slot_grip(l, slot, velocity);
   if (remembers_at(l->finger, slot)) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
-    const int negative = sliding_side(velocity.value, threshold, s->side_before[slot]);
+    const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
     return product(grip, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
@@ -155,7 +155,7 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
 static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
   const finger_state* s = &l->finger->remembered;
   const dual speed = {threshold, 0.0};
-  const double before = s->side_before[slot], now = s->side[slot];
+  const double before = side_before(l->finger, slot), now = s->side[slot];
   if (s->event[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }

@@ -18,9 +18,6 @@ static inline const extension_row* torque_row(const tendonfmu_finger* finger, si
   return finger->extensions.row + finger->extensions.signals + finger->extensions.friction + n;
 }
 
-/* Row of the extension `index` of the description. */
-const extension_row* extension_of(const tendonfmu_finger* finger, uint32_t index);
-
 /* Slots of a friction row: its member k, as effect_type.grip() counts it, acts on slot friction_slot(k),
  * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints. */
 size_t friction_members(const tendonfmu_finger* finger, effect_place place);

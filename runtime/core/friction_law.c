@@ -35,10 +35,7 @@ law_slopes law_with_slopes(const double* side, double speed) {
   return (law_slopes){
       .value = side[LAW_COULOMB] + stribeck + side[LAW_VISCOUS] * speed,
       .by_speed = side[LAW_VISCOUS] - side[LAW_RATE] * stribeck,
-      .by_static = decay,
-      .by_coulomb = 1.0 - decay,
-      .by_rate = -speed * stribeck,
-      .by_viscous = speed,
+      .decay = decay,
   };
 }
 

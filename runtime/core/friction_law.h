@@ -12,14 +12,11 @@ enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
 enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
 
-/* Value and slopes of one side at speed |v|, all for v > 0: mirror the value for v < 0. */
+/* One side at speed |v|, all for v > 0: mirror the value for v < 0. */
 typedef struct law_slopes {
-  double value;      /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| */
-  double by_speed;   /* ∂/∂|v| */
-  double by_static;  /* ∂/∂Fs */
-  double by_coulomb; /* ∂/∂Fc */
-  double by_rate;    /* ∂/∂(1/vs) */
-  double by_viscous; /* ∂/∂Fv */
+  double value;    /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| */
+  double by_speed; /* ∂/∂|v| */
+  double decay;    /* exp(−|v|/vs) */
 } law_slopes;
 
 /* side [LAW_SIDE_NUMBERS]; speed >= 0. The value has the bits of law_magnitude(). */

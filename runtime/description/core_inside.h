@@ -20,7 +20,6 @@ extern "C" {
 #include "link_geometry.h"
 #include "message.h"
 #include "model_image.h"
-#include "parameter_derivative.h"
 #include "parameters.h"
 #include "pseudo_inverse.h"
 #include "rows_in_use.h"

@@ -137,9 +137,8 @@ typedef struct effect_type {
   void (*signal_pass)(effect_place place, const double* parameters, const double* memory, effect_signals* direction);
 } effect_type;
 
-/* Row by id or name; NULL when there is none. */
+/* Row by id; NULL when there is none. */
 const effect_type* effect_by_id(uint32_t id);
-const effect_type* effect_by_name(const char* name);
 
 /* Row by position 0.., NULL past the end. */
 const effect_type* effect_at(size_t position);

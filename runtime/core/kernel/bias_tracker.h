@@ -152,9 +152,9 @@ COLD_STATIC void remember_transitions(tendonfmu_finger* f, double time) {
   for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
     const quad_mask now = moving_now(f, slot), before = moved_before(f, slot);
     const quad_mask stops = quad_only_first(before, now), starts = quad_only_first(now, before);
-    quad_store(s->side_before + slot, quad_load(s->side + slot));
     quad_store(s->moving + slot, quad_keep(now, one));
-    quad_store(s->event + slot, quad_sub(quad_keep(stops, one), quad_keep(starts, one)));
+    const quad started = quad_sub(quad_load(s->side + slot), quad_set(2.0));
+    quad_store(s->event + slot, quad_select(starts, started, quad_keep(stops, one)));
     quad_store(s->stuck_since + slot, quad_select(stops, quad_set(clock), quad_load(s->stuck_since + slot)));
   }
 }

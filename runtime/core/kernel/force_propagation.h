@@ -207,14 +207,12 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds
     keep_tension(f, at, EDGES, force);
     const quad force_between = acting_force(force, kinds); /* f_Bj */
     lost = quad_add(lost, edge_loss);
-    quad_store(s->edge_loss + at, edge_loss);
     if (at < last) {
       const size_t behind = at + lanes;
       const quad pulley_loss = loss_at(f, behind, PULLEYS, s->pulley, force_between, force);
       force = without_slack(quad_sub(force, pulley_loss), kinds, &slack);
       keep_tension(f, behind, PULLEYS, force);
       lost = quad_add(lost, pulley_loss);
-      quad_store(s->pulley_loss + behind, pulley_loss);
     }
     quad_sums_add(&tendon_friction[j], i, quad_mul(quad_load(f->derived.moment_arm + at), lost));
     quad_sums_add(&load[j], i, force_between);

@@ -180,9 +180,6 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
   } else {
     forget_transitions(f);
   }
-  if (f->extensions.gripped) {
-    copy_row(s->side_before, s->side, f->slots); /* derivatives of what has a memory read it */
-  }
   remember_slots(f, time);
   copy_row(s->angle, f->scratch.angle, f->joint_lanes);
   copy_row(s->speed, f->scratch.velocity + f->joints * f->tendon_lanes, f->joint_lanes);
