@@ -320,7 +320,9 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    if (row->effect->slope) {
+      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    }
     if (row->effect->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }
