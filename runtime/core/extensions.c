@@ -135,6 +135,28 @@ effect_sample remembered_sample(const tendonfmu_finger* f) {
   return sample;
 }
 
+/* --- signals --------------------------------------------------------------------------------------------------------
+ */
+
+void shape_signals(tendonfmu_finger* f, double time, int late) {
+  const finger_scratch* s = &f->scratch;
+  effect_signals signals = {.joints = f->joints,
+                            .tendons = f->tendons,
+                            .first = f->remembered.scalar[STATE_INITIALISED] == 0.0,
+                            .source = (int)f->remembered.scalar[STATE_SOURCE],
+                            .late = late,
+                            .time = time,
+                            .force = s->force,
+                            .position = s->position,
+                            .angle = s->angle,
+                            .velocity = s->velocity + f->joints * f->tendon_lanes,
+                            .inverse_stiffness = f->derived.inverse_stiffness};
+  for (size_t n = 0; n < f->extensions.signals; ++n) {
+    const extension_row* row = signal_row(f, n);
+    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
+  }
+}
+
 /* --- friction -------------------------------------------------------------------------------------------------------
  */
 

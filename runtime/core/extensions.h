@@ -39,6 +39,9 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
 
+/* Signals in scratch, before the joint angles are known (late 0) and after (late 1); time of the sample, s. */
+void shape_signals(tendonfmu_finger* finger, double time, int late);
+
 /* What friction and torque rows will remember; angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
 

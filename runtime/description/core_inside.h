@@ -13,7 +13,6 @@ extern "C" {
 #include "contact_place.h"
 #include "derived_numbers.h"
 #include "effect.h"
-#include "extension_signals.h"
 #include "extensions.h"
 #include "finger_memory.h"
 #include "friction_law.h"

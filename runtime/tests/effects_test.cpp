@@ -119,7 +119,9 @@ struct Effect {
   PerJoint slope(const Sample& sample, const Sample& direction, const std::vector<double>& after) const {
     PerJoint result{};
     const effect_direction along = along_of(direction);
-    see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
+    if (type->slope) {
+      see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
+    }
     return result;
   }
 };

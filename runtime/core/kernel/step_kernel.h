@@ -4,7 +4,7 @@
 
 #include "bias_tracker.h"
 #include "contact_detector.h"
-#include "extension_signals.h"
+#include "extensions.h"
 #include "force_propagation.h"
 #include "kernel_choice.h"
 #include "kinematics.h"
