@@ -5,10 +5,10 @@
 #include <math.h>
 
 size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle) {
-  const double* point = finger->derived.edge_angle + finger->derived.edge_angle_row[joint] + tendon;
+  const size_t first = finger->derived.edge_angle_row[joint] + tendon;
   size_t passed = 0;
   for (size_t k = 0; k < finger->shape.most_points[joint]; ++k) {
-    const double at = point[k * finger->tendon_lanes];
+    const double at = finger->derived.edge_angle[first + k * finger->tendon_lanes];
     passed += angle >= at && at < INFINITY; /* an angle of an overflowing sample may be infinite, too */
   }
   return passed;
