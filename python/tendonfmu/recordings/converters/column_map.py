@@ -1,7 +1,7 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first brings readings of a
-counter that starts again into its middle. Where `convert inspect` could not
+Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first takes the jumps out of
+readings of a counter that starts again. Where `convert inspect` could not
 decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
 `schema/map.schema.json` defines them for editors.
 """
@@ -48,6 +48,8 @@ SLIDING = {
 }
 REQUIRED = {"turning": ("time", "torque", "angle"), "sliding": ("time", "force", "position")}
 
+TURNING_QUANTITIES = (units.TIME, units.LENGTH, units.ANGLE)  # a force or torque makes no turns
+
 _COLUMN = re.compile(r"([a-z_]+)\[([1-9][0-9]?)\]")
 
 
@@ -63,12 +65,14 @@ class MappedColumn:
     zone: str = "UTC"  # time zone of texts without one
     pattern: str = ""  # pattern of texts (`datetime.strptime`), or "": ISO 8601
     rate: float = 0.0  # rows a second of a log without a column of time, or 0
-    wrap: float = 0.0  # readings after which a counter starts again, or 0; those above half of it count as negative
+    wrap: float = 0.0  # readings after which a counter starts again, or 0
+    # whether its jumps are followed over many turns; otherwise readings above half of `wrap` count as negative
+    turns: bool = False
 
     def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
         """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
         # no unnecessary arithmetic: numbers in SI must not change by rounding
-        if self.wrap:
+        if self.wrap and not self.turns:
             readings = (readings + self.wrap / 2.0) % self.wrap - self.wrap / 2.0
         shifted = readings - self.offset if self.offset else readings
         return (shifted * self.factor if self.factor != 1.0 else shifted).astype(np.float64)
@@ -275,7 +279,8 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     first = offset.value == "first"
     start = None if first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
     wrap = node.member("wrap").number(0.0, LARGEST, "the log's unit", 0.0)
-    return MappedColumn(node.path, column, sign * scale * _factor(unit, known, unit_names), start, wrap=wrap)
+    factor = sign * scale * _factor(unit, known, unit_names)
+    return MappedColumn(node.path, column, factor, start, wrap=wrap, turns=known in TURNING_QUANTITIES)
 
 
 def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:

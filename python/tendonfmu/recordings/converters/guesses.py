@@ -47,6 +47,7 @@ SI = {"angle": "rad", "angular speed": "rad/s", "torque": "N.m", "force": "N", "
 
 EPOCHS = {"epoch_s": 1.0, "epoch_ms": 1e3, "epoch_us": 1e6, "epoch_ns": 1e9}
 FROM_1990, TO_2100 = 631_152_000.0, 4_102_444_800.0  # s
+SLOWEST = 120.0  # s; of a date: a timer's µs of more than a quarter of an hour look like s since 1990
 # median step -> unit, for clocks that start anywhere; logs have some 10 to 10,000 samples per second
 STEPS = [(1e-5, 0.12, "s"), (0.5, 120.0, "ms"), (500.0, 120e3, "us"), (500e3, 120e6, "ns")]
 
@@ -75,7 +76,7 @@ def unit_of(name: str, unit: str, quantity: str, low: float, high: float, ros: b
 def unit_of_time(name: str, unit: str, first: float, step: float) -> Guess:
     """Return the unit of a clock, by its first reading and median step."""
     for stamp, per_second in EPOCHS.items():
-        if FROM_1990 <= first / per_second <= TO_2100:
+        if FROM_1990 <= first / per_second <= TO_2100 and step / per_second < SLOWEST:
             return Guess(
                 stamp, SURE if step > 0 else LIKELY, f"{first:.0f} is a date of our time in {stamp[6:]} since 1970"
             )

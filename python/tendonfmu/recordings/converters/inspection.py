@@ -27,7 +27,7 @@ from tendonfmu.recordings.converters.log import (
 from tendonfmu.recordings.converters.stamps import nanoseconds
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
-from tendonfmu.recordings.traps import wrapped
+from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps
 CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
@@ -46,7 +46,7 @@ class FieldSummary:
     high: float = -np.inf
     example: str = ""  # first text
     only_flags: bool = True  # whether all numbers are 0 or 1
-    wrap: float | None = None  # steps after which it starts again (`traps.wrapped`), of the first block
+    wrap: float | None = None  # readings after which it starts again (`counters.wrap_of`)
     rising: bool = True  # whether each number is above the one before, and the first and last of them
     first: float = np.nan
     last: float = -np.inf
@@ -62,7 +62,8 @@ class FieldSummary:
         self.missing += len(values) - len(finite)
         if len(finite):
             if self.count == len(values):
-                self.wrap, self.first = wrapped(finite.astype(np.float64)), float(finite[0])
+                self.first = float(finite[0])
+            self.wrap = self.wrap or wrap_of(finite.astype(np.float64))
             self.rising = self.rising and bool((np.diff(finite) > 0).all()) and float(finite[0]) > self.last
             self.last = float(finite[-1])
             self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))
@@ -84,6 +85,7 @@ class ClockSummary:
     backwards: int = 0
     rows: int = 0  # number of times
     whole: bool = True
+    wrap: float | None = None  # readings after which a timer starts again
     _end: Any = None
 
     def add(self, values: NDArray[Any]) -> None:
@@ -97,6 +99,10 @@ class ClockSummary:
             values = np.concatenate([[self._end], values])
             self.rows -= 1
         self._end, self.last, self.rows = values[-1], float(values[-1]), self.rows + len(values)
+        self.wrap = self.wrap or (None if self.stamp else overflow(values))
+        if self.wrap:
+            values = unwrapped(values, self.wrap, values[0])
+            self._end, self.last = values[-1], float(values[-1])
         steps = np.diff(values)
         if not len(steps):
             return
@@ -152,13 +158,20 @@ def inspect_log(file: Path, log: Log | None = None) -> Inspection:
 def _traps(topic: TopicSummary) -> Iterator[str]:
     """Yield what is wrong with fields by themselves: words that start again, and clocks that run apart."""
     clock = topic.clock
+    counters: dict[float, list[str]] = {}
+    for summary in topic.fields:
+        if summary.wrap and not (clock and summary.field.name == clock.name):
+            counters.setdefault(summary.wrap, []).append(summary.field.name)
+    for wrap, names in counters.items():
+        yield (
+            f"{', '.join(names)}: jumps by {wrap:.6g}: signed numbers stored as unsigned, an encoder of many turns, or "
+            f'a counter that overflows; "wrap": {wrap:.6g} in the map takes the jumps out; of an encoder, the first '
+            "reading is taken within half a turn of the offset"
+        )
     for summary in topic.fields:
         name = summary.field.name
-        if summary.wrap:
-            yield (
-                f"{name}: jumps by {summary.wrap:.0f} steps, and no value is between: signed numbers stored as "
-                f'unsigned, or a counter that overflows; "wrap": {summary.wrap:.0f} in the map if its unit is a step'
-            )
+        if clock is not None and name == clock.name and clock.wrap:
+            yield f'{name}: a timer that overflows at {clock.wrap:.16g}; "wrap" in the map makes its times go on'
         is_second = clock is not None and name != clock.name and summary.rising and summary.count == clock.rows
         if clock is None or not is_second or clock.last <= clock.first:
             continue

@@ -58,6 +58,7 @@ class Line:
     unit: str  # its unit, or "?"
     sure: str  # SURE, LIKELY, GUESS or UNDECIDED
     why: str  # in words
+    wrap: float | None = None  # readings after which it starts again
 
 
 @dataclass
@@ -260,7 +261,7 @@ def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary
     if summary.missing:
         values = f"{summary.missing} of {counted(summary.count, 'value')} {are(summary.missing)} missing"
         why += f'; {values}: see "missing" in "log"'
-    return Line(column, source, guess.unit, sure, why)
+    return Line(column, source, guess.unit, sure, why, summary.wrap)
 
 
 def _time(inspection: Inspection, beside: Member | None) -> Line:
@@ -280,7 +281,7 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     guess = Guess(clock.stamp, SURE, "its values are points in time")
     if not clock.stamp:
         guess = unit_of_time(clock.name, summary.field.unit, clock.first, clock.step)
-    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}")
+    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}", clock.wrap)
 
 
 def _source(summary: FieldSummary) -> str | int:
@@ -304,7 +305,9 @@ def _document(
     inspection: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], is_one_joint: bool
 ) -> dict[str, Any]:
     columns = {
-        line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"} for line in lines
+        line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"}
+        | ({"wrap": line.wrap} if line.wrap else {})
+        for line in lines
     }
     document: dict[str, Any] = {"format": FORMAT}
     if orders:
