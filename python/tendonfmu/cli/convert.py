@@ -157,7 +157,7 @@ def _inspect(file: Path, output: Path | None, episodes: str | None) -> dict[str,
 
 
 def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
-    from tendonfmu.recordings import clock_line, field_rows, proposal_rows
+    from tendonfmu.recordings import clock_line, field_rows, proposal_rows, unused_line
 
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in inspection.topics:
@@ -165,7 +165,7 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
         print_results([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")
-    print_results([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
+    print_results([("proposed map", columns, list(proposal_rows(proposal)))], [*orders, *unused_line(proposal)], "why")
 
 
 def _convert_table(

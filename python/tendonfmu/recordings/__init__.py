@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         inspection_document,
         proposal_rows,
         propose,
+        unused_line,
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles

@@ -31,6 +31,8 @@ from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps
 CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
+SAMPLE = 2000  # values of a field that are kept
+TOGETHER = 0.5  # correlation with a signal from which a field may be one
 DRIFT = 3e-6, 1e-3  # of two clocks; less is rounding, and more is no second clock
 
 
@@ -47,6 +49,7 @@ class FieldSummary:
     example: str = ""  # first text
     only_flags: bool = True  # whether all numbers are 0 or 1
     wrap: float | None = None  # readings after which it starts again (`counters.wrap_of`)
+    sample: NDArray[np.float64] | None = None  # up to `SAMPLE` values of the first block, equally far apart
     rising: bool = True  # whether each number is above the one before, and the first and last of them
     first: float = np.nan
     last: float = -np.inf
@@ -58,6 +61,8 @@ class FieldSummary:
             self.missing += int(values.null_count)
             self.example = self.example or next((str(text) for text in values[:100] if text.is_valid), "")
             return
+        if self.sample is None:
+            self.sample = values[:: max(len(values) // SAMPLE, 1)].astype(np.float64)
         finite = values[np.isfinite(values)]
         self.missing += len(values) - len(finite)
         if len(finite):
@@ -68,6 +73,17 @@ class FieldSummary:
             self.last = float(finite[-1])
             self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))
             self.only_flags = self.only_flags and bool(np.isin(finite, (0, 1)).all())
+
+    def moves_with(self, other: FieldSummary) -> float:
+        """Return the correlation with another field of the topic; 0 if one of them stands still."""
+        if self.sample is None or other.sample is None or len(self.sample) != len(other.sample):
+            return 0.0
+        both = np.isfinite(self.sample) & np.isfinite(other.sample)
+        if not both.any():
+            return 0.0
+        mine, its = (values[both] - values[both].mean() for values in (self.sample, other.sample))
+        size = float(np.sqrt((mine**2).sum() * (its**2).sum()))
+        return float((mine * its).sum()) / size if size > 0.0 else 0.0
 
 
 @dataclass

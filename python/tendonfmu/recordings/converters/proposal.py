@@ -33,7 +33,13 @@ from tendonfmu.recordings.converters.guesses import (
     words_of,
 )
 from tendonfmu.recordings.converters.guesses import UNDECIDED as NOT_SURE
-from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummary, Inspection, TopicSummary
+from tendonfmu.recordings.converters.inspection import (
+    TOGETHER,
+    ClockSummary,
+    FieldSummary,
+    Inspection,
+    TopicSummary,
+)
 from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
@@ -68,6 +74,7 @@ class Proposal:
     document: dict[str, Any]  # the map, as in the JSON file
     lines: list[Line] = field(default_factory=list)  # its lines
     unused: list[str] = field(default_factory=list)  # names of fields that it does not use
+    moving: dict[str, str] = field(default_factory=dict)  # of those that may be signals, why
     orders: list[Order] = field(default_factory=list)  # how tendons and joints are numbered, where there are several
     undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
     notes: list[str] = field(default_factory=list)  # what is wrong with fields beside each other
@@ -93,14 +100,30 @@ def propose(inspection: Inspection) -> Proposal:
         if not groups.get("joint_position"):
             lines += _perhaps_angles(inspection, {line.source for line in lines}, len(slots.get("tendon_force", [])))
         lines += _contact(groups.get("contact", []))
-    used = {line.source for line in lines}
-    names = [summary.field.name for topic in inspection.topics for summary in topic.fields]
     log = _log_settings(inspection, lines)
     undecided = [f"log.{key}" for key, value in log.items() if value == UNDECIDED]
     undecided += [line.column for line in lines if UNDECIDED in (line.source, line.unit)]
     document = _document(inspection, log, lines, orders, is_one_joint)
-    unused = [name for name in names if name not in used]
-    return Proposal(document, lines, unused, orders, undecided, list(_magnitudes(groups)))
+    unused, moving = _unused(inspection, lines)
+    return Proposal(document, lines, unused, moving, orders, undecided, list(_magnitudes(groups)))
+
+
+def _unused(inspection: Inspection, lines: Sequence[Line]) -> tuple[list[str], dict[str, str]]:
+    """Return the names of the fields that no line uses, and of those that move with a signal which, and how much."""
+    columns = {line.source: line.column for line in lines if line.column != "time"}
+    used = {line.source for line in lines}
+    unused, moving = [], {}
+    for topic in inspection.topics:
+        signals = [(columns[_source(part)], part) for part in topic.fields if _source(part) in columns]
+        for part in topic.fields:
+            if _source(part) in used:
+                continue
+            unused.append(part.field.name)
+            fits = {column: part.moves_with(signal) for column, signal in signals if part.field.kind == NUMBER}
+            best = max(fits, key=lambda column: abs(fits[column]), default="")
+            if best and abs(fits[best]) > TOGETHER and not part.rising:
+                moving[part.field.name] = f"moves with {best}, correlation {fits[best]:.2f}"
+    return unused, moving
 
 
 def _magnitudes(groups: Mapping[str, Sequence[Member]]) -> Iterator[str]:
@@ -247,6 +270,9 @@ def _joint(inspection: Inspection, groups: dict[str, list[Member]]) -> list[Line
 def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary, is_short: bool) -> Line:
     """Return the line of a field. is_short: its group has fewer fields than the finger has tendons."""
     name, source = summary.field.name, _source(summary)
+    if summary.low == summary.high and group != "contact":
+        why = f"constant at {summary.low:.6g}: a sensor that is not connected? State the unit, or remove this"
+        return Line(column, source, UNDECIDED, NOT_SURE, why)
     statement = units.stated(name, summary.field.unit)
     if re.search(rf"(^|[./]){re.escape(column)}$", name) and not summary.field.unit:
         return Line(column, source, SI[QUANTITY[group]], SURE, "the name of a recording's column, in SI")
@@ -334,6 +360,7 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
         "orders": [{**asdict(order), "line": order.line()} for order in proposal.orders],
         "undecided": proposal.undecided,
         "unused": proposal.unused,
+        "moving": proposal.moving,
         "map": proposal.document,
         "notes": [*inspection.notes, *proposal.notes],
     }
@@ -421,6 +448,14 @@ def proposal_rows(proposal: Proposal) -> Iterator[list[str]]:
     """Yield the cells of each line of the map: our column, the log's, unit, how sure, why."""
     for line in proposal.lines:
         yield [line.column, _short(str(line.source)), line.unit, line.sure, line.why]
+
+
+def unused_line(proposal: Proposal) -> Iterator[str]:
+    """Yield a sentence about the fields that no line uses, with "?" where they may be signals."""
+    if proposal.unused:
+        listed = (f"{name}{' ?' if name in proposal.moving else ''}" for name in proposal.unused)
+        yield f"not used: {', '.join(listed)}"
+    yield from (f"? {name}: {why}" for name, why in proposal.moving.items())
 
 
 def _short(name: str) -> str:
