@@ -177,7 +177,7 @@ def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> 
 
 def joint_states(folder: Path, topic: str, names: tuple[str, ...], **more: list[float]) -> dict[str, Line]:
     """A topic of messages like JointState, with names, positions (m) and efforts."""
-    messages = [
+    messages: list[dict[str, Any]] = [
         {"t": k / 200, "name": names, "position": [spool] * len(names), "effort": [force] * len(names)}
         | {key: [value * force for value in values] for key, values in more.items()}
         for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True))
@@ -209,7 +209,7 @@ def test_names_of_elements_are_those_of_the_message_they_are_in(tmp_path: Path) 
     """As in DynamicJointState: interfaces in another order at one joint, fewer at another, and as many as joints."""
     interfaces = {"flexor": ("position", "effort"), "extensor": ("effort", "position")}
     measured = {name: list(zip(SPOOL, FORCE + k, strict=True)) for k, name in enumerate(interfaces)}
-    messages = [
+    messages: list[dict[str, Any]] = [
         {
             "joint_names": list(interfaces),
             "interface_values": [
@@ -231,7 +231,7 @@ def test_names_of_elements_are_those_of_the_message_they_are_in(tmp_path: Path) 
 
 
 def test_fields_that_start_late_are_listed(tmp_path: Path) -> None:
-    messages = [
+    messages: list[dict[str, Any]] = [
         {"name": ["flexor"], "position": [spool], "effort": [force] if k >= 20 else []}
         for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True))
     ]
@@ -242,7 +242,7 @@ def test_fields_that_start_late_are_listed(tmp_path: Path) -> None:
 
 
 def test_the_structure_of_a_message_is_no_signal(tmp_path: Path) -> None:
-    messages = [
+    messages: list[dict[str, Any]] = [
         {"layout": {"dim": [], "data_offset": k}, "data": [force, force + 1.0, 0.5]} for k, force in enumerate(FORCE)
     ]
     proposal = propose(inspect_log(json_messages(tmp_path / "log.mcap", "/tendon_tensions", messages)))

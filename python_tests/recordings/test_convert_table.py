@@ -126,7 +126,7 @@ BAD_MAPS = [
     ("columns/tendon_force[1]/column", 0, ["column = 0", "number from 1"]),
     ("columns/tendon_force[1]/column", ..., ["column: missing"]),
     ("log", {"separator": ":"}, ["log.separator", '";"']),
-    ("log", {"separator": ",", "decimal": ","}, ["log.decimal", "separator"]),
+    ("log", {"thousands": "x"}, ["log.thousands", "expected"]),
     ("log", {"header": 1}, ["log.header", "true or false"]),
     ("log", {"skip": -1}, ["log.skip"]),
     ("log", {"encoding": "klingon"}, ["log.encoding", "utf-16"]),

@@ -12,7 +12,7 @@ import codecs
 import re
 import zoneinfo
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ FORMAT = "tendonfmu-map-1"
 LARGEST = 1e12  # of offsets and scales, as of the signals of a recording
 UNDECIDED = "?"  # written by `convert inspect`, refused by `convert table`
 SEPARATORS = (",", ";", "\t", "|", " ")
+GROUP_MARKS = (",", ".", " ", "'")  # between thousands
 
 TURNING = {
     "time": units.TIME,
@@ -93,6 +94,7 @@ class LogFormat:
 
     separator: str | None = None  # of texts
     decimal: str | None = None
+    thousands: str | None = None
     skip: int | None = None
     header: bool | None = None
     units_row: bool | None = None
@@ -143,6 +145,18 @@ def read_map(path: Path) -> ColumnMap:
         raise InputError(f"{path}: {refused}") from None
 
 
+def read_log_format(path: Path) -> LogFormat:
+    """Read `log` alone of MAP.json, for `convert inspect`: rows without a number stay. Raise InputError."""
+    node = Node(read_json(path, "a map of columns"))
+    try:
+        node.member("format").choice(FORMAT)
+        undecided = ("missing", "disorder")
+        log = {key: value for key, value in (node.member("log").value or {}).items() if key not in undecided}
+        return replace(_read_log(Node(log, "log")), leave_out_missing=True)
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
 def _read(path: Path, node: Node) -> ColumnMap:
     node.keys(("format", "comment", "log", "columns", "joint", "resample"))
     node.member("format").choice(FORMAT)
@@ -157,15 +171,18 @@ def _read(path: Path, node: Node) -> ColumnMap:
 def _read_log(node: Node) -> LogFormat:
     if node.absent:
         return LogFormat()
-    node.keys(("separator", "decimal", "skip", "header", "units_row", "encoding", "missing", "disorder", "clocks"))
+    layout = ("separator", "decimal", "thousands", "skip", "header", "units_row", "encoding")
+    node.keys((*layout, "missing", "disorder", "clocks"))
     separator, decimal, skip = node.member("separator"), node.member("decimal"), node.member("skip")
+    thousands = node.member("thousands")
     encoding, missing, disorder = node.member("encoding"), node.member("missing"), node.member("disorder")
     for undecided, choices in ((missing, "refuse or leave out"), (disorder, "refuse or sort")):
         if undecided.value == UNDECIDED:
             undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
-    log = LogFormat(
+    return LogFormat(
         separator=None if separator.absent else separator.choice(*SEPARATORS),
         decimal=None if decimal.absent else decimal.choice(".", ","),
+        thousands=None if thousands.absent else thousands.choice(*GROUP_MARKS),
         skip=None if skip.absent else skip.integer(0, 10000),
         header=_flag(node.member("header")),
         units_row=_flag(node.member("units_row")),
@@ -174,9 +191,6 @@ def _read_log(node: Node) -> LogFormat:
         sort=not disorder.absent and disorder.choice("refuse", "sort") == "sort",
         clocks=_read_clocks(node.member("clocks")),
     )
-    if log.separator is not None and log.separator == log.decimal:
-        decimal.refuse("another character than the separator")
-    return log
 
 
 def _flag(node: Node) -> bool | None:

@@ -159,9 +159,9 @@ class Inspection:
     messages: bool = False  # whether the log holds messages, whose units are those of ROS unless stated
 
 
-def inspect_log(file: Path, log: Log | None = None) -> Inspection:
-    """Read a log and summarise it. log: the log, if it is open."""
-    log = log or open_log(file, LogFormat())
+def inspect_log(file: Path, log: Log | None = None, settings: LogFormat | None = None) -> Inspection:
+    """Read a log and summarise it. log: the log, if it is open. settings: what is known of its format."""
+    log = log or open_log(file, settings or LogFormat(leave_out_missing=True))
     topics = {topic.name: _empty_summary(topic) for topic in log.topics}
     wanted = {name: [part.key for part in topic.fields if part.field.kind != OTHER] for name, topic in topics.items()}
     texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]
@@ -261,10 +261,12 @@ def _settings(log: Log) -> dict[str, Any]:
     settings: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
     if log.encoding not in ("utf-8", "utf-8-sig"):
         settings["encoding"] = log.encoding
+    if layout.thousands:
+        settings["thousands"] = layout.thousands
     if layout.skip:
         settings["skip"] = layout.skip
     if not layout.header:
         settings["header"] = False
-    if layout.units:
+    if layout.has_units_row:
         settings["units_row"] = True
     return settings

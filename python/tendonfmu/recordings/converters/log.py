@@ -21,7 +21,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.recordings.converters.column_map import LogFormat
 
-TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log", ".lvm")
 # suffix: module and name of what opens it
 FORMATS = {
     **dict.fromkeys(TEXTS, ("text_log", "TextLog")),
@@ -40,7 +40,7 @@ Block = dict[str, Any]
 
 ROWS = 1 << 18  # of a block
 NUMBER, TIME, TEXT, OTHER = "number", "time", "text", "other"  # kinds of fields
-TIME_NAMES = ("time", "t", "stamp", "timestamp", "time_s", "time_ms", "header.stamp", "@log_time")
+TIME_NAMES = ("time", "t", "stamp", "timestamp", "time_s", "time_ms", "x_value", "header.stamp", "@log_time")
 NUMBERED = "#"  # before the number of a column whose name is not unique
 NANOSECONDS = 10**9
 # ends of the names of both columns, which begin alike

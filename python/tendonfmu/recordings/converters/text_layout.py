@@ -1,0 +1,299 @@
+"""How a text log is written, found in its first lines: separator, decimal mark, line of names, units, first row.
+
+A line is a row if the columns that hold numbers in most of the lines hold some in it too, so names are taken only from
+a line above rows. A cell may have its unit, brackets, a Fortran exponent, or a missing number as C libraries print it.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tendonfmu.errors import InputError
+from tendonfmu.files import counted
+from tendonfmu.recordings.converters.column_map import GROUP_MARKS, SEPARATORS, LogFormat
+from tendonfmu.recordings.converters.units import quantity
+
+COMMENTS = ("#", "%", "//")
+FLAGS = {"true": 1.0, "false": 0.0}
+MISSING = ("", "nan", "na", "n/a", "null", "none", "#n/a", "-nan", "<na>", "nat", "--", "---")  # in lower case
+LAST = 50  # lines of the sample in which the columns of numbers are found
+
+_NO_NUMBER = re.compile(r"[+-]?(1\.#(ind|qnan|snan|nan)\d*|nan\(.*\))")
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ed]([+-]?\d+))?(?![\d.])", re.IGNORECASE)
+_DATE = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}"
+_HOUR = r"\d{1,2}:\d{2}(:\d{2})?([.,]\d+)? ?([AaPp]\.?[Mm]\.?)?"
+_MOMENT = re.compile(rf"{_DATE}|{_HOUR}|{_DATE}[T ]+{_HOUR}.*")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text log is written."""
+
+    separator: str  # a space stands for any number of them
+    decimal: str  # "." or ","
+    thousands: str  # mark between groups of three digits, or ""
+    start: int  # number of lines before the first row
+    names: list[str]  # of the columns; "1", "2", ... if the log has none
+    units: list[str]  # of the columns, if the log states them in a row or in the cells; otherwise empty
+    skip: int  # number of lines before the line of names
+    header: bool  # whether there is a line of names
+    has_units_row: bool  # whether a row of units follows the names
+    width: int  # fields of a row; more than the names if rows end in a separator
+
+
+# --- cells ------------------------------------------------------------------------------------------------------------
+
+
+def fields_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line."""
+    if separator == " ":
+        return line.split()
+    fields = line.split(separator) if '"' not in line else next(csv.reader([line], delimiter=separator))
+    return [field.strip() for field in fields]
+
+
+def number_of(text: str, decimal: str, thousands: str = "") -> tuple[float, str] | None:
+    """Return the number in a cell and its unit, NaN for a missing one, or None if there is none."""
+    plain = text.strip().strip("[](){}").strip()
+    lower = plain.lower()
+    if lower in FLAGS:
+        return FLAGS[lower], ""
+    if lower in MISSING or _NO_NUMBER.fullmatch(lower):
+        return math.nan, ""
+    if thousands and _is_grouped(plain, decimal, thousands):
+        plain = plain.replace(thousands, "")
+    if decimal == ",":
+        plain = plain.replace(".", "\0").replace(",", ".")
+    match = _NUMBER.match(plain)
+    unit = plain[match.end() :].strip() if match else ""
+    if match is None or (unit and _quantity(unit) is None):
+        return None
+    return float(f"{match[1]}e{match[2] or 0}"), unit
+
+
+_quantity = functools.cache(quantity)
+
+
+def _is_grouped(text: str, decimal: str, thousands: str) -> bool:
+    number = rf"[+-]?\d{{1,3}}({re.escape(thousands)}\d{{3}})+({re.escape(decimal)}\d*)?"
+    return re.fullmatch(number, text) is not None
+
+
+def is_value(text: str, decimal: str, thousands: str = "") -> bool:
+    """Return whether a cell holds a number, a date or a time of day, or stands for a missing number."""
+    return number_of(text, decimal, thousands) is not None or _MOMENT.fullmatch(text.strip()) is not None
+
+
+def is_missing(text: str) -> bool:
+    """Return whether a cell stands for a missing number."""
+    plain = text.strip().lower()
+    return plain in MISSING or _NO_NUMBER.fullmatch(plain) is not None
+
+
+def is_comment(line: str) -> bool:
+    """Return whether a line is a comment."""
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _uncommented(line: str) -> str:
+    stripped = line.strip()
+    mark = next((mark for mark in COMMENTS if stripped.startswith(mark)), "")
+    return stripped.removeprefix(mark).strip() if mark else line
+
+
+# --- lines ------------------------------------------------------------------------------------------------------------
+
+
+def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
+    """Return how a log is written. Raise InputError if no column has numbers, or names and rows do not fit."""
+    given = log.skip or 0
+    content = [(k, line) for k, line in enumerate(lines) if k >= given and line.strip()]
+    if not content:
+        raise InputError(f"{file}: no line after the {given} that the map skips; expected a line of names")
+    plain = [line for _, line in content if not is_comment(line)] or [line for _, line in content]
+    separator = log.separator or _separator(plain, log.decimal)
+    rows = [(k, fields_of(line, separator)) for k, line in content if not is_comment(line)]
+    last = [row for _, row in rows[-LAST:]]
+    decimal = log.decimal or _decimal(last)
+    thousands = log.thousands if log.thousands is not None else _thousands(last, decimal)
+    found = _Lines(file, content, rows, separator, decimal, thousands, log)
+    return found.layout(given)
+
+
+class _Lines:
+    """The first lines of a log."""
+
+    def __init__(
+        self,
+        file: Path,
+        content: list[tuple[int, str]],
+        rows: list[tuple[int, list[str]]],
+        separator: str,
+        decimal: str,
+        thousands: str,
+        log: LogFormat,
+    ) -> None:
+        self.file, self.content, self.rows, self.log = file, content, rows, log
+        self.separator, self.decimal, self.thousands = separator, decimal, thousands
+        last = rows[-LAST:]
+        self.width = Counter(len(row) for _, row in last).most_common(1)[0][0] if last else 0
+        self.even = [row for _, row in last if len(row) == self.width]
+        # columns with numbers in most of the last lines
+        counts = [sum(self.is_number(row[k]) for row in self.even) for k in range(self.width)]
+        self.numeric = [k for k, count in enumerate(counts) if count and 2 * count >= max(counts)]
+
+    def is_number(self, cell: str) -> bool:
+        return not is_missing(cell) and is_value(cell, self.decimal, self.thousands)
+
+    def is_row(self, row: Sequence[str]) -> bool:
+        """Return whether all columns of numbers hold some, or stand for missing ones."""
+        cells = [row[k] for k in self.numeric] if len(row) == self.width else []
+        return any(map(self.is_number, cells)) and all(is_value(cell, self.decimal, self.thousands) for cell in cells)
+
+    def layout(self, given: int) -> Layout:
+        first = next((k for k, row in self.rows if self.is_row(row)), None)
+        if first is None and not self.numeric:
+            self.refuse_texts()
+        at = None if self.log.header is False else self.names_at(first, given)
+        if at is None:
+            start = first if first is not None and self.log.skip is None else (self.rows or self.content)[0][0]
+            names = [str(i) for i in range(1, self.width + 1)]
+            return self.made(start, names, [], start if self.log.skip is None and start else given, False, False)
+        number, line = self.content[at]
+        names = fields_of(_uncommented(line), self.separator)
+        below = [(k, row) for k, row in self.rows if k > number]
+        units: list[str] = []
+        has_units = bool(below) and self.is_units(below[0][1], len(names))
+        if below and self.log.units_row is not None:
+            has_units = self.log.units_row
+        if has_units:
+            units = [unit.strip(" []()") for unit in below.pop(0)[1]]
+        # a line with a number in a column of numbers is a row, if a faulty one: it is refused by name, not passed over
+        start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), None)
+        after = self.content[-1][0] + 1
+        return self.made(after if start is None else start, self.fitted(names), units, number, True, has_units)
+
+    def has_some(self, row: Sequence[str]) -> bool:
+        return any(self.is_number(row[k]) for k in self.numeric)
+
+    def made(self, start: int, names: list[str], units: list[str], skip: int, header: bool, has_units: bool) -> Layout:
+        return Layout(
+            self.separator,
+            self.decimal,
+            self.thousands,
+            start,
+            names,
+            units or self.stated_units(len(names)),
+            skip,
+            header,
+            has_units,
+            max(self.width, len(names)),
+        )
+
+    def stated_units(self, count: int) -> list[str]:
+        """Return the units in the header of LabVIEW or in the cells; none if there are none."""
+        labels = next((row for _, row in self.rows if row[0] == "Y_Unit_Label"), [])
+        cells = [next((row[k] for row in self.even if not is_missing(row[k])), "") for k in range(self.width)]
+        numbers = [number_of(cell, self.decimal, self.thousands) for cell in cells]
+        units = ["s", *labels[1:]] if labels else [number[1] if number else "" for number in numbers]
+        return (units + [""] * count)[:count] if any(units) else []
+
+    def fitted(self, names: list[str]) -> list[str]:
+        """Return a name for each column: rows may end in a separator, or begin with a number that has no name."""
+        if len(names) == self.width - 1:
+            if all(not row[-1] for row in self.even):
+                return [*names, ""]
+            if all(row[0].strip('"').isdigit() for row in self.even):
+                return ["", *names]
+        return names
+
+    def names_at(self, first: int | None, given: int) -> int | None:
+        """Return the index in `content` of the line of names, or None: the one above the rows with most names."""
+        if self.log.skip is not None:
+            return 0 if self.log.header or not self.has_number(self.content[0][1]) else None
+        before = [line for k, line in self.content if first is None or k < first]
+        best, most = None, 0
+        for at, line in reversed(list(enumerate(before))):
+            fields = fields_of(_uncommented(line), self.separator)
+            is_wide = len(fields) == self.width or len(self.fitted(fields)) == self.width
+            cells = fields_of(line, self.separator)
+            is_row = len(cells) == self.width and self.has_some(cells)
+            if not is_wide or is_row or self.is_units(cells, self.width):
+                continue
+            different = len({field for field in fields if field})
+            if best is not None and (different < most or best - at > 3):
+                break
+            if different > most or best is None:
+                best, most = at, different
+        return 0 if best is None and self.log.header else best
+
+    def has_number(self, line: str) -> bool:
+        return any(map(self.is_number, fields_of(line, self.separator)))
+
+    def is_units(self, fields: list[str], width: int) -> bool:
+        """Return whether fields are a row of units: brackets, names of units, or nothing."""
+        filled = [field for field in fields if field.strip()]
+        if len(fields) != width or not filled or any(map(self.is_number, fields)):
+            return False
+        known = [re.fullmatch(r"[\[(].*[\])]|-", field) or quantity(field) for field in filled]
+        return sum(map(bool, known)) * 2 > len(filled)
+
+    def refuse_texts(self) -> None:
+        """Raise InputError: no column has numbers."""
+        line = self.content[-1][1]
+        pairs = re.findall(r"([A-Za-z_][\w.]*)\s*[:=]\s*[-+]?\d", line)
+        advice = 'set "separator", "decimal" or "skip" in "log" of the map'
+        if len(pairs) > 1:
+            advice = f"print the names ({', '.join(pairs[:3])}, ...) once, in the first line, and then the values alone"
+        if len(self.content) == 1 and not pairs:
+            return  # a line of names without rows
+        raise InputError(
+            f"{self.file}: no column has numbers in the first {counted(len(self.content), 'line')}, such as "
+            f"{line.strip()[:60]!r}; {advice}"
+        )
+
+
+def _separator(lines: list[str], decimal: str | None) -> str:
+    """Return the separator by which most lines have the same number of fields, and most of them numbers."""
+    best, best_score = " ", (0.0, 0)
+    for separator in SEPARATORS:
+        rows = [fields_of(line, separator) for line in lines]
+        counts = Counter(map(len, rows))
+        width, most = max(counts.items(), key=lambda item: (item[1], item[0]))
+        if width < 2 or (separator == decimal and '"' not in lines[-1]):
+            continue
+        cells = [cell for row in [row for row in rows if len(row) == width][-LAST:] for cell in row]
+        decimals = (decimal,) if decimal else (".", ",")
+        numbers = max(
+            sum(is_value(cell, mark, other) for cell in cells)
+            for mark in decimals
+            for other in ("", "." if mark == "," else ",")
+        )
+        # a space counts only if no other separates: dates and names have spaces too
+        score = (most / len(lines) - (0.5 if separator == " " else 0.0) + numbers / len(cells), width)
+        if score > best_score:
+            best, best_score = separator, score
+    return best
+
+
+def _decimal(rows: list[list[str]]) -> str:
+    cells = [cell for row in rows for cell in row]
+    commas, points = (
+        sum(mark in cell and (number_of(cell, mark) is not None or _is_grouped(cell, mark, other)) for cell in cells)
+        for mark, other in (",.", ".,")
+    )
+    return "," if commas > points else "."
+
+
+def _thousands(rows: list[list[str]], decimal: str) -> str:
+    """Return the mark between groups of digits, if a cell has it beside the decimal mark; "" otherwise."""
+    cells = [cell for row in rows for cell in row if decimal in cell]
+    marks = [mark for mark in GROUP_MARKS if mark != decimal]
+    return next((mark for mark in marks if any(_is_grouped(cell, decimal, mark) for cell in cells)), "")
