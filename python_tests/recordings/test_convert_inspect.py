@@ -42,7 +42,7 @@ def check(folder: Path, name: str = "log.csv") -> None:
 
 def test_units_in_names_are_sure(tmp_path: Path) -> None:
     """Degrees, millimetres and milliseconds, with ; and decimal commas, in other names and another order."""
-    columns = {"q1 (deg)": np.degrees(ANGLE), "Time [ms]": 1000 * T, "Motor1_mm": 1000 * SPOOL}
+    columns: dict[str, Any] = {"q1 (deg)": np.degrees(ANGLE), "Time [ms]": 1000 * T, "Motor1_mm": 1000 * SPOOL}
     columns |= {"loadCell1 [mN]": 1000 * FORCE, "board_temp": 30.0}
     lines = proposed(tmp_path, columns, sep=";", decimal=",")
     assert {name: (line.source, line.unit, line.sure) for name, line in lines.items()} == {

@@ -51,7 +51,8 @@ REQUIRED = {"turning": ("time", "torque", "angle"), "sliding": ("time", "force",
 
 TURNING_QUANTITIES = (units.TIME, units.LENGTH, units.ANGLE)  # a force or torque makes no turns
 
-_COLUMN = re.compile(r"([a-z_]+)\[([1-9][0-9]?)\]")
+_PREFIX = r"(?P<prefix>(?:[A-Za-z][A-Za-z0-9_.-]*?[_.-])?)"  # of a finger of a hand
+_COLUMN = re.compile(rf"{_PREFIX}(?P<group>{'|'.join(units.OF_COLUMN)})(?:\[(?P<number>[1-9][0-9]?)\])?")
 
 
 @dataclass(frozen=True)
@@ -226,22 +227,27 @@ def _read_resampling(node: Node) -> Resampling | None:
 
 
 def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
-    """Read the long form: our columns by name. The reader of recordings checks their number."""
+    """Read the long form: our columns by name, those of a finger of a hand with its prefix (docs/reference/hand.md)."""
     names = node.keys(node.value if isinstance(node.value, dict) else ()).value
+    numbers: dict[str, dict[str, list[int]]] = {}  # by prefix and group
     for name in names:
         match = _COLUMN.fullmatch(name)
-        group = match[1] if match else name
-        if group not in units.OF_COLUMN or (match is None) != (group in ("time", LABEL)):
+        is_clock = match is not None and match["group"] == "time" and bool(match["prefix"])
+        if match is None or is_clock or (match["number"] is None) != (match["group"] in ("time", LABEL)):
             known = sorted(["time", *(f"{name}[1]" for name in GROUPS), LABEL])
             raise Refusal(f"{node.path}.{name}: unknown column; expected one of {', '.join(known)}")
-        yield name, _read_column(node.member(name), units.OF_COLUMN[group])
+        if match["number"]:
+            numbers.setdefault(match["prefix"], {}).setdefault(match["group"], []).append(int(match["number"]))
+        yield name, _read_column(node.member(name), units.OF_COLUMN[match["group"]])
     if "time" not in names:
         node.member("time").refuse("the log's column of time")
-    for group, (unit, needed) in GROUPS.items():
-        numbers = sorted(int(match[2]) for name in names if (match := _COLUMN.fullmatch(name)) and match[1] == group)
-        for i in range(1, max(numbers, default=1 if needed else 0) + 1):
-            if i not in numbers:
-                raise Refusal(f"{node.path}.{group}[{i}]: missing; expected the log's column of it, to be in {unit}")
+    for prefix, of_finger in (numbers or {"": {}}).items():
+        has_tendons = not prefix or any(group.startswith("tendon") for group in of_finger)  # a wrist may have none
+        for group, (unit, needed) in GROUPS.items():
+            for i in range(1, max(of_finger.get(group, []), default=1 if needed and has_tendons else 0) + 1):
+                if i not in of_finger.get(group, []):
+                    where = f"{node.path}.{prefix}{group}[{i}]"
+                    raise Refusal(f"{where}: missing; expected the log's column of it, to be in {unit}")
 
 
 def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:

@@ -315,11 +315,17 @@ class TopicRows:
                 # the first reading is taken within half a turn of the zero
                 values = self._followed(key, values, float(column.offset or 0.0))
             columns[key] = column.values(values)
-        is_label = np.isin(columns.get(LABEL, np.empty(0)), (0.0, 1.0))
-        if not is_label.all():
-            k = int(np.argmin(is_label))
-            raise self._refused(LABEL, rows.numbers[k], f"{columns[LABEL][k]:g}", "0 or 1")
+        for key in filter(_is_label, columns):
+            is_label = np.isin(columns[key], (0.0, 1.0))
+            if not is_label.all():
+                k = int(np.argmin(is_label))
+                raise self._refused(key, rows.numbers[k], f"{columns[key][k]:g}", "0 or 1")
         return columns
+
+
+def _is_label(key: str) -> bool:
+    """Return whether a column is the label of a finger, alone or in a hand."""
+    return key == LABEL or key.endswith((f"_{LABEL}", f".{LABEL}", f"-{LABEL}"))
 
 
 def _advice(word: float | None, column: MappedColumn) -> str:
@@ -371,7 +377,7 @@ def on_one_clock(file: Path, topics: Mapping[str, Columns], main: str, rule: Res
                 continue
             if name == main and rule.rate is None:
                 joined[key] = values[np.isin(clock, time)]
-            elif key == LABEL:  # labels are not interpolated: each sample has the last one before it
+            elif _is_label(key):  # labels are not interpolated: each sample has the last one before it
                 joined[key] = values[np.clip(np.searchsorted(clock, time, side="right") - 1, 0, len(clock) - 1)]
             else:
                 joined[key] = np.interp(time, clock, values)
@@ -454,6 +460,7 @@ class _Ranges:
             doubts.append(("time", f"{self._step:.3g} s from sample to sample"))
         for key, (low, high) in self._ranges.items() if self._map.joint is None else ():
             group = key.split("[")[0]
+            group = next((name for name in LARGEST if group.endswith(name)), group)  # of a finger of a hand
             what = ""
             if max(abs(low), abs(high)) > LARGEST.get(group, np.inf):
                 what = "more than a finger has"

@@ -176,9 +176,9 @@ class _Lines:
         if has_units:
             units = [unit.strip(" []()") for unit in below.pop(0)[1]]
         # a line with a number in a column of numbers is a row, if a faulty one: it is refused by name, not passed over
-        start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), None)
         after = self.content[-1][0] + 1
-        return self.made(after if start is None else start, self.fitted(names), units, number, True, has_units)
+        start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), after)
+        return self.made(start, self.fitted(names), units, number, True, has_units)
 
     def has_some(self, row: Sequence[str]) -> bool:
         return any(self.is_number(row[k]) for k in self.numeric)

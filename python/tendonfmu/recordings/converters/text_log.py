@@ -336,9 +336,7 @@ class TextLog:
             value = number_of(cell, layout.decimal, layout.thousands)
             unit = layout.units[place] if place < len(layout.units) else ""
             if value is None or (value[1] and value[1] != unit):
-                wanted = (
-                    "a finite number" if value is None else f"a number in {unit}" if unit else "a number without unit"
-                )
+                wanted = f"a number in {unit or 'no unit of its own'}" if value else "a finite number"
                 return f"column {layout.names[place]}, \0{cell!r}; expected {wanted}"
             cells.append(value[0])
         return cells
