@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -148,6 +149,38 @@ def test_inspect_takes_what_a_map_says_of_the_text(call: Call, tmp_path: Path) -
     assert answer.status == 0, answer.err
     document = json.loads((tmp_path / "map.json").read_text(encoding="utf-8"))
     assert document["log"]["skip"] == 2 and document["columns"]["tendon_force[1]"]["column"] == "force [mN]"
+
+
+BEGIN = dt.datetime(2026, 5, 4, 23, 59, 59, 800_000)
+CLOCKS: dict[str, tuple[str, int, str]] = {  # names, digits of the fraction that are cut, and pattern
+    "comma before the milliseconds": ("Timestamp", 3, "%Y-%m-%d %H:%M:%S,%f"),
+    "of the day, over midnight": ("Time", 3, "%H:%M:%S.%f"),
+    "colon before the milliseconds": ("Time", 3, "%H:%M:%S:%f"),
+    "day first": ("Zeit", 3, "%d.%m.%Y %H:%M:%S,%f"),
+    "month first": ("When", 0, "%m/%d/%Y %H:%M:%S.%f"),
+    "date and time in two columns": ("Date;Time", 0, "%Y-%m-%d;%H:%M:%S.%f"),
+    "both, day first": ("Log Date;Log Time", 3, "%d/%m/%Y;%H:%M:%S.%f"),
+}
+
+
+@pytest.mark.parametrize("clock", [*CLOCKS, "morning and afternoon", "durations of pandas"])
+def test_texts_of_times_are_recognised(tmp_path: Path, clock: str) -> None:
+    times = [BEGIN + dt.timedelta(seconds=float(t)) for t in T]
+    if clock == "morning and afternoon":
+        name, texts = "Time", [f"{time:%I:%M:%S}.{time:%f} {time:%p}" for time in times]
+    elif clock == "durations of pandas":
+        name, texts = "t", [f"0 days {dt.datetime(2026, 1, 1) + (time - BEGIN):%H:%M:%S.%f}" for time in times]
+    else:
+        name, cut, pattern = CLOCKS[clock]
+        texts = [time.strftime(pattern)[: -cut or None] for time in times]
+    rows = [[text, *row[1:]] for text, row in zip(texts, CELLS, strict=True)]
+    inspection = inspected(tmp_path, joined([[name, *NAMES[1:]], *rows], ";"))
+    proposal = propose(inspection)
+    VALIDATOR.validate(proposal.document)
+    (tmp_path / "map.json").write_text(json.dumps(proposal.document), encoding="utf-8")
+    columns = convert_table(inspection.file, tmp_path / "map.json").columns
+    assert columns["time"] == pytest.approx(T, abs=1e-9)
+    assert columns["tendon_force[1]"] == pytest.approx(FORCE / 1000.0)
 
 
 @needs("cases")

@@ -24,7 +24,7 @@ from tendonfmu.recordings.converters.log import (
     Topic,
     open_log,
 )
-from tendonfmu.recordings.converters.stamps import nanoseconds
+from tendonfmu.recordings.converters.stamps import nanoseconds, pattern_of
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
 from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
@@ -92,6 +92,7 @@ class ClockSummary:
 
     name: str  # the field
     stamp: str = ""  # kind of a point in time that the field holds without doubt, or ""
+    pattern: str = ""  # of its texts, where they are not of ISO 8601
     first: float = 0.0  # first and last time
     last: float = 0.0
     step: float = 0.0  # median step, of the first block
@@ -211,11 +212,15 @@ def _empty_summary(topic: Topic) -> TopicSummary:
     return TopicSummary(topic, fields, ClockSummary(clock, "datetime" if is_moment else ""))
 
 
-def _clock_by_values(topic: TopicSummary, block: dict[str, Any]) -> ClockSummary | None:
-    """Return the field that rises at every row by nearly the same step; None if not one alone does."""
+def _clock_by_values(log: Log, topic: TopicSummary, block: dict[str, Any]) -> ClockSummary | None:
+    """Return the field of times as text, or that alone rises at every row by nearly the same step, or None."""
     found = []
     for summary in topic.fields:
         values = block.get(summary.key)
+        if summary.field.kind == TEXT and values is not None:
+            clock = ClockSummary(summary.key)
+            if _as_times(log, clock, values) is not None:
+                return clock
         if summary.field.kind != NUMBER or not isinstance(values, np.ndarray) or len(values) < FEWEST_TIMES:
             continue
         step = np.diff(values.astype(np.float64))
@@ -229,7 +234,7 @@ def _clock_by_values(topic: TopicSummary, block: dict[str, Any]) -> ClockSummary
 
 def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
     if topic.clock is None and not any(summary.count for summary in topic.fields):
-        topic.clock = _clock_by_values(topic, block)
+        topic.clock = _clock_by_values(log, topic, block)
     for summary in topic.fields:
         values = block.get(summary.key)
         if values is None:
@@ -238,18 +243,27 @@ def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
         if topic.clock is None or summary.key != topic.clock.name:
             continue
         if summary.field.kind == TEXT and (topic.clock.stamp or not topic.clock.rows):
-            values = _as_times(log, summary.field.name, values)
+            values = _as_times(log, topic.clock, values)
             topic.clock.stamp = "datetime" if values is not None else ""
         if isinstance(values, np.ndarray):
             topic.clock.add(values)
 
 
-def _as_times(log: Log, name: str, texts: Any) -> NDArray[np.int64] | None:
-    """Return texts as ns since 1970, or None if they are no times."""
-    try:
-        return nanoseconds(log.file, MappedColumn("time", name, 1e-9, None, "datetime"), texts)
-    except InputError:
-        return None
+def _as_times(log: Log, clock: ClockSummary, texts: Any) -> NDArray[np.int64] | None:
+    """Return texts as ns since 1970, or None if they are no times. Sets the pattern that fits them."""
+    for has_pattern in (bool(clock.pattern), True):
+        if has_pattern and not clock.pattern:
+            known = texts.drop_null()
+            clock.pattern = pattern_of([str(text) for text in (*known[:100], *known[-1:])]) if len(known) else ""
+            if not clock.pattern:
+                return None
+        try:
+            column = MappedColumn("time", clock.name, 1e-9, None, "datetime", pattern=clock.pattern)
+            return nanoseconds(log.file, column, texts)
+        except InputError:
+            continue
+    clock.pattern = ""
+    return None
 
 
 def _settings(log: Log) -> dict[str, Any]:

@@ -65,6 +65,7 @@ class Line:
     sure: str  # SURE, LIKELY, GUESS or UNDECIDED
     why: str  # in words
     wrap: float | None = None  # readings after which it starts again
+    pattern: str = ""  # of texts of times that are not of ISO 8601
 
 
 @dataclass
@@ -307,7 +308,7 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     guess = Guess(clock.stamp, SURE, "its values are points in time")
     if not clock.stamp:
         guess = unit_of_time(clock.name, summary.field.unit, clock.first, clock.step)
-    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}", clock.wrap)
+    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}", clock.wrap, clock.pattern)
 
 
 def _source(summary: FieldSummary) -> str | int:
@@ -330,9 +331,9 @@ def _log_settings(inspection: Inspection, lines: Sequence[Line]) -> dict[str, An
 def _document(
     inspection: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], is_one_joint: bool
 ) -> dict[str, Any]:
-    columns = {
+    columns: dict[str, dict[str, Any]] = {
         line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"}
-        | ({"wrap": line.wrap} if line.wrap else {})
+        | {key: value for key, value in (("wrap", line.wrap), ("pattern", line.pattern)) if value}
         for line in lines
     }
     document: dict[str, Any] = {"format": FORMAT}

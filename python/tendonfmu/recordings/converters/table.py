@@ -22,7 +22,7 @@ from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, MappedColumn, Resampling, read_map
 from tendonfmu.recordings.converters.log import TIME_NAMES, Log, Topic, find_field, open_log
 from tendonfmu.recordings.converters.one_joint import joint_columns
-from tendonfmu.recordings.converters.stamps import nanoseconds
+from tendonfmu.recordings.converters.stamps import DAY, nanoseconds, of_day_alone
 from tendonfmu.recordings.counters import overflow, unwrapped
 from tendonfmu.recordings.recording import LABEL
 
@@ -215,6 +215,7 @@ class TopicRows:
         self._file, self._columns, self._names = file, columns, names
         self._leave_out_missing = leave_out_missing
         self._last: Any = None  # time
+        self._midnight: tuple[int, int] | None = None  # last time of day, and how often it has started again
         self._turned: dict[str, float] = {}  # last reading of each counter of many turns, without its jumps
         self._fastest: dict[str, float] = {}  # and its largest step
 
@@ -242,6 +243,12 @@ class TopicRows:
         if not is_sound.all():
             self.left_out += int(np.count_nonzero(~is_sound))
             rows = rows.only(is_sound)
+        if of_day_alone(self._columns["time"]) and len(rows.numbers):
+            time = rows.readings["time"]
+            before = time[0] if self._midnight is None else self._midnight[0]
+            days = np.cumsum(np.diff(time, prepend=before) < -DAY // 2) + (self._midnight or (0, 0))[1]
+            self._midnight = time[-1], days[-1]
+            rows = Rows({**rows.readings, "time": time + DAY * days}, rows.numbers)
         if self._columns["time"].wrap and len(rows.numbers):
             time = rows.readings["time"]
             rows = Rows({**rows.readings, "time": self._followed("time", time, float(time[0]))}, rows.numbers)
