@@ -29,6 +29,8 @@ FORMATS = {
     ".parquet": ("parquet_log", "ParquetLog"),
     ".mat": ("matlab_log", "open_matlab"),
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
+    **dict.fromkeys((".feather", ".arrow", ".jsonl", ".ndjson"), ("parquet_log", "TableLog")),
+    **dict.fromkeys((".npz", ".npy"), ("hdf5_log", "open_numpy")),
     ".mcap": ("mcap_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
 }
