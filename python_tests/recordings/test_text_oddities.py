@@ -183,6 +183,49 @@ def test_texts_of_times_are_recognised(tmp_path: Path, clock: str) -> None:
     assert columns["tendon_force[1]"] == pytest.approx(FORCE / 1000.0)
 
 
+def converted(folder: Path, inspection: Inspection) -> dict[str, Any]:
+    (folder / "map.json").write_text(json.dumps(propose(inspection).document), encoding="utf-8")
+    return dict(convert_table(inspection.file, folder / "map.json").columns)
+
+
+def test_pairs_of_time_and_value_come_onto_one_clock(tmp_path: Path) -> None:
+    """Each channel with its own rate and length, as LabVIEW and trend recorders export them."""
+    late = T[::2] + 0.0003
+    other = np.interp(late, T, SPOOL)
+    names = ["F time", "F [mN]", "x time", "x spool [mm]"]
+    rows = [
+        [f"{T[k]:.4f}", f"{FORCE[k]:.3f}", *((f"{late[k]:.5f}", f"{other[k]:.6f}") if k < len(late) else ("", ""))]
+        for k in range(ROWS)
+    ]
+    inspection = inspected(tmp_path, joined([names, *rows]))
+    assert [(topic.topic.name, topic.clock and topic.clock.rows) for topic in inspection.topics] == [
+        ("F [mN]", ROWS),
+        ("x spool [mm]", ROWS // 2),
+    ]
+    columns = converted(tmp_path, inspection)
+    kept = (late[0] <= T) & (late[-1] >= T)
+    assert len(columns["time"]) == kept.sum()
+    assert columns["tendon_force[1]"] == pytest.approx(FORCE[kept] / 1000.0)
+    assert columns["tendon_position[1]"] == pytest.approx(SPOOL[kept] / 1000.0, abs=1e-4)
+    alike = joined([["Time", "force [mN]", "Time", "spool [mm]"], *([r[0], r[1], r[0], r[2]] for r in CELLS)])
+    assert converted(tmp_path, inspected(tmp_path, alike))["tendon_position[1]"] == pytest.approx(SPOOL / 1000.0)
+
+
+@pytest.mark.parametrize("stamp", ["[2026-01-05 10:30:{:06.3f}] ", "10:30:{:06.3f} -> "])
+def test_times_of_a_terminal_are_a_column(tmp_path: Path, stamp: str) -> None:
+    lines = [stamp.format(25.0 + t) + ",".join(row[1:]) for t, row in zip(T, CELLS, strict=True)]
+    text = "force [mN],spool [mm]\n" + "\n".join(lines) + "\n"
+    columns = converted(tmp_path, inspected(tmp_path, text))
+    assert columns["time"] == pytest.approx(T, abs=1e-9)
+    assert columns["tendon_force[1]"] == pytest.approx(FORCE / 1000.0)
+
+
+def test_a_format_of_another_program_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "log.bag").write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(InputError, match="rosbags-convert"):
+        inspect_log(tmp_path / "log.bag")
+
+
 @needs("cases")
 def test_logs_of_public_reports() -> None:
     """Each is read whole, or is refused by name."""

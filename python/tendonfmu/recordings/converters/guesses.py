@@ -198,6 +198,7 @@ OTHERS = {"desired", "des", "target", "command", "cmd", "setpoint", "goal", "tem
 OTHERS |= {"action", "pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
 # parts of a message that say how it is built
 STRUCTURE = {"layout", "header", "seq", "dim", "data_offset", "stride", "size", "frame_index", "episode_index"}
+CLOCKS = (["time"], ["timestamp"], ["stamp"], ["date"], ["clock"], ["millis"], ["micros"])  # last word of a name
 VALUES = {"value", "values", "data"}  # names of arrays that say nothing
 KNOWN = TENDON | FORCES | TORQUES | SPEEDS | ANGLES | REFERENCE
 
@@ -275,6 +276,8 @@ def words_of(name: str) -> list[str]:
 
 def _group_of(summary: FieldSummary) -> str | None:
     """Return what a field likely is: a group of columns, "torque", or None."""
+    if words_of(summary.field.name)[-1:] in CLOCKS:
+        return None
     parts = set(re.split(r"[./]", summary.field.name.lower()))
     if summary.field.kind != NUMBER or summary.count == summary.missing or parts & STRUCTURE:
         return None

@@ -1,7 +1,7 @@
-"""How HDF5 files are read, and what they have in common with MATLAB files: arrays with names.
+"""How HDF5 files are read, and what they have in common with those of MATLAB and numpy: arrays with names.
 
-Files of numpy are read alike. Arrays of one struct or group are a topic. A row is an element along the longer side of
-an array; the columns of a matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, and fields
+Arrays of one struct or group are a topic. A row is an element along the longer side of an array; the columns of a
+matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, and fields
 of compound datasets by a dot. A file that is cut off is refused: HDF5 finds its data by tables that may lie anywhere.
 """
 

@@ -34,6 +34,13 @@ FORMATS = {
     ".mcap": ("mcap_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
 }
+# formats that another program turns into one of these
+ELSEWHERE = {
+    ".bag": "a bag of ROS 1 becomes one of ROS 2 by `rosbags-convert --src LOG.bag --dst LOG`",
+    ".tdms": "TDMS becomes CSV or HDF5 by the Python package npTDMS, or in LabVIEW",
+    ".xlsx": "save the sheet as CSV",
+    ".pkl": "write it by DataFrame.to_parquet",
+}
 FOLDER = ("ros2_bag_log", "open_bag")
 DATASET, INFO = ("lerobot_log", "LeRobotLog"), "meta/info.json"  # a folder with this file is a LeRobot dataset
 
@@ -134,9 +141,10 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     known = ", ".join(FORMATS)
     if not file.is_dir():
         if suffix not in (TEXTS if is_gzip else FORMATS):
+            advice = f"; {ELSEWHERE[suffix]}" if suffix in ELSEWHERE else ""
             raise InputError(
                 f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or the folder of a bag "
-                "or dataset"
+                f"or dataset{advice}"
             )
         if not file.is_file():
             raise InputError(f"{file}: no such file; expected a log, {known}")

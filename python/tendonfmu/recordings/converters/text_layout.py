@@ -32,6 +32,23 @@ _HOUR = r"\d{1,2}:\d{2}(:\d{2})?([.,]\d+)? ?([AaPp]\.?[Mm]\.?)?"
 _MOMENT = re.compile(rf"{_DATE}|{_HOUR}|{_DATE}[T ]+{_HOUR}.*")
 
 
+# a time that a terminal writes before each line: [2026-01-05 10:30:25.123] or 10:30:25.123 ->
+_STAMP = re.compile(rf"^\[?(?:({_DATE})[T ]+)?(\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?)(?:\]| ->)[ \t]*(?=\S)", re.MULTILINE)
+
+
+def stamp_separator(lines: Sequence[str]) -> str | None:
+    """Return the separator of lines before which a terminal has written a time, or None."""
+    stamped = [line[match.end() :] for line in lines[-LAST:] if (match := _STAMP.match(line))]
+    if 2 * len(stamped) <= len(lines[-LAST:]):
+        return None
+    return next((mark for mark in SEPARATORS if mark in stamped[-1]), " ")
+
+
+def with_column_of_stamps(text: str, separator: str) -> str:
+    """Return lines whose times are a column."""
+    return _STAMP.sub(lambda match: f"{f'{match[1]}T' if match[1] else ''}{match[2]}{separator}", text)
+
+
 @dataclass(frozen=True)
 class Layout:
     """How a text log is written."""
@@ -212,6 +229,8 @@ class _Lines:
                 return [*names, ""]
             if all(row[0].strip('"').isdigit() for row in self.even):
                 return ["", *names]
+            if all(_MOMENT.fullmatch(row[0]) for row in self.even):
+                return ["time", *names]
         return names
 
     def names_at(self, first: int | None, given: int) -> int | None:
@@ -248,10 +267,12 @@ class _Lines:
     def refuse_texts(self) -> None:
         """Raise InputError: no column has numbers."""
         line = self.content[-1][1]
-        pairs = re.findall(r"([A-Za-z_][\w.]*)\s*[:=]\s*[-+]?\d", line)
+        pairs = re.findall(r"([A-Za-z_][\w.]*)['\"]?\s*[:=]\s*[-+]?\d", line)
         advice = 'set "separator", "decimal" or "skip" in "log" of the map'
         if len(pairs) > 1:
             advice = f"print the names ({', '.join(pairs[:3])}, ...) once, in the first line, and then the values alone"
+        if line.strip().startswith('{"'):
+            advice = "name a file with a JSON object in each line .jsonl"
         if len(self.content) == 1 and not pairs:
             return  # a line of names without rows
         raise InputError(

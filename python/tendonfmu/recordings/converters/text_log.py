@@ -11,9 +11,11 @@ from __future__ import annotations
 import codecs
 import io
 import math
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -34,12 +36,16 @@ from tendonfmu.recordings.converters.text_layout import (
     is_comment,
     is_missing,
     number_of,
+    stamp_separator,
+    with_column_of_stamps,
 )
+from tendonfmu.recordings.converters.units import stated
 
 CHUNK = 4 << 20  # bytes of text at once
 HEAD = 1 << 18  # bytes by which the encoding is found
-SAMPLE = 200  # lines by which the layout is found
+SAMPLE = 1000  # lines by which the layout is found
 MOST_FAULTY = 0.1  # of the rows of a block: more are another layout
+CLOCK = re.compile(r"(?<![a-z])(time|t|timestamp|x_value|zeit)(?![a-z])")  # in the name of a time
 FOOTER = 20  # lines below the last row that are left out
 
 _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
@@ -82,6 +88,21 @@ def _numbers_of_lists(cells: Sequence[str | None]) -> Any:
         return None
 
 
+def _pairs(fields: list[Field]) -> list[Topic]:
+    """Return a topic for each channel if they come as pairs of a time and a value, otherwise one of all fields."""
+    times, values = fields[::2], fields[1::2]
+    are_clocks = all(CLOCK.search(field.name.lower()) and field.kind == NUMBER for field in times)
+    if len(values) < 2 or len(times) != len(values) or not are_clocks or any(CLOCK.search(f.name) for f in values):
+        return [Topic("", tuple(fields))]
+    topics, names = [], [value.name for value in values]
+    for k, (time, value) in enumerate(zip(times, values, strict=True), start=1):
+        name = value.name if names.count(value.name) == 1 else f"{value.name}[{k}]"
+        unit = (stated(time.name, time.unit) or (time.unit,))[0]
+        fields = [replace(time, name=f"{name}.time", unit=unit), replace(value, name=name)]
+        topics.append(Topic(name, tuple(fields), prefix=f"{name}."))
+    return topics
+
+
 # --- the log ----------------------------------------------------------------------------------------------------------
 
 
@@ -102,11 +123,14 @@ class TextLog:
         self.encoding, note = _find_encoding(file, begin[:HEAD], settings.encoding)
         self._hints = [note] if note else []
         head = [line for text in self._texts(begin_only=True) for line in text.split("\n")[:-1]]
+        self._stamps = stamp_separator(head)  # between the times of a terminal and its lines
+        if self._stamps:
+            head = [with_column_of_stamps(line, self._stamps) for line in head]
         self.layout = find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
         self._is_lenient = settings.leave_out_missing
         lines = [line for line in head[self.layout.start :] if line.strip()]
         self._places: list[tuple[int, int | None]] = []  # of each field: its column, and which number of a list there
-        self.topics = [Topic("", tuple(self._fields(lines[:SAMPLE])))]
+        self.topics = _pairs(list(self._fields(lines[:SAMPLE])))
 
     def _fields(self, lines: list[str]) -> Iterator[Field]:
         """Yield the columns, with their kinds by the first lines; one with lists of numbers has a field for each."""
@@ -206,7 +230,12 @@ class TextLog:
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read columns; see `log.Log`."""
-        places = {name: self._places[self.topics[0].place(name)] for name in wanted.get("", ())}
+        fields = [field.name for topic in self.topics for field in topic.fields]
+        places = {
+            name: self._places[self.topics[0].place(name) if len(self.topics) == 1 else fields.index(name)]
+            for names in wanted.values()
+            for name in names
+        }
         row, skip = 0, self.layout.start
         self._odd: dict[str, list[str]] = {}  # rows that are no rows, by what is done about them
         for text, following in pairwise(chain(self._texts(), [None])):
@@ -219,17 +248,29 @@ class TextLog:
                 text = "\n".join(line for line in text.split("\n") if not is_comment(line))
             if not text.strip():
                 continue
+            if self._stamps:
+                text = with_column_of_stamps(text, self._stamps)
             block = self._parse_fast(text, places, texts)
             if block is None:
                 lines = [line for line in text.split("\n") if line.strip()]
                 block = self._parse_by_field(lines, places, texts, row, following is None)
             row += len(next(iter(block.values()))) if block else 0
-            yield "", block
+            yield from self._by_topic(wanted, block)
         self.notes = [
             *self._hints,
             *(f"{self.file}: {counted(len(odd), 'line')} {what}: {odd[0][:60]!r}" for what, odd in self._odd.items()),
             *(f"{note}; {counted(row, 'row')} {are(row)} kept" for note in self._tail_notes),
         ]
+
+    def _by_topic(self, wanted: Mapping[str, Sequence[str]], block: Block) -> Iterator[tuple[str, Block]]:
+        if len(self.topics) == 1:
+            yield "", block
+            return
+        for topic in self.topics:
+            if part := {name: block[name] for name in wanted.get(topic.name, ())}:
+                # the shorter of the channels end before the last row
+                there = np.isfinite(part.get(topic.fields[0].name, np.zeros(len(next(iter(part.values()))))))
+                yield topic.name, {name: values[there] for name, values in part.items()}
 
     def _parse_fast(
         self, text: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]
