@@ -2,9 +2,9 @@
  * (fmi2_call_table.c, fmi3_call_table.c). A library has one of them; all else in it is the same. */
 #pragma once
 
-/* States of an instance. Steps are carried out at once, so stepInProgress, stepFailed and stepCanceled never occur.
- * There are no events and no structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either.
- */
+/* States of an instance. Steps are carried out at once, so stepInProgress and stepCanceled never occur. A discarded
+ * step leads to stepComplete, which allows all that stepFailed does and the next step too. There are no events and no
+ * structural parameters, so the Event and Configuration Modes of FMI 3.0 never occur either. */
 typedef enum fmu_phase {
   PHASE_INSTANTIATED,
   PHASE_INITIALISATION,
@@ -92,8 +92,9 @@ typedef struct fmi_version {
 /* Of this library. */
 extern const fmi_version this_fmi;
 
-const char* call_name(fmu_function function);
+static inline const char* call_name(fmu_function function) {
+  return this_fmi.calls[function].name;
+}
 static inline int call_is_allowed(fmu_function function, fmu_phase phase) {
   return (this_fmi.calls[function].allowed >> phase) & 1;
 }
-const char* phase_name(fmu_phase phase);

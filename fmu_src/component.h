@@ -17,9 +17,15 @@ typedef struct component {
 
   fmu_phase phase;
   int failed;          /* an error was returned: state "error" on top of the phase */
-  int outputs_pending; /* in initialisation mode: outputs do not belong to the present inputs */
+  int waiting;         /* for the first sample: until then outputs follow the inputs */
+  int inputs_given;    /* an input was set: there is something to initialise with */
+  int outputs_pending; /* while waiting: outputs do not belong to the present inputs */
   int stop_time_defined;
   double start_time, stop_time, end_of_step;
+
+  fmu_status step_status; /* of the last step: OK or discarded */
+  unsigned refusals;      /* how often in a row the step at refused_at was discarded */
+  double refused_at;      /* s */
 } component;
 
 /* Takes over the model and a copy of the name; identity: component_identity(). NULL when memory is out; the model is
@@ -30,6 +36,9 @@ void component_destroy(component* c);
 /* Back to what component_create() gave; logging stays as it is set. */
 void component_reset(component* c);
 
+/* There was no discarded step. */
+void component_forget_steps(component* c);
+
 /* Logs that the function may not be called now, and fails. Returns 0. */
 int component_refuse_call(component* c, fmu_function function);
 
@@ -38,11 +47,17 @@ static inline int component_may_call(component* c, fmu_function function) {
   return c && (call_is_allowed(function, c->failed ? PHASE_ERROR : c->phase) || component_refuse_call(c, function));
 }
 
-/* Logs the text as an error, enters the state "error" and returns FMU_ERROR. */
-fmu_status component_fail(component* c, const log_text* text);
-/* The same with "<function>: <reason>". */
-fmu_status component_fail_because(component* c, const char* function, const char* reason);
+/* Logs "<function>: <line>" as an error, enters the state "error" and returns FMU_ERROR. */
+fmu_status component_fail(component* c, const char* function, const char* format, ...) LOG_FORMAT(3);
+/* The same with the model's words. */
+fmu_status component_fail_as_model(component* c, fmu_function function);
 
-/* In initialisation mode: brings the outputs up to the present inputs. 0, or -1 with everything as it was and the
- * reason in model_last_error(). */
-int component_update_outputs(component* c);
+/* Logs "<function>: <why the model refused the inputs><consequence>" and returns FMU_WARNING. */
+fmu_status component_warn(component* c, fmu_function function, const char* consequence);
+
+/* While waiting for the first sample: as if it were taken now, until model_end_trial(). FMU_WARNING, which is logged:
+ * there is none of these inputs, and nothing to be ended. */
+fmu_status component_begin_trial(component* c, fmu_function function);
+
+/* While waiting: brings the outputs up to the present inputs; to 0 with FMU_WARNING. */
+fmu_status component_update_outputs(component* c, fmu_function function);

@@ -1,59 +1,29 @@
 #include "component_state.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
+
+#include "bytes.h"
 
 /* byte offsets of the header; the checksum covers all that follows it */
 enum { MAGIC = 0, VERSION = 8, SIZE = 16, CHECKSUM = 24, IDENTITY = 32, NUMBERS = 40 };
-enum { STATE_VERSION = 2 };
+enum { STATE_VERSION = 3 };
 
 /* numbers before the inputs and parameters */
-enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, LIFE_COUNT };
+enum { AT_PHASE, AT_STOP_DEFINED, AT_START, AT_STOP, AT_END, AT_INPUTS_GIVEN, LIFE_COUNT };
 
 static const unsigned char magic[8] = {'T', 'F', 'M', 'U', 'F', 'M', 'I', '2'};
 
-static void put_u64(unsigned char* to, uint64_t value) {
-  for (int i = 0; i < 8; ++i) {
-    to[i] = (unsigned char)(value >> (8 * i));
-  }
-}
-
-static uint64_t get_u64(const unsigned char* from) {
-  uint64_t value = 0;
-  for (int i = 0; i < 8; ++i) {
-    value |= (uint64_t)from[i] << (8 * i);
-  }
-  return value;
-}
-
-static void put_number(unsigned char* to, size_t index, double value) {
-  uint64_t bits;
-  memcpy(&bits, &value, sizeof bits);
-  put_u64(to + NUMBERS + 8 * index, bits);
-}
-
 static double get_number(const unsigned char* from, size_t index) {
-  const uint64_t bits = get_u64(from + NUMBERS + 8 * index);
-  double value;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
-static uint64_t fnv_1a(const unsigned char* bytes, size_t size) {
-  uint64_t hash = 0xcbf29ce484222325u;
-  for (size_t i = 0; i < size; ++i) {
-    hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  }
-  return hash;
+  return load_f64(from + NUMBERS + 8 * index);
 }
 
 static uint64_t checksum(const unsigned char* bytes, size_t size) {
-  return fnv_1a(bytes + IDENTITY, size - IDENTITY);
+  return hash_bytes(bytes + IDENTITY, size - IDENTITY, 0);
 }
 
 uint64_t component_identity(const char* identifier) {
-  return fnv_1a((const unsigned char*)identifier, strlen(identifier));
+  return hash_bytes(identifier, strlen(identifier), 0);
 }
 
 static size_t model_offset(const component* c) {
@@ -61,33 +31,25 @@ static size_t model_offset(const component* c) {
 }
 
 size_t component_state_size(const component* c) {
-  return model_offset(c) + model_state_size(c->model);
+  return model_offset(c) + model_get_shape(c->model).state_size;
 }
 
 void component_save(const component* c, void* bytes) {
-  unsigned char* to = bytes;
+  unsigned char *to = bytes, *numbers = to + NUMBERS;
   const variables* v = &c->values;
   const size_t size = component_state_size(c);
-  const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase,
-                                   [AT_STOP_DEFINED] = c->stop_time_defined,
-                                   [AT_START] = c->start_time,
-                                   [AT_STOP] = c->stop_time,
-                                   [AT_END] = c->end_of_step};
+  const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase, [AT_STOP_DEFINED] = c->stop_time_defined,
+                                   [AT_START] = c->start_time,    [AT_STOP] = c->stop_time,
+                                   [AT_END] = c->end_of_step,     [AT_INPUTS_GIVEN] = c->inputs_given};
   memcpy(to + MAGIC, magic, sizeof magic);
-  put_u64(to + VERSION, STATE_VERSION);
-  put_u64(to + SIZE, size);
-  put_u64(to + IDENTITY, c->identity);
-  for (size_t i = 0; i < LIFE_COUNT; ++i) {
-    put_number(to, i, life[i]);
-  }
-  for (size_t i = 0; i < v->input_count; ++i) {
-    put_number(to, LIFE_COUNT + i, v->numbers[i]);
-  }
-  for (size_t i = 0; i < v->parameter_count; ++i) {
-    put_number(to, LIFE_COUNT + v->input_count + i, v->parameters[i]);
-  }
+  store_u64(to + VERSION, STATE_VERSION);
+  store_u64(to + SIZE, size);
+  store_u64(to + IDENTITY, c->identity);
+  store_doubles(numbers, life, LIFE_COUNT);
+  store_doubles(numbers + 8 * LIFE_COUNT, v->numbers, v->input_count);
+  store_doubles(numbers + 8 * (LIFE_COUNT + v->input_count), v->parameters, v->parameter_count);
   model_save(c->model, to + model_offset(c));
-  put_u64(to + CHECKSUM, checksum(to, size));
+  store_u64(to + CHECKSUM, checksum(to, size));
 }
 
 static int is_flag(double x) {
@@ -97,26 +59,15 @@ static int is_flag(double x) {
 static int life_is_sound(const unsigned char* from) {
   const double phase = get_number(from, AT_PHASE);
   return phase >= 0.0 && phase < PHASE_COUNT && phase == floor(phase) && is_flag(get_number(from, AT_STOP_DEFINED)) &&
-         isfinite(get_number(from, AT_START)) && !isnan(get_number(from, AT_STOP)) &&
-         isfinite(get_number(from, AT_END));
+         is_flag(get_number(from, AT_INPUTS_GIVEN)) && isfinite(get_number(from, AT_START)) &&
+         !isnan(get_number(from, AT_STOP)) && isfinite(get_number(from, AT_END));
 }
 
-/* inputs and parameters within their ranges */
-static int values_are_sound(const component* c, const unsigned char* from) {
-  size_t at = LIFE_COUNT;
-  for (int g = 0; g < GROUP_COUNT; ++g) {
-    const variable_group* group = &variable_groups[g];
-    const size_t count = group->causality == CAUSALITY_INPUT ? c->values.count[g] : 0;
-    for (size_t i = 0; i < count; ++i) {
-      const variable input = {group, (variable_group_id)g, i, 0};
-      if (!variables_accept(c->model, &input, get_number(from, at++))) {
-        return 0;
-      }
-    }
-  }
+/* Parameters within their ranges. Inputs may be anything: a step says what is wrong with them. */
+static int parameters_are_sound(const component* c, const unsigned char* from) {
   for (size_t i = 0; i < c->values.parameter_count; ++i) {
     const variable parameter = {NULL, GROUP_COUNT, i, 0};
-    const double value = get_number(from, at++);
+    const double value = get_number(from, LIFE_COUNT + c->values.input_count + i);
     if (value != c->values.parameters[i] && !variables_accept(c->model, &parameter, value)) {
       return 0;
     }
@@ -126,10 +77,10 @@ static int values_are_sound(const component* c, const unsigned char* from) {
 
 const char* component_refuse_block(const component* c, const void* bytes) {
   const unsigned char* from = bytes;
-  if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || get_u64(from + VERSION) != STATE_VERSION) {
+  if (memcmp(from + MAGIC, magic, sizeof magic) != 0 || load_u64(from + VERSION) != STATE_VERSION) {
     return "not a state of an FMU of this kind and version";
   }
-  if (get_u64(from + SIZE) != component_state_size(c) || get_u64(from + IDENTITY) != c->identity) {
+  if (load_u64(from + SIZE) != component_state_size(c) || load_u64(from + IDENTITY) != c->identity) {
     return "state of another FMU";
   }
   return NULL;
@@ -143,10 +94,10 @@ const char* component_check_state(component* c, const void* bytes, size_t size) 
   if (reason) {
     return reason;
   }
-  if (get_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
+  if (load_u64((const unsigned char*)bytes + CHECKSUM) != checksum(bytes, size)) {
     return "damaged state: its checksum does not match";
   }
-  if (!life_is_sound(bytes) || !values_are_sound(c, bytes)) {
+  if (!life_is_sound(bytes) || !parameters_are_sound(c, bytes)) {
     return "damaged state: a number is out of its range";
   }
   const unsigned char* of_model = (const unsigned char*)bytes + model_offset(c);
@@ -165,20 +116,18 @@ const char* component_restore(component* c, const void* bytes) {
   }
   variables_fetch_settings(v, c->model);
   c->failed = 0;
+  c->waiting = c->outputs_pending = !model_is_initialised(c->model);
   c->phase = (fmu_phase)get_number(from, AT_PHASE);
   v->parameters_pending = 1; /* whether they differ from the model's is found when they are handed over */
   c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
   c->start_time = get_number(from, AT_START);
   c->stop_time = get_number(from, AT_STOP);
   c->end_of_step = get_number(from, AT_END);
-  for (size_t i = 0; i < v->input_count; ++i) {
-    v->numbers[i] = get_number(from, LIFE_COUNT + i);
-  }
-  for (size_t i = 0; i < v->parameter_count; ++i) {
-    v->parameters[i] = get_number(from, LIFE_COUNT + v->input_count + i);
-  }
-  c->outputs_pending = c->phase == PHASE_INITIALISATION;
-  if (model_is_initialised(c->model)) {
+  c->inputs_given = get_number(from, AT_INPUTS_GIVEN) != 0.0;
+  component_forget_steps(c);
+  load_doubles(v->numbers, from + NUMBERS + 8 * LIFE_COUNT, v->input_count);
+  load_doubles(v->parameters, from + NUMBERS + 8 * (LIFE_COUNT + v->input_count), v->parameter_count);
+  if (!c->waiting) {
     model_fetch_outputs(c->model, v);
   }
   return NULL;

@@ -22,34 +22,29 @@ static variables lay_out(const component* c) {
 
 /* --- finding ------------------------------------------------------------------------------------------------------ */
 
-/* 0 when the reference is a Real input or output, as wanted */
-static int find_for_derivative(component* c, fmu_function function, unsigned reference, variable_causality wanted,
-                               variable* found) {
+/* A Real input or output, as wanted. */
+static fmu_status find_for_derivative(component* c, fmu_function function, unsigned reference,
+                                      variable_causality wanted, variable* found) {
   if (find_of_type(c, function, VARIABLE_REAL, reference, found)) {
-    return -1;
+    return FMU_ERROR;
   }
   if (variable_causality_of(found) != wanted) {
-    fail_at(c, function, found,
-            wanted == CAUSALITY_INPUT ? "not a known: derivatives are by the inputs"
-                                      : "not an unknown: derivatives are those of the Real outputs");
-    return -1;
+    return fail_at(c, function, found,
+                   wanted == CAUSALITY_INPUT ? "not a known: derivatives are by the inputs"
+                                             : "not an unknown: derivatives are those of the Real outputs");
   }
-  if (found->group->discrete) {
-    fail_at(c, function, found, "discrete: it has no derivative");
-    return -1;
-  }
-  return 0;
+  return found->group->discrete ? fail_at(c, function, found, "discrete: it has no derivative") : FMU_OK;
 }
 
-static int check_references(component* c, fmu_function function, const unsigned references[], size_t count,
-                            variable_causality wanted) {
+static fmu_status check_references(component* c, fmu_function function, const unsigned references[], size_t count,
+                                   variable_causality wanted) {
   variable found = {0};
   for (size_t i = 0; i < count; ++i) {
     if (find_for_derivative(c, function, references[i], wanted, &found)) {
-      return -1;
+      return FMU_ERROR;
     }
   }
-  return 0;
+  return FMU_OK;
 }
 
 /* 1 when the call is allowed and the request is one; otherwise logs and fails. `in` are the variables of the seed. */
@@ -66,7 +61,7 @@ static int is_sound(component* c, fmu_function function, const partials* p, cons
   }
   for (size_t i = 0; i < p->seed_count; ++i) {
     if (!isfinite(p->seed[i])) {
-      component_fail_because(c, call_name(function), "a number of the seed (dvKnown) is not finite");
+      component_fail(c, call_name(function), "a number of the seed (dvKnown) is not finite");
       return 0;
     }
   }
@@ -94,18 +89,18 @@ static double* next_number(const variables* view, const references* list, place*
   return NULL;
 }
 
-/* In initialisation mode derivatives are those of the first sample, taken for the time being. */
-static int begin_derivatives(component* c) {
-  const int trial = !c->failed && c->phase == PHASE_INITIALISATION;
-  return trial && model_begin_trial(c->model, &c->values, c->start_time) ? -1 : 0;
+/* Until the first sample is taken derivatives are those of a sample taken for the time being. Where there is none, with
+ * FMU_WARNING, outputs are 0, and so are derivatives. */
+static fmu_status begin_derivatives(component* c, fmu_function function) {
+  return c->waiting && !c->failed ? component_begin_trial(c, function) : FMU_OK;
 }
 
 /* Ends what begin_derivatives() began. 0 for the status OK; otherwise says why and fails. */
 static fmu_status end_derivatives(component* c, fmu_function function, tendonfmu_status status) {
-  if (!c->failed && c->phase == PHASE_INITIALISATION) {
+  if (c->waiting && !c->failed) {
     model_end_trial(c->model);
   }
-  return status == TENDONFMU_OK ? FMU_OK : component_fail_because(c, call_name(function), model_last_error(c->model));
+  return status == TENDONFMU_OK ? FMU_OK : component_fail_as_model(c, function);
 }
 
 static tendonfmu_status derive(component* c, const variables* view) {
@@ -127,12 +122,12 @@ fmu_status derivatives_directional(component* c, const partials* p) {
   for (double* number; (number = next_number(&view, &p->knowns, &known)) != NULL;) {
     *number += *seed++;
   }
-  if (begin_derivatives(c)) {
-    return component_fail_because(c, call_name(function), model_last_error(c->model));
+  fmu_status status = begin_derivatives(c, function);
+  if (status == FMU_OK) {
+    status = end_derivatives(c, function, derive(c, &view));
   }
-  const fmu_status status = end_derivatives(c, function, derive(c, &view));
   double* sensitivity = p->sensitivity;
-  for (const double* number; status == FMU_OK && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
+  for (const double* number; status != FMU_ERROR && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
     *sensitivity++ = *number;
   }
   return status;
@@ -157,11 +152,13 @@ fmu_status derivatives_adjoint(component* c, const partials* p) {
     return FMU_ERROR;
   }
   const variables view = lay_out(c);
-  if (begin_derivatives(c)) {
-    return component_fail_because(c, call_name(function), model_last_error(c->model));
-  }
+  const fmu_status begun = begin_derivatives(c, function);
   tendonfmu_status status = TENDONFMU_OK;
   double* sensitivity = p->sensitivity;
+  if (begun != FMU_OK) {
+    memset(sensitivity, 0, p->sensitivity_count * sizeof *sensitivity);
+    return begun;
+  }
   for (double* number; status == TENDONFMU_OK && (number = next_number(&view, &p->knowns, &known)) != NULL;) {
     *number = 1.0;
     status = derive(c, &view);

@@ -1,5 +1,6 @@
 #include "finger_model.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,14 +8,18 @@
 
 struct model {
   tendonfmu_finger* finger;
-  void* scratch; /* [state_size] a state of the finger to go back to */
-  size_t state_size, parameter_count;
+  model_shape shape;
+  void* scratch;           /* [state_size] a state of the finger to go back to */
   size_t* changed_indices; /* [p] parameters to hand over */
   double* changed_values;  /* [p] */
   double* derivatives;     /* [inputs + outputs] */
+  int at_end;              /* a step takes the sample at its end, not at its beginning */
 };
 
-const model_texts model_text = {.resource = "model.image", .initialised = "the first sample is taken"};
+const model_texts model_text = {.resource = "model.image",
+                                .initialised = "the first sample is taken",
+                                .waits = "the first step takes the first sample",
+                                .needs_inputs = 1};
 
 /* Copies as much as there is room for. */
 static void say(char* message, size_t size, const char* text) {
@@ -25,7 +30,7 @@ static void say(char* message, size_t size, const char* text) {
   }
 }
 
-model* model_create(const void* resource, size_t size, char* message, size_t message_size) {
+model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size) {
   model* m = calloc(1, sizeof *m);
   if (!m) {
     say(message, message_size, "out of memory");
@@ -36,12 +41,17 @@ model* model_create(const void* resource, size_t size, char* message, size_t mes
     free(m);
     return NULL;
   }
-  m->state_size = tendonfmu_state_size(m->finger);
-  m->parameter_count = tendonfmu_parameter_count(m->finger);
-  m->scratch = malloc(m->state_size);
-  m->changed_indices = malloc((m->parameter_count + 1) * sizeof *m->changed_indices);
-  m->changed_values = malloc((m->parameter_count + 1) * sizeof *m->changed_values);
-  m->derivatives = calloc(GROUP_COUNT * (model_joint_count(m) + model_tendon_count(m) + 1), sizeof *m->derivatives);
+  m->at_end = at_end;
+  m->shape = (model_shape){.joints = tendonfmu_joint_count(m->finger),
+                           .tendons = tendonfmu_tendon_count(m->finger),
+                           .parameters = tendonfmu_parameter_count(m->finger),
+                           .state_size = tendonfmu_state_size(m->finger),
+                           .has_links = tendonfmu_has_links(m->finger),
+                           .watches_sensors = tendonfmu_watches_sensors(m->finger)};
+  m->scratch = malloc(m->shape.state_size);
+  m->changed_indices = malloc((m->shape.parameters + 1) * sizeof *m->changed_indices);
+  m->changed_values = malloc((m->shape.parameters + 1) * sizeof *m->changed_values);
+  m->derivatives = calloc(GROUP_COUNT * (m->shape.joints + m->shape.tendons + 1), sizeof *m->derivatives);
   if (!m->scratch || !m->changed_indices || !m->changed_values || !m->derivatives) {
     say(message, message_size, "out of memory");
     model_destroy(m);
@@ -63,24 +73,12 @@ void model_reset(model* m) {
   tendonfmu_reset(m->finger);
 }
 
-void model_guid(const void* resource, size_t size, char guid[39]) {
-  tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT, guid);
+void model_guid(const void* resource, size_t size, int at_end, char guid[39]) {
+  tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT + (unsigned)at_end, guid);
 }
 
-size_t model_joint_count(const model* m) {
-  return tendonfmu_joint_count(m->finger);
-}
-
-size_t model_tendon_count(const model* m) {
-  return tendonfmu_tendon_count(m->finger);
-}
-
-int model_has_links(const model* m) {
-  return tendonfmu_has_links(m->finger);
-}
-
-int model_watches_sensors(const model* m) {
-  return tendonfmu_watches_sensors(m->finger);
+model_shape model_get_shape(const model* m) {
+  return m->shape;
 }
 
 const char* model_last_error(const model* m) {
@@ -117,12 +115,8 @@ model_range model_setting_range(const model* m, variable_group_id group) {
                        .maximum = variable_groups[group].maximum};
 }
 
-size_t model_parameter_count(const model* m) {
-  return m->parameter_count;
-}
-
 void model_get_parameters(const model* m, double* values) {
-  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, values);
+  tendonfmu_get_parameters(m->finger, m->shape.parameters, NULL, values);
 }
 
 model_range model_parameter_range(const model* m, size_t index) {
@@ -153,108 +147,106 @@ double model_get_time(const model* m) {
 
 /* Hands the finger, in one batch, the parameters that differ from its own: relations between them (static >= coulomb)
  * then hold or not for all together, whatever order they were written in. */
-static int hand_over_parameters(model* m, const variables* values) {
+static tendonfmu_status hand_over_parameters(model* m, const variables* values) {
   size_t changed = 0;
-  tendonfmu_get_parameters(m->finger, m->parameter_count, NULL, m->changed_values);
-  for (size_t i = 0; i < m->parameter_count; ++i) {
+  tendonfmu_get_parameters(m->finger, m->shape.parameters, NULL, m->changed_values);
+  for (size_t i = 0; i < m->shape.parameters; ++i) {
     if (values->parameters[i] != m->changed_values[i]) {
       m->changed_indices[changed] = i;
       m->changed_values[changed++] = values->parameters[i];
     }
   }
   if (!changed) {
-    return 0;
+    return TENDONFMU_OK;
   }
-  return tendonfmu_set_parameters(m->finger, changed, m->changed_indices, m->changed_values) == TENDONFMU_OK ? 0 : -1;
+  return tendonfmu_set_parameters(m->finger, changed, m->changed_indices, m->changed_values);
 }
 
-static int advance(model* m, const variables* values, double time) {
+static model_answer advance(model* m, const variables* values, double time) {
   const tendonfmu_inputs inputs = variables_inputs(values);
-  if (values->parameters_pending && hand_over_parameters(m, values)) {
-    return -1;
+  tendonfmu_status status = values->parameters_pending ? hand_over_parameters(m, values) : TENDONFMU_OK;
+  if (status == TENDONFMU_OK) {
+    status = tendonfmu_is_initialised(m->finger) ? tendonfmu_step(m->finger, time, &inputs)
+                                                 : tendonfmu_initialise(m->finger, time, &inputs);
   }
-  return (tendonfmu_is_initialised(m->finger) ? tendonfmu_step(m->finger, time, &inputs)
-                                              : tendonfmu_initialise(m->finger, time, &inputs)) == TENDONFMU_OK
-             ? 0
-             : -1;
+  return status == TENDONFMU_OK ? MODEL_OK : status == TENDONFMU_BAD_SAMPLE ? MODEL_BAD_INPUTS : MODEL_FAILED;
 }
 
 /* Takes a sample of the present inputs; parameters that were written take effect in it. */
-static int take_sample(model* m, variables* values, double time) {
+static model_answer take_sample(model* m, variables* values, double time) {
   if (tendonfmu_is_initialised(m->finger) && time == tendonfmu_get_time(m->finger)) {
-    return 0; /* taken already: nothing changes, and parameters wait for the next sample */
+    return MODEL_OK; /* taken already: nothing changes, and parameters wait for the next sample */
   }
   if (values->parameters_pending) {
-    tendonfmu_save_state(m->finger, m->scratch, m->state_size);
+    tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
   }
-  if (advance(m, values, time)) {
-    if (values->parameters_pending) { /* they are not to stay with a finger that refused the sample */
-      tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
-    }
-    return -1;
+  const model_answer answer = advance(m, values, time);
+  if (answer == MODEL_OK) {
+    values->parameters_pending = 0;
+  } else if (values->parameters_pending) { /* they are not to stay with a finger that refused the sample */
+    tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
   }
-  values->parameters_pending = 0;
-  return 0;
+  return answer;
 }
 
-int model_initialise(model* m, variables* values, double start) {
+model_answer model_initialise(model* m, variables* values, double start) {
   return take_sample(m, values, start);
 }
 
-int model_begin_trial(model* m, variables* values, double start) {
-  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
-  if (advance(m, values, start)) {
+model_answer model_begin_trial(model* m, variables* values, double start) {
+  tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
+  const model_answer answer = advance(m, values, start);
+  if (answer != MODEL_OK) {
     model_end_trial(m);
-    return -1;
   }
-  return 0;
+  return answer;
 }
 
 void model_end_trial(model* m) {
-  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+  tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
 }
 
-/* The sample belongs to the beginning of the step. */
+static double sample_time(const model* m, double time, double step) {
+  return m->at_end ? time + step : time;
+}
+
 const char* model_refuse_step(const model* m, double time, double step) {
-  (void)step;
-  return time < tendonfmu_get_time(m->finger)
-             ? "expected a currentCommunicationPoint not before the sample already taken"
-             : NULL;
+  const double sample = sample_time(m, time, step);
+  if (tendonfmu_is_initialised(m->finger) && sample < tendonfmu_get_time(m->finger)) {
+    return m->at_end ? "expected a step that does not end before the sample already taken"
+                     : "expected a currentCommunicationPoint not before the sample already taken";
+  }
+  return fabs(sample) <= 1e15 ? NULL : "expected a step that ends at a magnitude of at most 1e15 s";
 }
 
-int model_step(model* m, variables* values, double time, double step) {
-  (void)step;
-  return take_sample(m, values, time);
+model_answer model_step(model* m, variables* values, double time, double step) {
+  return take_sample(m, values, sample_time(m, time, step));
 }
 
 /* --- saved states --------------------------------------------------------------------------------------------------
  */
-
-size_t model_state_size(const model* m) {
-  return m->state_size;
-}
 
 void model_fetch_outputs(const model* m, variables* values) {
   variables_fetch_outputs(values, m->finger);
 }
 
 void model_save(const model* m, void* bytes) {
-  tendonfmu_save_state(m->finger, bytes, m->state_size);
+  tendonfmu_save_state(m->finger, bytes, m->shape.state_size);
 }
 
-const char* model_check_state(model* m, const void* bytes, int initialised) {
+const char* model_check_state(model* m, const void* bytes, int may_be_initialised) {
   const char* reason = NULL;
-  tendonfmu_save_state(m->finger, m->scratch, m->state_size);
-  if (tendonfmu_restore_state(m->finger, bytes, m->state_size) != TENDONFMU_OK) {
+  tendonfmu_save_state(m->finger, m->scratch, m->shape.state_size);
+  if (tendonfmu_restore_state(m->finger, bytes, m->shape.state_size) != TENDONFMU_OK) {
     return tendonfmu_last_error(m->finger);
   }
-  if (tendonfmu_is_initialised(m->finger) != initialised) {
+  if (tendonfmu_is_initialised(m->finger) && !may_be_initialised) {
     reason = "damaged state: its phase does not fit its finger";
   }
-  tendonfmu_restore_state(m->finger, m->scratch, m->state_size);
+  tendonfmu_restore_state(m->finger, m->scratch, m->shape.state_size);
   return reason;
 }
 
 int model_restore(model* m, const void* bytes) {
-  return tendonfmu_restore_state(m->finger, bytes, m->state_size) == TENDONFMU_OK ? 0 : -1;
+  return tendonfmu_restore_state(m->finger, bytes, m->shape.state_size) == TENDONFMU_OK ? 0 : -1;
 }

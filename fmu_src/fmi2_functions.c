@@ -50,7 +50,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                     .instance_name = instanceName ? instanceName : "",
                     .wanted = LOG_EVERYTHING};
   component* c = fmuType == fmi2CoSimulation ? life_create(&log, fmuGUID, fmuResourceLocation)
-                                             : life_refuse(&log, "fmuType: expected fmi2CoSimulation", "");
+                                             : life_refuse(&log, "fmuType: expected fmi2CoSimulation");
   if (c) {
     c->log.wanted = loggingOn ? LOG_EVERYTHING : LOG_NOTHING;
   }
@@ -71,21 +71,15 @@ fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefi
   return (fmi2Status)life_set_experiment(instance, CALL_SETUP_EXPERIMENT, &e);
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {
-  return (fmi2Status)life_enter_initialisation(instance);
-}
+#define WITHOUT_ARGUMENTS(function, life)       \
+  fmi2Status function(fmi2Component instance) { \
+    return (fmi2Status)life(instance);          \
+  }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component instance) {
-  return (fmi2Status)life_exit_initialisation(instance);
-}
-
-fmi2Status fmi2Terminate(fmi2Component instance) {
-  return (fmi2Status)life_terminate(instance);
-}
-
-fmi2Status fmi2Reset(fmi2Component instance) {
-  return (fmi2Status)life_reset(instance);
-}
+WITHOUT_ARGUMENTS(fmi2EnterInitializationMode, life_enter_initialisation)
+WITHOUT_ARGUMENTS(fmi2ExitInitializationMode, life_exit_initialisation)
+WITHOUT_ARGUMENTS(fmi2Terminate, life_terminate)
+WITHOUT_ARGUMENTS(fmi2Reset, life_reset)
 
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
@@ -106,12 +100,11 @@ static fmi2Status begin_status(component* c, fmu_function function, const void* 
     return fmi2Error;
   }
   if (!value) {
-    return (fmi2Status)component_fail_because(c, call_name(function), "value is NULL");
+    return (fmi2Status)component_fail(c, call_name(function), "value is NULL");
   }
   if (!has_answer) {
-    const log_text text = log_start(call_name(function), "no such status: every step is carried out at once");
-    log_send(&c->log, FMU_DISCARD, LOG_STATUS_WARNING, &text);
-    return fmi2Discard;
+    const log_text text = log_line("%s: no such status: every step is carried out at once", call_name(function));
+    return (fmi2Status)log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
   }
   return fmi2OK;
 }
@@ -119,7 +112,7 @@ static fmi2Status begin_status(component* c, fmu_function function, const void* 
 fmi2Status fmi2GetStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2Status* value) {
   const fmi2Status status = begin_status(instance, CALL_GET_STATUS, value, kind == fmi2DoStepStatus);
   if (status == fmi2OK) {
-    *value = fmi2OK;
+    *value = (fmi2Status)((const component*)instance)->step_status;
   }
   return status;
 }

@@ -9,8 +9,7 @@ static const char no_output_derivatives[] = "outputs have no derivatives by time
 static const char model_exchange[] = "belongs to model exchange, this FMU is for co-simulation";
 
 static fmi2Status refuse(component* c, fmu_function function, const char* reason) {
-  return component_may_call(c, function) ? (fmi2Status)component_fail_because(c, call_name(function), reason)
-                                         : fmi2Error;
+  return component_may_call(c, function) ? (fmi2Status)component_fail(c, call_name(function), "%s", reason) : fmi2Error;
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr,

@@ -41,10 +41,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
   (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
   const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
   if (eventModeUsed) {
-    return life_refuse(&log, "eventModeUsed: expected false, there is no Event Mode", "");
+    return life_refuse(&log, "eventModeUsed: expected false, there is no Event Mode");
   }
   if (nRequiredIntermediateVariables) {
-    return life_refuse(&log, "nRequiredIntermediateVariables: expected 0, there are no intermediate values", "");
+    return life_refuse(&log, "nRequiredIntermediateVariables: expected 0, there are no intermediate values");
   }
   component* c = life_create(&log, instantiationToken, resourcePath);
   if (c) {
@@ -59,7 +59,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3LogMessageCallback logMessage) {
   (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
   const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
-  return life_refuse(&log, "this FMU is for co-simulation, not for model exchange", "");
+  return life_refuse(&log, "this FMU is for co-simulation, not for model exchange");
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -71,7 +71,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
   (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
   (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
   const log_target log = target_of(instanceName, instanceEnvironment, logMessage);
-  return life_refuse(&log, "this FMU is for co-simulation, not for scheduled execution", "");
+  return life_refuse(&log, "this FMU is for co-simulation, not for scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance instance) {
@@ -107,7 +107,7 @@ static void put_flag(fmi3Boolean* flag) {
   }
 }
 
-/* Every step is carried out to its end, and none asks for an event or for the end of the simulation. */
+/* Every step is carried out to its end or not at all, and none asks for an event or for the end of the simulation. */
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean* eventHandlingNeeded,
                       fmi3Boolean* terminateSimulation, fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {

@@ -8,24 +8,18 @@
 #include "resource.h"
 
 static void log_event(const component* c, fmu_function function, const char* event, const char* more) {
-  log_text text = log_start(call_name(function), event);
-  log_append(&text, more);
+  const log_text text = log_line("%s: %s%s", call_name(function), event, more);
   log_send(&c->log, FMU_OK, LOG_EVENTS, &text);
 }
 
 /* --- creation ----------------------------------------------------------------------------------------------------- */
 
-component* life_refuse(const log_target* log, const char* reason, const char* more) {
-  log_text text = log_start(this_fmi.instantiate, reason);
-  log_append(&text, more);
-  log_send(log, FMU_ERROR, LOG_STATUS_ERROR, &text);
-  return NULL;
-}
-
-static component* refuse_resource(const log_target* log, const char* reason) {
-  log_text text = log_start(this_fmi.instantiate, model_text.resource);
-  log_append(&text, ": ");
-  log_append(&text, reason);
+component* life_refuse(const log_target* log, const char* format, ...) {
+  log_text text = log_line("%s: ", this_fmi.instantiate);
+  va_list arguments;
+  va_start(arguments, format);
+  log_append_list(&text, format, arguments);
+  va_end(arguments);
   log_send(log, FMU_ERROR, LOG_STATUS_ERROR, &text);
   return NULL;
 }
@@ -33,21 +27,19 @@ static component* refuse_resource(const log_target* log, const char* reason) {
 /* the model of the resource, after a check that resource and variable table are those of the modelDescription.xml */
 static model* create_model(const log_target* log, const void* resource, size_t size, const char* identifier,
                            const char* resources) {
-  char expected[39] = "", message[256] = "";
-  model* m = model_create(resource, size, message, sizeof message);
+  char expected[39] = "", of_end[39] = "", message[256] = "";
+  model_guid(resource, size, 0, expected);
+  model_guid(resource, size, 1, of_end);
+  const int at_end = identifier && strcmp(identifier, of_end) == 0;
+  model* m = model_create(resource, size, at_end, message, sizeof message);
   if (!m) {
-    refuse_resource(log, message);
+    life_refuse(log, "%s: %s", model_text.resource, message);
     return NULL;
   }
-  model_guid(resource, size, expected);
-  if (!identifier || strcmp(identifier, expected) != 0) {
-    log_text reason = {.bytes = ""};
-    log_append(&reason, this_fmi.identifier);
-    log_append(&reason, " is not that of this FMU: expected ");
-    log_append(&reason, expected);
-    log_append(&reason, ", as of the model in ");
+  if (!identifier || (!at_end && strcmp(identifier, expected) != 0)) {
     model_destroy(m);
-    life_refuse(log, reason.bytes, resources);
+    life_refuse(log, "%s is not that of this FMU: expected %s, as of the model in %s", this_fmi.identifier, expected,
+                resources);
     return NULL;
   }
   return m;
@@ -58,7 +50,7 @@ component* life_create(const log_target* log, const char* identifier, const char
   size_t size = 0;
   void* resource = resource_read(resources, model_text.resource, &size, this_fmi.resources, &reason);
   if (!resource) {
-    return refuse_resource(log, reason.bytes);
+    return life_refuse(log, "%s: %s", model_text.resource, reason.bytes);
   }
   model* m = create_model(log, resource, size, identifier, resources);
   free(resource);
@@ -66,7 +58,7 @@ component* life_create(const log_target* log, const char* identifier, const char
     return NULL;
   }
   component* c = component_create(log, m, component_identity(identifier));
-  return c ? c : life_refuse(log, "out of memory", "");
+  return c ? c : life_refuse(log, "out of memory");
 }
 
 /* --- logging ------------------------------------------------------------------------------------------------------ */
@@ -78,7 +70,7 @@ fmu_status life_set_logging(component* c, int on, size_t count, const char* cons
     return FMU_ERROR;
   }
   if (count && !categories) {
-    return component_fail_because(c, function, "categories is NULL");
+    return component_fail(c, function, "categories is NULL");
   }
   unsigned named = count ? LOG_NOTHING : LOG_EVERYTHING;
   for (size_t i = 0; i < count; ++i) {
@@ -87,11 +79,10 @@ fmu_status life_set_logging(component* c, int on, size_t count, const char* cons
       named |= 1u << category;
       continue;
     }
-    log_text text = log_start(function, "no category \"");
-    log_append(&text, categories[i] ? categories[i] : "NULL");
-    log_append(&text, "\": expected those of LogCategories in modelDescription.xml; ignored");
-    log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
-    status = FMU_WARNING;
+    const log_text text =
+        log_line("%s: no category \"%s\": expected those of LogCategories in modelDescription.xml; ignored", function,
+                 categories[i] ? categories[i] : "NULL");
+    status = log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
   }
   c->log.wanted = on ? named : c->log.wanted & ~named;
   return status;
@@ -104,11 +95,7 @@ static int time_is_sound(component* c, fmu_function function, const char* name, 
   if (fabs(time) <= 1e15) {
     return 1;
   }
-  log_text text = log_start(call_name(function), name);
-  log_append(&text, " = ");
-  log_append_number(&text, time);
-  log_append(&text, " s: expected a finite number of magnitude at most 1e15 s");
-  component_fail(c, &text);
+  component_fail(c, call_name(function), "%s = %g s: expected a finite number of magnitude at most 1e15 s", name, time);
   return 0;
 }
 
@@ -120,15 +107,11 @@ static int set_tolerance(component* c, fmu_function function, double tolerance) 
   if (!expected && !(used < tolerance || used > tolerance)) {
     return 1;
   }
-  log_text text = log_start(call_name(function), "tolerance = ");
-  log_append_number(&text, tolerance);
-  log_append(&text, expected ? ": expected " : ": this FMU goes on with ");
   if (expected) {
-    log_append(&text, expected);
-    component_fail(c, &text);
+    component_fail(c, call_name(function), "tolerance = %g: expected %s", tolerance, expected);
     return 0;
   }
-  log_append_number(&text, used);
+  const log_text text = log_line("%s: tolerance = %g: this FMU goes on with %g", call_name(function), tolerance, used);
   log_send(&c->log, FMU_WARNING, LOG_STATUS_WARNING, &text);
   return 1;
 }
@@ -138,12 +121,8 @@ fmu_status life_set_experiment(component* c, fmu_function function, const experi
     return FMU_ERROR;
   }
   if (e->stop_time_defined && !(e->stop_time >= e->start_time)) {
-    log_text text = log_start(call_name(function), "stopTime = ");
-    log_append_number(&text, e->stop_time);
-    log_append(&text, " s: expected at least startTime = ");
-    log_append_number(&text, e->start_time);
-    log_append(&text, " s");
-    return component_fail(c, &text);
+    return component_fail(c, call_name(function), "stopTime = %g s: expected at least startTime = %g s", e->stop_time,
+                          e->start_time);
   }
   if (e->tolerance_defined && !set_tolerance(c, function, e->tolerance)) {
     return FMU_ERROR;
@@ -164,18 +143,42 @@ fmu_status life_enter_initialisation(component* c) {
   return FMU_OK;
 }
 
+/* The model has taken a sample. */
+static void show_sample(component* c) {
+  model_fetch_outputs(c->model, &c->values);
+  c->waiting = c->outputs_pending = 0;
+}
+
+/* Inputs that nobody has set are tried alone: parameters that do not go together are refused here. */
+static model_answer initialise(component* c) {
+  if (c->inputs_given || !model_text.needs_inputs) {
+    return model_initialise(c->model, &c->values, c->start_time);
+  }
+  const model_answer answer = model_begin_trial(c->model, &c->values, c->start_time);
+  if (answer == MODEL_OK) {
+    model_end_trial(c->model);
+  }
+  return answer;
+}
+
+/* With inputs that nobody has set, or that are bad, the first step initialises. */
 fmu_status life_exit_initialisation(component* c) {
-  if (!component_may_call(c, CALL_EXIT_INITIALIZATION_MODE)) {
+  const fmu_function function = CALL_EXIT_INITIALIZATION_MODE;
+  fmu_status status = FMU_OK;
+  if (!component_may_call(c, function)) {
     return FMU_ERROR;
   }
-  if (model_initialise(c->model, &c->values, c->start_time)) {
-    return component_fail_because(c, call_name(CALL_EXIT_INITIALIZATION_MODE), model_last_error(c->model));
+  switch (initialise(c)) {
+    case MODEL_OK: break;
+    case MODEL_BAD_INPUTS: status = component_warn(c, function, ""); break;
+    default: return component_fail_as_model(c, function);
   }
-  model_fetch_outputs(c->model, &c->values);
+  if (model_is_initialised(c->model)) {
+    show_sample(c);
+  }
   c->phase = PHASE_STEP_COMPLETE;
-  c->outputs_pending = 0;
-  log_event(c, CALL_EXIT_INITIALIZATION_MODE, model_text.initialised, "");
-  return FMU_OK;
+  log_event(c, function, c->waiting ? model_text.waits : model_text.initialised, "");
+  return status;
 }
 
 fmu_status life_terminate(component* c) {
@@ -198,6 +201,19 @@ fmu_status life_reset(component* c) {
 
 /* --- steps -------------------------------------------------------------------------------------------------------- */
 
+/* A master that repeats a discarded step with the same inputs would never end: fmpy 0.3.32 does. */
+enum { MOST_REFUSALS = 1000 };
+
+static fmu_status discard_step(component* c, double time) {
+  c->refusals = c->refusals && time == c->refused_at ? c->refusals + 1 : 1;
+  c->refused_at = time;
+  if (c->refusals > MOST_REFUSALS) {
+    return component_fail(c, call_name(CALL_DO_STEP), "%s; the step was tried 1000 times", model_last_error(c->model));
+  }
+  const log_text text = log_line("%s: %s", call_name(CALL_DO_STEP), model_last_error(c->model));
+  return c->step_status = log_send(&c->log, FMU_DISCARD, LOG_STATUS_DISCARD, &text);
+}
+
 /* Why there is no step from `time` over `step`; NULL when there is one. Clients round: their last step is the one that
  * ends nearest to the stop time. */
 static const char* refuse_step(const component* c, double time, double step) {
@@ -206,6 +222,9 @@ static const char* refuse_step(const component* c, double time, double step) {
   }
   if (c->stop_time_defined && time + step > c->stop_time + 0.5 * step) {
     return "expected a step that ends at the stop time or before";
+  }
+  if (c->waiting && time < c->start_time) {
+    return "expected a currentCommunicationPoint not before the start time";
   }
   return model_refuse_step(c->model, time, step);
 }
@@ -216,20 +235,17 @@ fmu_status life_step(component* c, double time, double step) {
   }
   const char* reason = refuse_step(c, time, step);
   if (reason) {
-    log_text text = log_start(call_name(CALL_DO_STEP), reason);
-    log_append(&text, ", got point ");
-    log_append_number(&text, time);
-    log_append(&text, " s and step ");
-    log_append_number(&text, step);
-    log_append(&text, " s, after the sample at ");
-    log_append_number(&text, model_get_time(c->model));
-    log_append(&text, " s");
-    return component_fail(c, &text);
+    const log_text after = log_line("after the sample at %g s", model_get_time(c->model));
+    return component_fail(c, call_name(CALL_DO_STEP), "%s, got point %g s and step %g s, %s", reason, time, step,
+                          c->waiting ? "before the first sample" : after.bytes);
   }
-  if (model_step(c->model, &c->values, time, step)) {
-    return component_fail_because(c, call_name(CALL_DO_STEP), model_last_error(c->model));
+  switch (model_step(c->model, &c->values, time, step)) {
+    case MODEL_OK: break;
+    case MODEL_BAD_INPUTS: return discard_step(c, time);
+    default: return component_fail_as_model(c, CALL_DO_STEP);
   }
-  model_fetch_outputs(c->model, &c->values);
+  show_sample(c);
+  component_forget_steps(c);
   c->end_of_step = time + step;
   return FMU_OK;
 }

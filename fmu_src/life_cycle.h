@@ -7,7 +7,7 @@
 /* NULL, with the reason in the log. `identifier` is what the importer read in modelDescription.xml, `resources` the URI
  * or path of the folder. */
 component* life_create(const log_target* log, const char* identifier, const char* resources);
-component* life_refuse(const log_target* log, const char* reason, const char* more);
+component* life_refuse(const log_target* log, const char* format, ...) LOG_FORMAT(2);
 
 fmu_status life_set_logging(component* c, int on, size_t count, const char* const categories[]);
 

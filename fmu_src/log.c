@@ -4,34 +4,43 @@
 
 #include "message.h"
 
-static message_line line_of(log_text* text) {
-  return (message_line){text->bytes, sizeof text->bytes};
+void log_append_list(log_text* text, const char* format, va_list arguments) {
+  const message_line line = {text->bytes, sizeof text->bytes};
+  for (; *format; ++format) {
+    const char plain[2] = {*format, '\0'};
+    if (*format != '%') {
+      message_text(line, plain);
+      continue;
+    }
+    switch (*++format) {
+      case 's': message_text(line, va_arg(arguments, const char*)); break;
+      case 'g': message_number(line, va_arg(arguments, double)); break;
+      default: message_count(line, va_arg(arguments, size_t)), ++format; break; /* %zu */
+    }
+  }
 }
 
-void log_append(log_text* text, const char* more) {
-  message_text(line_of(text), more);
+void log_append(log_text* text, const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  log_append_list(text, format, arguments);
+  va_end(arguments);
 }
 
-void log_append_number(log_text* text, double value) {
-  message_number(line_of(text), value);
-}
-
-void log_append_count(log_text* text, size_t value) {
-  message_count(line_of(text), value);
-}
-
-log_text log_start(const char* function, const char* reason) {
-  log_text text;
-  message_start(line_of(&text), function);
-  log_append(&text, ": ");
-  log_append(&text, reason);
+log_text log_line(const char* format, ...) {
+  log_text text = {.bytes = ""};
+  va_list arguments;
+  va_start(arguments, format);
+  log_append_list(&text, format, arguments);
+  va_end(arguments);
   return text;
 }
 
-void log_send(const log_target* target, fmu_status status, log_category category, const log_text* text) {
+fmu_status log_send(const log_target* target, fmu_status status, log_category category, const log_text* text) {
   if (target->logger && ((target->wanted | target->always) & (1u << category))) {
     target->send(target, status, log_category_names[category], text->bytes);
   }
+  return status;
 }
 
 log_category log_find_category(const char* name) {

@@ -1,10 +1,17 @@
 /* Messages of the FMU: one line of text put together without the heap, and the importer's logger. */
 #pragma once
 
+#include <stdarg.h>
 #include <stddef.h>
 
 #include "status.h"
 #include "variable_table.h"
+
+#if defined(__GNUC__)
+#define LOG_FORMAT(at) __attribute__((format(printf, at, at + 1)))
+#else
+#define LOG_FORMAT(at)
+#endif
 
 enum { LOG_TEXT_BYTES = 512 };
 
@@ -12,13 +19,11 @@ typedef struct log_text {
   char bytes[LOG_TEXT_BYTES];
 } log_text;
 
-/* Appends; too long a line is cut. Numbers have a decimal point in every locale. */
-void log_append(log_text* text, const char* more);
-void log_append_number(log_text* text, double value);
-void log_append_count(log_text* text, size_t value);
-
-/* "<function>: <reason>" */
-log_text log_start(const char* function, const char* reason);
+/* A line; too long a one is cut. Of printf's conversions %s, %g and %zu; numbers have a decimal point in every locale,
+ * and all digits that they need. */
+log_text log_line(const char* format, ...) LOG_FORMAT(1);
+void log_append(log_text* text, const char* format, ...) LOG_FORMAT(2);
+void log_append_list(log_text* text, const char* format, va_list arguments);
 
 /* Where messages go and which are wanted. The importer's logger is of another type in each version of FMI. */
 typedef struct log_target {
@@ -32,7 +37,8 @@ typedef struct log_target {
 
 enum { LOG_NOTHING = 0, LOG_EVERYTHING = (1 << LOG_CATEGORY_COUNT) - 1 };
 
-void log_send(const log_target* target, fmu_status status, log_category category, const log_text* text);
+/* Returns the status. */
+fmu_status log_send(const log_target* target, fmu_status status, log_category category, const log_text* text);
 
 /* Category of a declared name; LOG_CATEGORY_COUNT when there is none. */
 log_category log_find_category(const char* name);

@@ -12,25 +12,30 @@ struct variables;
 typedef struct model_texts {
   const char* resource;    /* file in the folder resources that model_create() takes */
   const char* initialised; /* what fmi2ExitInitializationMode logs */
+  const char* waits;       /* the same where the first step has to initialise */
+  int needs_inputs;        /* inputs that nobody has set are no reason to initialise */
 } model_texts;
 extern const model_texts model_text;
 
-/* Of the bytes of the resource. NULL when refused, with the reason in message. */
-model* model_create(const void* resource, size_t size, char* message, size_t message_size);
+/* Of the bytes of the resource. `at_end`: the inputs of a step are those of its end. NULL when refused, with the reason
+ * in message. */
+model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size);
 void model_destroy(model* m);
 
 /* Back to what model_create() gave. */
 void model_reset(model* m);
 
-/* Identifier of the resource and of the table of variables. */
-void model_guid(const void* resource, size_t size, char guid[39]);
+/* Identifier of the resource, of the table of variables and of `at_end`. */
+void model_guid(const void* resource, size_t size, int at_end, char guid[39]);
 
-size_t model_joint_count(const model* m);
-size_t model_tendon_count(const model* m);
-
-/* Whether there are the groups of the table that need links. */
-int model_has_links(const model* m);
-int model_watches_sensors(const model* m);
+/* What an instance of a resource never changes. */
+typedef struct model_shape {
+  size_t joints, tendons;
+  size_t parameters;              /* by path, beyond the table's groups */
+  size_t state_size;              /* bytes of a saved state, settings included */
+  int has_links, watches_sensors; /* whether there are the groups of the table that need these */
+} model_shape;
+model_shape model_get_shape(const model* m);
 
 /* One line about the last call that failed. */
 const char* model_last_error(const model* m);
@@ -53,7 +58,6 @@ void model_set_setting(model* m, variable_group_id group, size_t index, double v
 model_range model_setting_range(const model* m, variable_group_id group);
 
 /* Parameters by path, beyond the table's groups; they take effect with the next sample, all together. */
-size_t model_parameter_count(const model* m);
 void model_get_parameters(const model* m, double* values);
 model_range model_parameter_range(const model* m, size_t index);
 /* 0, or -1 when the path is longer than size - 1. */
@@ -65,19 +69,25 @@ const char* model_set_tolerance(model* m, double* tolerance);
 /* --- life ----------------------------------------------------------------------------------------------------------
  */
 
-/* All that return int: 0, or -1 with everything as it was and the reason in model_last_error(). */
+/* All but MODEL_OK leave everything as it was, with the reason in model_last_error(). */
+typedef enum model_answer {
+  MODEL_OK,
+  MODEL_BAD_INPUTS, /* it goes on with other inputs */
+  MODEL_FAILED
+} model_answer;
 
 int model_is_initialised(const model* m);
-int model_initialise(model* m, struct variables* values, double start);
+model_answer model_initialise(model* m, struct variables* values, double start);
 
-/* In initialisation mode, as if initialised with the present inputs; then back to before it. In between, outputs can be
- * fetched. */
-int model_begin_trial(model* m, struct variables* values, double start);
+/* Before the initialisation, as if initialised with the present inputs; then back to before it. In between, outputs can
+ * be fetched. */
+model_answer model_begin_trial(model* m, struct variables* values, double start);
 void model_end_trial(model* m);
 
 /* Why there is no step from `time` over `step`; NULL when there is one. */
 const char* model_refuse_step(const model* m, double time, double step);
-int model_step(model* m, struct variables* values, double time, double step);
+/* Initialises first where model_initialise() found bad inputs or was not called. */
+model_answer model_step(model* m, struct variables* values, double time, double step);
 
 /* Time of the outputs. */
 double model_get_time(const model* m);
@@ -88,10 +98,9 @@ void model_fetch_outputs(const model* m, struct variables* values);
 /* --- saved states --------------------------------------------------------------------------------------------------
  */
 
-/* Bytes of a state, settings included; the same for every instance of one FMU. */
-size_t model_state_size(const model* m);
 void model_save(const model* m, void* bytes);
 
-/* Why these bytes cannot be a state with (initialised 1) or without a sample; NULL when they can. Changes nothing. */
-const char* model_check_state(model* m, const void* bytes, int initialised);
+/* Why these bytes cannot be a state; NULL when they can. Before the initialisation `may_be_initialised` is 0. Changes
+ * nothing. */
+const char* model_check_state(model* m, const void* bytes, int may_be_initialised);
 int model_restore(model* m, const void* bytes);

@@ -8,7 +8,7 @@
 #endif
 
 /* Defines one: `parameters` are those of the standard, the first is `instance`. */
-#define REFUSE(status, function, reason, parameters)                                             \
-  status function parameters {                                                                   \
-    return (status)(instance ? component_fail_because(instance, #function, reason) : FMU_ERROR); \
+#define REFUSE(status, function, reason, parameters)                                           \
+  status function parameters {                                                                 \
+    return (status)(instance ? component_fail(instance, #function, "%s", reason) : FMU_ERROR); \
   }

@@ -93,11 +93,11 @@ static void* read_all(FILE* file, size_t* size, log_text* reason) {
     block = larger;
   }
   if (!block) {
-    log_append(reason, "file too large for the memory");
+    *reason = log_line("file too large for the memory");
     return NULL;
   }
   if (ferror(file) || used == 0) {
-    log_append(reason, "cannot be read, or is empty");
+    *reason = log_line("cannot be read, or is empty");
     free(block);
     return NULL;
   }
@@ -124,16 +124,13 @@ static FILE* open_in(const char* location, const char* name, int is_uri, int dec
 }
 
 void* resource_read(const char* location, const char* name, size_t* size, const char* argument, log_text* reason) {
-  reason->bytes[0] = 0;
   if (!location || !*location) {
-    log_append(reason, argument);
-    log_append(reason, " is NULL or empty: expected where the folder resources is");
+    *reason = log_line("%s is NULL or empty: expected where the folder resources is", argument);
     return NULL;
   }
   const int is_uri = starts_with(location, "file:");
   if (!is_uri && strstr(location, "://")) {
-    log_append(reason, argument);
-    log_append(reason, ": expected a file URI, file:///..., or a path");
+    *reason = log_line("%s: expected a file URI, file:///..., or a path", argument);
     return NULL;
   }
   FILE* file = open_in(location, name, is_uri, 1);
@@ -141,9 +138,7 @@ void* resource_read(const char* location, const char* name, size_t* size, const 
     file = open_in(location, name, is_uri, 0);
   }
   if (!file) {
-    log_append(reason, "not found in the folder that ");
-    log_append(reason, argument);
-    log_append(reason, " names");
+    *reason = log_line("not found in the folder that %s names", argument);
     return NULL;
   }
   void* block = read_all(file, size, reason);

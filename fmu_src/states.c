@@ -6,14 +6,12 @@
 #include "component_state.h"
 
 static fmu_status fail(component* c, fmu_function function, const char* reason) {
-  return component_fail_because(c, call_name(function), reason);
+  return component_fail(c, call_name(function), "%s", reason);
 }
 
 /* "<function>: <what the version calls a state> is NULL" */
 static fmu_status fail_without_state(component* c, fmu_function function) {
-  log_text text = log_start(call_name(function), this_fmi.state);
-  log_append(&text, " is NULL");
-  return component_fail(c, &text);
+  return component_fail(c, call_name(function), "%s is NULL", this_fmi.state);
 }
 
 /* A block of another FMU may be shorter than those of this one. */
@@ -27,6 +25,15 @@ static int is_own_block(component* c, fmu_function function, const void* block) 
   return block && !reason;
 }
 
+/* *state NULL: a new block of this FMU; otherwise it must be one. */
+static fmu_status provide_block(component* c, fmu_function function, void** state) {
+  if (*state) {
+    return is_own_block(c, function, *state) ? FMU_OK : FMU_ERROR;
+  }
+  *state = malloc(component_state_size(c));
+  return *state ? FMU_OK : fail(c, function, "out of memory");
+}
+
 fmu_status states_get(component* c, void** state) {
   if (!component_may_call(c, CALL_GET_FMU_STATE)) {
     return FMU_ERROR;
@@ -34,14 +41,8 @@ fmu_status states_get(component* c, void** state) {
   if (!state) {
     return fail_without_state(c, CALL_GET_FMU_STATE);
   }
-  if (*state && !is_own_block(c, CALL_GET_FMU_STATE, *state)) {
+  if (provide_block(c, CALL_GET_FMU_STATE, state)) {
     return FMU_ERROR;
-  }
-  if (!*state) {
-    *state = malloc(component_state_size(c));
-  }
-  if (!*state) {
-    return fail(c, CALL_GET_FMU_STATE, "out of memory");
   }
   component_save(c, *state);
   return FMU_OK;
@@ -70,10 +71,8 @@ fmu_status states_free(component* c, void** state) {
 }
 
 fmu_status states_serialized_size(component* c, const void* state, size_t* size) {
-  if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE)) {
-    return FMU_ERROR;
-  }
-  if (!is_own_block(c, CALL_SERIALIZED_FMU_STATE_SIZE, state)) {
+  if (!component_may_call(c, CALL_SERIALIZED_FMU_STATE_SIZE) ||
+      !is_own_block(c, CALL_SERIALIZED_FMU_STATE_SIZE, state)) {
     return FMU_ERROR;
   }
   if (!size) {
@@ -88,20 +87,14 @@ static int has_bytes(component* c, fmu_function function, const void* bytes, siz
   if (bytes && size == component_state_size(c)) {
     return 1;
   }
-  log_text text = log_start(call_name(function), bytes ? "size = " : "serializedState is NULL, size = ");
-  log_append_count(&text, size);
-  log_append(&text, ": expected ");
-  log_append_count(&text, component_state_size(c));
-  log_append(&text, " bytes");
-  component_fail(c, &text);
+  component_fail(c, call_name(function), "%ssize = %zu: expected %zu bytes", bytes ? "" : "serializedState is NULL, ",
+                 size, component_state_size(c));
   return 0;
 }
 
 fmu_status states_serialize(component* c, const void* state, void* bytes, size_t size) {
-  if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE)) {
-    return FMU_ERROR;
-  }
-  if (!is_own_block(c, CALL_SERIALIZE_FMU_STATE, state) || !has_bytes(c, CALL_SERIALIZE_FMU_STATE, bytes, size)) {
+  if (!component_may_call(c, CALL_SERIALIZE_FMU_STATE) || !is_own_block(c, CALL_SERIALIZE_FMU_STATE, state) ||
+      !has_bytes(c, CALL_SERIALIZE_FMU_STATE, bytes, size)) {
     return FMU_ERROR;
   }
   memcpy(bytes, state, size);
@@ -122,14 +115,8 @@ fmu_status states_deserialize(component* c, const void* bytes, size_t size, void
   if (reason) {
     return fail(c, CALL_DESERIALIZE_FMU_STATE, reason);
   }
-  if (*state && !is_own_block(c, CALL_DESERIALIZE_FMU_STATE, *state)) {
+  if (provide_block(c, CALL_DESERIALIZE_FMU_STATE, state)) {
     return FMU_ERROR;
-  }
-  if (!*state) {
-    *state = malloc(size);
-  }
-  if (!*state) {
-    return fail(c, CALL_DESERIALIZE_FMU_STATE, "out of memory");
   }
   memcpy(*state, bytes, size);
   return FMU_OK;

@@ -12,15 +12,15 @@ typedef struct value_run {
   size_t elements;   /* their numbers */
 } value_run;
 
-/* 0 with the run that begins with references[0] [count]; otherwise says what is wrong with that one and fails */
-static int find_run(component* c, fmu_function function, variable_type type, const unsigned references[], size_t count,
-                    value_run* run) {
+/* The run that begins with references[0] [count]; otherwise says what is wrong with that one and fails. */
+static fmu_status find_run(component* c, fmu_function function, variable_type type, const unsigned references[],
+                           size_t count, value_run* run) {
   if (find_of_type(c, function, type, references[0], &run->first)) {
-    return -1;
+    return FMU_ERROR;
   }
   run->references = variables_run(&c->values, &run->first, references, count);
   run->elements = run->first.whole ? c->values.count[run->first.id] : run->references;
-  return 0;
+  return FMU_OK;
 }
 
 /* --- elements of arrays of the importer --------------------------------------------------------------------------- */
@@ -36,57 +36,42 @@ static double given_value(const void* values, value_format format, size_t at, va
   return type == VARIABLE_BOOLEAN ? value != 0.0 : value;
 }
 
-static void put_numbers(void* values, value_format format, size_t at, const double* numbers, size_t count) {
+/* Numbers, or flags in their place, which are read as Booleans: never into doubles. */
+static void put_values(void* values, value_format format, size_t at, const double* numbers, const unsigned char* flags,
+                       size_t count) {
   switch (format) {
     case VALUES_INT:
       for (size_t i = 0; i < count; ++i) {
-        ((int*)values)[at + i] = (int)numbers[i];
+        ((int*)values)[at + i] = flags ? flags[i] : (int)numbers[i];
       }
       break;
     case VALUES_BOOL:
       for (size_t i = 0; i < count; ++i) {
-        ((_Bool*)values)[at + i] = numbers[i] != 0.0;
+        ((_Bool*)values)[at + i] = flags ? flags[i] != 0 : numbers[i] != 0.0;
       }
       break;
     default: memcpy((double*)values + at, numbers, count * sizeof *numbers); break;
   }
 }
 
-/* flags are read as Booleans: never into doubles */
-static void put_flags(void* values, value_format format, size_t at, const unsigned char* flags, size_t count) {
-  if (format == VALUES_INT) {
-    for (size_t i = 0; i < count; ++i) {
-      ((int*)values)[at + i] = flags[i];
-    }
-    return;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    ((_Bool*)values)[at + i] = flags[i] != 0;
-  }
-}
-
 /* --- reading ------------------------------------------------------------------------------------------------------ */
 
-/* In initialisation mode outputs follow the inputs; before it there are none. */
-static int update_outputs(component* c, fmu_function function, const variable* found) {
-  if (c->phase > PHASE_INITIALISATION || variable_causality_of(found) != CAUSALITY_OUTPUT) {
-    return 0; /* a step brings the outputs with it */
+/* Until the first sample is taken outputs follow the inputs; before the initialisation mode there are none. */
+static fmu_status update_outputs(component* c, fmu_function function, const variable* found) {
+  if (!c->waiting || variable_causality_of(found) != CAUSALITY_OUTPUT) {
+    return FMU_OK; /* a step brings the outputs with it */
   }
   if (!c->failed && c->phase == PHASE_INSTANTIATED) {
-    fail_at(c, function, found, "an output has no value before the initialisation mode");
-    return -1;
+    return fail_at(c, function, found, "an output has no value before the initialisation mode");
   }
-  if (component_update_outputs(c)) {
-    component_fail_because(c, call_name(function), model_last_error(c->model));
-    return -1;
-  }
-  return 0;
+  return component_update_outputs(c, function);
 }
 
 fmu_status values_get(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, void* values, size_t value_count) {
   value_run run;
   size_t at = 0;
+  fmu_status status = FMU_OK;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
@@ -94,85 +79,58 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
   for (size_t i = 0; i < count; i += run.references, at += run.elements) {
     if (is_time(references[i], type)) {
       run.references = run.elements = 1;
-      put_numbers(values, format, at, &c->end_of_step, 1);
+      put_values(values, format, at, &c->end_of_step, NULL, 1);
       continue;
     }
-    if (find_run(c, function, type, references + i, count - i, &run) || update_outputs(c, function, &run.first)) {
+    if (find_run(c, function, type, references + i, count - i, &run)) {
       return FMU_ERROR;
     }
-    if (variable_is_flag(&run.first)) {
-      put_flags(values, format, at, c->values.flag[run.first.id] + run.first.index, run.elements);
-    } else {
-      put_numbers(values, format, at, variables_number(&c->values, &run.first), run.elements);
+    const fmu_status updated = update_outputs(c, function, &run.first);
+    if (updated == FMU_ERROR) {
+      return updated;
     }
+    status = updated > status ? updated : status;
+    const int is_flag = variable_is_flag(&run.first);
+    put_values(values, format, at, is_flag ? NULL : variables_number(&c->values, &run.first),
+               is_flag ? c->values.flag[run.first.id] + run.first.index : NULL, run.elements);
   }
-  return FMU_OK;
+  return status;
 }
 
 /* --- writing ------------------------------------------------------------------------------------------------------ */
 
-static int refuse_fixed(component* c, fmu_function function, const variable* found) {
-  log_text reason;
-  reason.bytes[0] = 0;
-  log_append(&reason, "a fixed parameter is written before ");
-  log_append(&reason, call_name(CALL_EXIT_INITIALIZATION_MODE));
-  log_append(&reason, " only");
-  fail_at(c, function, found, reason.bytes);
-  return -1;
-}
-
-/* 0 when the variable may be written now, whatever the value */
-static int check_writable(component* c, fmu_function function, const variable* found) {
-  switch (variable_causality_of(found)) {
-    case CAUSALITY_INPUT: return 0;
-    case CAUSALITY_OUTPUT: fail_at(c, function, found, "an output is not written"); return -1;
-    default: break;
+/* Whether the variable may be written now, whatever the value. */
+static fmu_status check_writable(component* c, fmu_function function, const variable* found) {
+  if (variable_causality_of(found) == CAUSALITY_OUTPUT) {
+    return fail_at(c, function, found, "an output is not written");
   }
-  const int is_fixed = found->group || !model_parameter_range(c->model, found->index).tunable;
-  return c->phase == PHASE_STEP_COMPLETE && is_fixed ? refuse_fixed(c, function, found) : 0;
-}
-
-/* Inputs given as doubles, which nothing but their range is asked of: checked and copied as they stand. */
-static int is_block(const value_run* run, value_format format) {
-  return format == VALUES_DOUBLE && variable_causality_of(&run->first) == CAUSALITY_INPUT;
-}
-
-/* variables_accept() of all elements of a run of inputs: what is not a number compares false */
-static int all_accepted(const variable_group* group, const double* values, size_t count) {
-  int accepted = 1;
-  for (size_t i = 0; i < count; ++i) {
-    accepted &= (values[i] >= group->minimum) & (values[i] <= group->maximum);
+  if (c->phase != PHASE_STEP_COMPLETE || (!found->group && model_parameter_range(c->model, found->index).tunable)) {
+    return FMU_OK;
   }
-  return accepted;
+  return component_fail(c, call_name(function), "%s: a fixed parameter is written before %s only",
+                        variables_name(c->model, found).bytes, call_name(CALL_EXIT_INITIALIZATION_MODE));
 }
 
-/* 0 when the variable may have the value */
-static int check_value(component* c, fmu_function function, const variable* one, double value) {
-  if (variables_accept(c->model, one, value)) {
-    return 0;
-  }
-  log_text text = log_start(call_name(function), "");
-  variables_append_refusal(&text, c->model, one, value);
-  component_fail(c, &text);
-  return -1;
+/* Inputs, all of them Real: taken as they stand, whatever they are, since the step alone may discard them. */
+static int is_block(const value_run* run) {
+  return variable_causality_of(&run->first) == CAUSALITY_INPUT;
 }
 
-/* 0 when every variable of the run may have its value, which stand in `values` from `at` on */
-static int check_run(component* c, fmu_function function, const value_run* run, const void* values, value_format format,
-                     size_t at) {
+/* Whether every variable of the run may have its value, which stand in `values` from `at` on. */
+static fmu_status check_run(component* c, fmu_function function, const value_run* run, const void* values,
+                            value_format format, size_t at) {
   const variable_type type = variable_type_of(&run->first);
-  if (is_block(run, format) && all_accepted(run->first.group, (const double*)values + at, run->elements)) {
-    return 0;
-  }
-  for (size_t i = 0; i < run->elements; ++i) { /* one by one: the first that is refused is named */
+  for (size_t i = 0; !is_block(run) && i < run->elements; ++i) { /* one by one: the first that is refused is named */
     const variable one = variables_element(&run->first, i);
-    const variable* named = run->first.whole ? &run->first : &one;
-    if (check_writable(c, function, named) ||
-        check_value(c, function, &one, given_value(values, format, at + i, type))) {
-      return -1;
+    const double value = given_value(values, format, at + i, type);
+    if (check_writable(c, function, run->first.whole ? &run->first : &one)) {
+      return FMU_ERROR;
+    }
+    if (!variables_accept(c->model, &one, value)) {
+      return component_fail(c, call_name(function), "%s", variables_refusal(c->model, &one, value).bytes);
     }
   }
-  return 0;
+  return FMU_OK;
 }
 
 /* Values that check_run() took. */
@@ -180,7 +138,8 @@ static void take_run(component* c, const value_run* run, const void* values, val
   double* numbers = variables_number(&c->values, &run->first);
   const variable_group* group = run->first.group;
   c->outputs_pending = 1;
-  if (is_block(run, format)) {
+  if (is_block(run)) {
+    c->inputs_given = 1;
     memcpy(numbers, (const double*)values + at, run->elements * sizeof *numbers);
     return;
   }
@@ -203,7 +162,7 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
   }
   for (size_t i = 0; i < count; i += run.references, at += run.elements) { /* all or none */
     if (is_time(references[i], type)) {
-      return component_fail_because(c, call_name(function), "time: the independent variable is not written");
+      return component_fail(c, call_name(function), "time: the independent variable is not written");
     }
     if (find_run(c, function, type, references + i, count - i, &run) ||
         check_run(c, function, &run, values, format, at)) {

@@ -4,13 +4,14 @@
 #include <string.h>
 
 /* Elements of a group; 0 where the model does not have what it needs. */
-static size_t count_elements(const variables* v, const variable_group* group) {
-  if ((group->needs == NEEDS_LINKS && !v->has_links) || (group->needs == NEEDS_SENSOR_FAULT && !v->watches_sensors)) {
+static size_t count_elements(const model_shape* shape, const variable_group* group) {
+  if ((group->needs == NEEDS_LINKS && !shape->has_links) ||
+      (group->needs == NEEDS_SENSOR_FAULT && !shape->watches_sensors)) {
     return 0;
   }
   switch (group->size) {
-    case SIZE_JOINTS: return v->joints;
-    case SIZE_TENDONS: return v->tendons;
+    case SIZE_JOINTS: return shape->joints;
+    case SIZE_TENDONS: return shape->tendons;
     case SIZE_VECTOR: return 3;
     default: return 1;
   }
@@ -21,26 +22,16 @@ static int has_numbers(const variable_group* group) {
   return group->type != VARIABLE_BOOLEAN || group->causality == CAUSALITY_PARAMETER;
 }
 
-/* Numbers of all groups of one causality. */
-static size_t number_count(const variables* v, variable_causality causality) {
-  size_t count = 0;
+/* Gives each group of one causality its part of a block, NULL to count; returns how many numbers they have. */
+static size_t share_out(variables* v, variable_causality causality, double* block) {
+  size_t used = 0;
   for (int g = 0; g < GROUP_COUNT; ++g) {
     if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      count += v->count[g];
+      v->number[g] = block && v->count[g] ? block + used : NULL;
+      used += v->count[g];
     }
   }
-  return count;
-}
-
-/* Gives each group of one causality its part of the block; returns what is left of it. */
-static double* share_out(variables* v, variable_causality causality, double* block) {
-  for (int g = 0; g < GROUP_COUNT; ++g) {
-    if (has_numbers(&variable_groups[g]) && variable_groups[g].causality == causality) {
-      v->number[g] = v->count[g] ? block : NULL;
-      block += v->count[g];
-    }
-  }
-  return block;
+  return used;
 }
 
 static size_t share_out_flags(variables* v, unsigned char* block) {
@@ -57,25 +48,23 @@ static size_t share_out_flags(variables* v, unsigned char* block) {
 int variables_create(variables* v, const model* m, int arrays) {
   memset(v, 0, sizeof *v);
   v->arrays = arrays;
-  v->joints = model_joint_count(m);
-  v->tendons = model_tendon_count(m);
-  v->parameter_count = model_parameter_count(m);
-  v->has_links = model_has_links(m);
-  v->watches_sensors = model_watches_sensors(m);
+  const model_shape shape = model_get_shape(m);
+  v->parameter_count = shape.parameters;
   for (int g = 0; g < GROUP_COUNT; ++g) {
-    v->count[g] = count_elements(v, &variable_groups[g]);
+    v->count[g] = count_elements(&shape, &variable_groups[g]);
   }
-  v->input_count = number_count(v, CAUSALITY_INPUT);
-  v->output_count = number_count(v, CAUSALITY_OUTPUT);
-  const size_t settings = number_count(v, CAUSALITY_PARAMETER);
+  v->input_count = share_out(v, CAUSALITY_INPUT, NULL);
+  v->output_count = share_out(v, CAUSALITY_OUTPUT, NULL);
+  const size_t settings = share_out(v, CAUSALITY_PARAMETER, NULL);
   v->numbers = calloc(v->input_count + v->output_count + settings + v->parameter_count, sizeof(double));
   v->flags = calloc(share_out_flags(v, NULL), 1);
   if (!v->numbers || !v->flags) {
     return -1;
   }
   share_out_flags(v, v->flags);
-  double* outputs = share_out(v, CAUSALITY_INPUT, v->numbers);
-  v->parameters = share_out(v, CAUSALITY_PARAMETER, share_out(v, CAUSALITY_OUTPUT, outputs));
+  double* outputs = v->numbers + share_out(v, CAUSALITY_INPUT, v->numbers);
+  double* of_settings = outputs + share_out(v, CAUSALITY_OUTPUT, outputs);
+  v->parameters = of_settings + share_out(v, CAUSALITY_PARAMETER, of_settings);
   variables_start(v, m);
   return 0;
 }
@@ -85,9 +74,14 @@ void variables_destroy(variables* v) {
   free(v->flags);
 }
 
-void variables_start(variables* v, const model* m) {
-  memset(v->numbers, 0, (v->input_count + v->output_count) * sizeof(double));
+void variables_clear_outputs(variables* v) {
+  memset(v->numbers + v->input_count, 0, v->output_count * sizeof(double));
   memset(v->flags, 0, share_out_flags(v, v->flags));
+}
+
+void variables_start(variables* v, const model* m) {
+  memset(v->numbers, 0, v->input_count * sizeof(double));
+  variables_clear_outputs(v);
   variables_fetch_settings(v, m);
   model_get_parameters(m, v->parameters);
   v->parameters_pending = 0;
@@ -114,40 +108,24 @@ static model_range range_of(const model* m, const variable* found) {
 }
 
 int variables_accept(const model* m, const variable* found, double value) {
-  if (found->group && found->group->causality == CAUSALITY_INPUT) {
-    return value >= found->group->minimum && value <= found->group->maximum; /* what is not a number compares false */
-  }
   const model_range range = range_of(m, found);
   return value <= range.maximum && (range.above_minimum ? value > range.minimum : value >= range.minimum);
 }
 
-void variables_append_refusal(log_text* text, const model* m, const variable* found, double value) {
+log_text variables_refusal(const model* m, const variable* found, double value) {
   const model_range range = range_of(m, found);
-  variables_append_name(text, m, found);
-  log_append(text, " = ");
-  log_append_number(text, value);
-  log_append(text, range.above_minimum ? ": expected above " : ": expected ");
-  log_append_number(text, range.minimum);
-  log_append(text, range.above_minimum ? " and at most " : " to ");
-  log_append_number(text, range.maximum);
-  if (range.unit && *range.unit) {
-    log_append(text, " ");
-    log_append(text, range.unit);
-  }
+  const char* from = range.above_minimum ? "above " : "";
+  const char* to = range.above_minimum ? "and at most" : "to";
+  const int has_unit = range.unit && *range.unit;
+  return log_line("%s = %g: expected %s%g %s %g%s%s", variables_name(m, found).bytes, value, from, range.minimum, to,
+                  range.maximum, has_unit ? " " : "", has_unit ? range.unit : "");
 }
 
-void variables_append_name(log_text* text, const model* m, const variable* found) {
+log_text variables_name(const model* m, const variable* found) {
   char path[128];
   if (!found->group) {
-    if (model_parameter_path(m, found->index, path, sizeof path) == 0) {
-      log_append(text, path);
-    }
-    return;
+    return log_line("%s", model_parameter_path(m, found->index, path, sizeof path) == 0 ? path : "");
   }
-  log_append(text, found->group->name);
-  if (found->group->size != SIZE_SCALAR && !found->whole) {
-    log_append(text, "[");
-    log_append_count(text, found->index + 1);
-    log_append(text, "]");
-  }
+  return found->group->size == SIZE_SCALAR || found->whole ? log_line("%s", found->group->name)
+                                                           : log_line("%s[%zu]", found->group->name, found->index + 1);
 }

@@ -7,10 +7,9 @@
 #include "model.h"
 #include "variable_table.h"
 
-/* Arrays of n joints, m tendons, p parameters. All memory is taken by variables_create(). */
+/* All memory is taken by variables_create(). */
 typedef struct variables {
-  size_t joints, tendons, parameter_count;
-  int has_links, watches_sensors;
+  size_t parameter_count;           /* p */
   int arrays;                       /* a value reference stands for a whole group, not for one element */
   double* numbers;                  /* one block: what the pointers below point into */
   unsigned char* flags;             /* likewise */
@@ -36,6 +35,8 @@ void variables_destroy(variables* v);
 
 /* Inputs to 0, outputs to 0, settings and parameters to those of the model. */
 void variables_start(variables* v, const model* m);
+
+void variables_clear_outputs(variables* v);
 
 /* Settings to those of the model. */
 void variables_fetch_settings(variables* v, const model* m);
@@ -99,11 +100,11 @@ static inline double* variables_number(const variables* v, const variable* found
   return (found->group ? v->number[found->id] : v->parameters) + found->index;
 }
 
-/* 1 when the variable may have the value, whatever the others have. */
+/* 1 when the variable may have the value, whatever the others have; what is not a number compares false. */
 int variables_accept(const model* m, const variable* found, double value);
 
-/* Appends "<name> = <value>: expected <range> <unit>". */
-void variables_append_refusal(log_text* text, const model* m, const variable* found, double value);
+/* "<name> = <value>: expected <range> <unit>" */
+log_text variables_refusal(const model* m, const variable* found, double value);
 
 /* Name as in the XML, such as "tendon_force[2]" or "contact"; of a whole group "tendon_force". */
-void variables_append_name(log_text* text, const model* m, const variable* found);
+log_text variables_name(const model* m, const variable* found);

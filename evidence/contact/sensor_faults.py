@@ -25,7 +25,7 @@ from tendonfmu.recordings import read_recording
 
 Arrays = dict[str, Numbers]
 
-FINGERS = (3,)
+FINGERS = (3, 19)
 KINDS = ("zero", "frozen", "jump", "position")
 SLOT, EARLIEST, LATEST, LASTS = 8.0, 1.0, 2.5, 3.0  # s
 JUMP = (2.0, 10.0)  # N

@@ -1,7 +1,7 @@
 // A byte string drives a sequence of calls on one instance. Whatever is called, in whatever state and with whatever
-// arguments: a call that is refused, or that only asks, leaves no trace in the saved state, one that the standard does
-// not allow is refused, messages are one line, and outputs are finite (fuzzed_fmu.hpp holds what is checked). Here is
-// what the sequences of all versions of FMI have in common: arguments and saved states.
+// arguments: a call that is refused, a step that is discarded and a call that only asks leave no trace in the saved
+// state, one that the standard does not allow is refused, messages are one line, and outputs are finite (fuzzed_fmu.hpp
+// holds what is checked). Here is what the sequences of all versions of FMI have in common: arguments and saved states.
 #pragma once
 
 #include <fuzzer/FuzzedDataProvider.h>
@@ -24,15 +24,6 @@ namespace calls {
 inline std::ptrdiff_t place_of_core(const byte_list& bytes) {
   const byte_list magic = {'T', 'F', 'M', 'U', 'S', 'T', 'A', 0};
   return std::search(bytes.begin() + 40, bytes.end(), magic.begin(), magic.end()) - bytes.begin();
-}
-
-/* as component_state.c has it: FNV-1a of all after the header */
-inline std::uint64_t checksum(const byte_list& bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (std::size_t i = 32; i < bytes.size(); ++i) {
-    hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  }
-  return hash;
 }
 
 /* but for the checksums, and the sign of zeros */
@@ -285,7 +276,7 @@ class call_sequence {
       if (at + 40 < bytes.size()) {
         store_u64(&bytes[at + 24], hash_bytes(&bytes[at + 32], bytes.size() - at - 32, 0));
       }
-      store_u64(&bytes[24], checksum(bytes));
+      store_u64(&bytes[24], hash_bytes(&bytes[32], bytes.size() - 32, 0));  // as component_state.c has it
     }
     if (rarely()) {
       bytes.resize(data_.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
@@ -321,7 +312,13 @@ class call_sequence {
 template <class Sequence>
 void run_sequence(const std::uint8_t* bytes, std::size_t size) {
   static const std::vector<byte_list> made_of = resources();
-  static const std::deque<unpacked_fmu> fmus(made_of.begin(), made_of.end());
+  static const std::deque<unpacked_fmu> fmus = [] {
+    std::deque<unpacked_fmu> all;
+    for (const byte_list& resource : made_of) {
+      all.emplace_back(resource, all.size() % 2 == 1);  // the second takes samples at the end of steps
+    }
+    return all;
+  }();
   FuzzedDataProvider data(bytes, size);
   const std::size_t which = data.ConsumeIntegralInRange<std::size_t>(0, 7);
   Sequence sequence(data, fmus[which < 6 ? 0 : which - 5], fmus[which < 6 ? 1 : 0]);

@@ -8,10 +8,6 @@ void log(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String category, 
   calls::message_is_sound(category, message);
 }
 
-fmu_status as_status(fmi2Status status) {
-  return static_cast<fmu_status>(status);
-}
-
 }  // namespace
 
 namespace calls::version {
@@ -24,36 +20,21 @@ void* instantiate(const unpacked_fmu& fmu) {
 void free_instance(void* component) {
   fmi2FreeInstance(component);
 }
-fmu_status get_state(void* component, void** state) {
-  return as_status(fmi2GetFMUstate(component, state));
-}
-fmu_status set_state(void* component, void* state) {
-  return as_status(fmi2SetFMUstate(component, state));
-}
-fmu_status free_state(void* component, void** state) {
-  return as_status(fmi2FreeFMUstate(component, state));
-}
-fmu_status serialized_size(void* component, void* state, std::size_t* size) {
-  return as_status(fmi2SerializedFMUstateSize(component, state, size));
-}
-fmu_status serialize(void* component, void* state, unsigned char* bytes, std::size_t size) {
-  return as_status(fmi2SerializeFMUstate(component, state, reinterpret_cast<fmi2Byte*>(bytes), size));
-}
-fmu_status deserialize(void* component, const unsigned char* bytes, std::size_t size, void** state) {
-  return as_status(fmi2DeSerializeFMUstate(component, reinterpret_cast<const fmi2Byte*>(bytes), size, state));
-}
-fmu_status enter_initialisation(void* component) {
-  return as_status(fmi2EnterInitializationMode(component));
-}
-fmu_status exit_initialisation(void* component) {
-  return as_status(fmi2ExitInitializationMode(component));
-}
-fmu_status step(void* component, double from, double over) {
-  return as_status(fmi2DoStep(component, from, over, fmi2False));
-}
-fmu_status write(void* component, const references& which, const std::vector<double>& numbers) {
-  return as_status(fmi2SetReal(component, which.data(), which.size(), numbers.data()));
-}
+VERSION_CALL(get_state, (void* component, void** state), fmi2GetFMUstate(component, state))
+VERSION_CALL(set_state, (void* component, void* state), fmi2SetFMUstate(component, state))
+VERSION_CALL(free_state, (void* component, void** state), fmi2FreeFMUstate(component, state))
+VERSION_CALL(serialized_size, (void* component, void* state, std::size_t* size),
+             fmi2SerializedFMUstateSize(component, state, size))
+VERSION_CALL(serialize, (void* component, void* state, unsigned char* bytes, std::size_t size),
+             fmi2SerializeFMUstate(component, state, reinterpret_cast<fmi2Byte*>(bytes), size))
+VERSION_CALL(deserialize, (void* component, const unsigned char* bytes, std::size_t size, void** state),
+             fmi2DeSerializeFMUstate(component, reinterpret_cast<const fmi2Byte*>(bytes), size, state))
+VERSION_CALL(enter_initialisation, (void* component), fmi2EnterInitializationMode(component))
+VERSION_CALL(exit_initialisation, (void* component), fmi2ExitInitializationMode(component))
+VERSION_CALL(step, (void* component, double from, double over), fmi2DoStep(component, from, over, fmi2False))
+VERSION_CALL(write, (void* component, const references& which, const std::vector<double>& numbers),
+             fmi2SetReal(component, which.data(), which.size(), numbers.data()))
+
 fmu_status read(void* component, variable_type type, const references& which, std::vector<double>& numbers) {
   if (type == VARIABLE_REAL) {
     return as_status(fmi2GetReal(component, which.data(), which.size(), numbers.data()));
@@ -69,6 +50,7 @@ fmu_status read(void* component, variable_type type, const references& which, st
 
 namespace {
 
+using calls::as_status;
 using calls::variable_list;
 
 class fmi2_sequence : public calls::call_sequence {

@@ -9,6 +9,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueR
   if (!component_may_call(instance, CALL_GET_DIRECTIONAL_DERIVATIVE)) {
     return fmi2Error;
   }
-  return (fmi2Status)component_fail_because(instance, "fmi2GetDirectionalDerivative",
-                                            "there are none: providesDirectionalDerivative is false");
+  return (fmi2Status)component_fail(instance, "fmi2GetDirectionalDerivative",
+                                    "there are none: providesDirectionalDerivative is false");
 }

@@ -11,7 +11,8 @@
 
 static const double longest_step = 1000.0; /* s; half a minute of computing */
 
-const model_texts model_text = {.resource = "rig.json", .initialised = "the finger has settled"};
+const model_texts model_text = {
+    .resource = "rig.json", .initialised = "the finger has settled", .waits = "the finger settles with the first step"};
 
 /* --- creation ------------------------------------------------------------------------------------------------------
  */
@@ -24,7 +25,9 @@ static model* refuse(model* m, char* message, size_t size, const char* reason) {
   return NULL;
 }
 
-model* model_create(const void* resource, size_t size, char* message, size_t message_size) {
+/* Its inputs are held over a step, and its outputs are those of the end: there is no choice. */
+model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size) {
+  (void)at_end;
   tendonfmu_plant_settings settings;
   model* m = calloc(1, sizeof *m);
   if (!m) {
@@ -73,26 +76,14 @@ void model_reset(model* m) {
   m->start = 0.0;
 }
 
-void model_guid(const void* resource, size_t size, char guid[39]) {
+void model_guid(const void* resource, size_t size, int at_end, char guid[39]) {
+  (void)at_end;
   tendonfmu_image_guid(resource, size, VARIABLE_TABLE_SALT, guid);
 }
 
-size_t model_joint_count(const model* m) {
-  return m->joints;
-}
-
-size_t model_tendon_count(const model* m) {
-  return m->tendons;
-}
-
-int model_has_links(const model* m) {
-  (void)m; /* no group of its table needs any */
-  return 0;
-}
-
-int model_watches_sensors(const model* m) {
-  (void)m; /* nor this */
-  return 0;
+/* Its groups need neither links nor sensors that are watched, and the rig's numbers are no parameters. */
+model_shape model_get_shape(const model* m) {
+  return (model_shape){.joints = m->joints, .tendons = m->tendons, .state_size = plant_model_state_size(m)};
 }
 
 const char* model_last_error(const model* m) {
@@ -132,12 +123,7 @@ const char* model_set_tolerance(model* m, double* tolerance) {
   return NULL;
 }
 
-/* The rig's numbers are no parameters: another rig is another FMU. */
-
-size_t model_parameter_count(const model* m) {
-  (void)m;
-  return 0;
-}
+/* By path there are none: another rig is another FMU. */
 
 void model_get_parameters(const model* m, double* values) {
   (void)m, (void)values;
@@ -172,6 +158,22 @@ static int is_command(const model* m, const double* inputs) {
     }
   }
   return 0;
+}
+
+/* Names the first input that is out of its range. */
+static model_answer check_inputs(model* m, const variables* values) {
+  for (int g = 0; g < GROUP_COUNT; ++g) {
+    const variable_group* group = &variable_groups[g];
+    const size_t count = group->causality == CAUSALITY_INPUT ? values->count[g] : 0;
+    for (size_t i = 0; i < count; ++i) {
+      const variable input = {group, (variable_group_id)g, i, 0};
+      if (!variables_accept(m, &input, values->number[g][i])) {
+        snprintf(m->error, sizeof m->error, "%s", variables_refusal(m, &input, values->number[g][i]).bytes);
+        return MODEL_BAD_INPUTS;
+      }
+    }
+  }
+  return MODEL_OK;
 }
 
 int plant_take_inputs(model* m, const double* inputs) {
@@ -238,12 +240,15 @@ static int settle(model* m, const variables* values) {
 
 /* Settling takes long: a plant that has settled with the present inputs and settings, to be looked at, stays as it is.
  */
-static int settle_as_wanted(model* m, const variables* values) {
+static model_answer settle_as_wanted(model* m, const variables* values) {
+  if (check_inputs(m, values) != MODEL_OK) {
+    return MODEL_BAD_INPUTS;
+  }
   if (tendonfmu_plant_is_initialised(m->plant) && memcmp(m->used, m->wanted, sizeof m->used) == 0 &&
       !inputs_differ(m, values)) {
-    return 0;
+    return MODEL_OK;
   }
-  return settle(m, values);
+  return settle(m, values) ? MODEL_FAILED : MODEL_OK;
 }
 
 int model_is_initialised(const model* m) {
@@ -254,16 +259,16 @@ double model_get_time(const model* m) {
   return m->start + tendonfmu_plant_get_time(m->plant);
 }
 
-int model_initialise(model* m, variables* values, double start) {
-  if (settle_as_wanted(m, values)) {
-    return -1;
+model_answer model_initialise(model* m, variables* values, double start) {
+  const model_answer answer = settle_as_wanted(m, values);
+  if (answer != MODEL_FAILED) { /* time 0 of the plant, also where the first step settles */
+    m->start = start;
+    m->running = answer == MODEL_OK;
   }
-  m->start = start;
-  m->running = 1;
-  return 0;
+  return answer;
 }
 
-int model_begin_trial(model* m, variables* values, double start) {
+model_answer model_begin_trial(model* m, variables* values, double start) {
   (void)start;
   return settle_as_wanted(m, values);
 }
@@ -297,8 +302,8 @@ static double plant_time(double start, double time) {
   return fabs(plain - rounded) <= lost_digits(start, time) ? rounded : plain;
 }
 
-int model_step(model* m, variables* values, double time, double step) {
-  const double end = plant_time(m->start, time + step);
+/* The present inputs are within their ranges. */
+static int advance(model* m, const variables* values, double end) {
   const int differ = inputs_differ(m, values);
   const int commanded = m->commanded;
   if (differ) { /* to go back to: inputs are part of the plant's state */
@@ -318,4 +323,15 @@ int model_step(model* m, variables* values, double time, double step) {
     return -1;
   }
   return 0;
+}
+
+model_answer model_step(model* m, variables* values, double time, double step) {
+  const int running = m->running;
+  const model_answer answer = running ? check_inputs(m, values) : settle_as_wanted(m, values);
+  if (answer != MODEL_OK) {
+    return answer;
+  }
+  const int failed = advance(m, values, plant_time(m->start, time + step));
+  m->running = running || !failed;
+  return failed ? MODEL_FAILED : MODEL_OK;
 }

@@ -29,5 +29,8 @@ int plant_failed(model* m);
 /* A plant before its initialisation, with these settings [SETTING_COUNT]. 0 or -1. */
 int plant_start_over(model* m, const double* settings);
 
-/* Hands over inputs [input_count]. 0 or -1. */
+/* Bytes of a saved state of the FMU's model. */
+size_t plant_model_state_size(const model* m);
+
+/* Hands over inputs [input_count] within their ranges. 0 or -1. */
 int plant_take_inputs(model* m, const double* inputs);

@@ -1,19 +1,13 @@
 #include "plant_settings.h"
 
 #include <math.h>
+#include <string.h>
 
+#define PLACE(NAME, field, type) {GROUP_##NAME, SETTING_##NAME},
 static const struct {
   variable_group_id group;
   size_t place;
-} places[] = {{GROUP_INTEGRATOR, SETTING_INTEGRATOR},
-              {GROUP_RELATIVE_TOLERANCE, SETTING_RELATIVE_TOLERANCE},
-              {GROUP_STEP, SETTING_STEP},
-              {GROUP_SCHEDULED_MOTION, SETTING_SCHEDULED_MOTION},
-              {GROUP_SCHEDULED_PUSHES, SETTING_SCHEDULED_PUSHES},
-              {GROUP_SENSORS, SETTING_SENSORS},
-              {GROUP_SEED, SETTING_SEED},
-              {GROUP_PUSH_LINK, SETTING_PUSH_LINK},
-              {GROUP_PUSH_POINT, SETTING_PUSH_POINT}};
+} places[] = {SETTINGS(PLACE){GROUP_PUSH_POINT, SETTING_PUSH_POINT}};
 enum { PLACES = sizeof places / sizeof *places };
 
 size_t setting_place(variable_group_id group, size_t index) {
@@ -24,32 +18,18 @@ size_t setting_place(variable_group_id group, size_t index) {
   return places[k].place + index;
 }
 
+#define TO_NUMBER(NAME, field, type)   numbers[SETTING_##NAME] = (double)settings->field;
+#define FROM_NUMBER(NAME, field, type) settings.field = (type)numbers[SETTING_##NAME];
+
 void settings_to_numbers(const tendonfmu_plant_settings* settings, double numbers[SETTING_COUNT]) {
-  numbers[SETTING_INTEGRATOR] = settings->integrator;
-  numbers[SETTING_RELATIVE_TOLERANCE] = settings->relative_tolerance;
-  numbers[SETTING_STEP] = settings->step;
-  numbers[SETTING_SCHEDULED_MOTION] = settings->scheduled_motion;
-  numbers[SETTING_SCHEDULED_PUSHES] = settings->scheduled_pushes;
-  numbers[SETTING_SENSORS] = settings->sensors;
-  numbers[SETTING_SEED] = (double)settings->seed;
-  numbers[SETTING_PUSH_LINK] = settings->push_link;
-  for (size_t i = 0; i < 3; ++i) {
-    numbers[SETTING_PUSH_POINT + i] = settings->push_point[i];
-  }
+  SETTINGS(TO_NUMBER)
+  memcpy(numbers + SETTING_PUSH_POINT, settings->push_point, sizeof settings->push_point);
 }
 
 tendonfmu_plant_settings settings_from_numbers(const double numbers[SETTING_COUNT]) {
-  tendonfmu_plant_settings settings = {.integrator = (int)numbers[SETTING_INTEGRATOR],
-                                       .relative_tolerance = numbers[SETTING_RELATIVE_TOLERANCE],
-                                       .step = numbers[SETTING_STEP],
-                                       .scheduled_motion = numbers[SETTING_SCHEDULED_MOTION] != 0.0,
-                                       .scheduled_pushes = numbers[SETTING_SCHEDULED_PUSHES] != 0.0,
-                                       .sensors = numbers[SETTING_SENSORS] != 0.0,
-                                       .seed = (uint64_t)numbers[SETTING_SEED],
-                                       .push_link = (int)numbers[SETTING_PUSH_LINK]};
-  for (size_t i = 0; i < 3; ++i) {
-    settings.push_point[i] = numbers[SETTING_PUSH_POINT + i];
-  }
+  tendonfmu_plant_settings settings;
+  SETTINGS(FROM_NUMBER)
+  memcpy(settings.push_point, numbers + SETTING_PUSH_POINT, sizeof settings.push_point);
   return settings;
 }
 

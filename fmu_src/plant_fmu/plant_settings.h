@@ -6,18 +6,19 @@
 #include "model.h"
 #include "tendonfmu_plant.h"
 
-enum {
-  SETTING_INTEGRATOR,
-  SETTING_RELATIVE_TOLERANCE,
-  SETTING_STEP,
-  SETTING_SCHEDULED_MOTION,
-  SETTING_SCHEDULED_PUSHES,
-  SETTING_SENSORS,
-  SETTING_SEED,
-  SETTING_PUSH_LINK,
-  SETTING_PUSH_POINT, /* three */
-  SETTING_COUNT = SETTING_PUSH_POINT + 3
-};
+/* Those of one number: name in the table's groups and here, field of the plant's settings, its type. */
+#define SETTINGS(ENTRY)                                 \
+  ENTRY(INTEGRATOR, integrator, int)                    \
+  ENTRY(RELATIVE_TOLERANCE, relative_tolerance, double) \
+  ENTRY(STEP, step, double)                             \
+  ENTRY(SCHEDULED_MOTION, scheduled_motion, int)        \
+  ENTRY(SCHEDULED_PUSHES, scheduled_pushes, int)        \
+  ENTRY(SENSORS, sensors, int)                          \
+  ENTRY(SEED, seed, uint64_t)                           \
+  ENTRY(PUSH_LINK, push_link, int)
+
+#define PLACE_OF_SETTING(NAME, field, type) SETTING_##NAME,
+enum { SETTINGS(PLACE_OF_SETTING) SETTING_PUSH_POINT, /* three */ SETTING_COUNT = SETTING_PUSH_POINT + 3 };
 
 /* Place of an element of a parameter group. */
 size_t setting_place(variable_group_id group, size_t index);

@@ -24,13 +24,13 @@ static const void* plant_bytes(const model* m, const void* bytes) {
   return (const char*)bytes + plant_offset(m);
 }
 
-size_t model_state_size(const model* m) {
+size_t plant_model_state_size(const model* m) {
   return plant_offset(m) + m->plant_state_size;
 }
 
 void model_save(const model* m, void* bytes) {
   const double life[] = {m->running, m->start, m->running && m->commanded, m->tolerance_written};
-  memset(bytes, 0, model_state_size(m));
+  memset(bytes, 0, plant_model_state_size(m));
   put(bytes, AT_RUNNING, life, AT_SETTINGS);
   put(bytes, AT_SETTINGS, m->wanted, SETTING_COUNT);
   if (m->running) {
@@ -47,22 +47,23 @@ static int is_flag(double x) {
 static int is_blank(const model* m, const void* bytes) {
   const unsigned char* byte = bytes;
   size_t at = AT_INPUTS * sizeof(double);
-  while (at < model_state_size(m) && byte[at] == 0) {
+  while (at < plant_model_state_size(m) && byte[at] == 0) {
     ++at;
   }
-  return at == model_state_size(m);
+  return at == plant_model_state_size(m);
 }
 
-const char* model_check_state(model* m, const void* bytes, int initialised) {
+const char* model_check_state(model* m, const void* bytes, int may_be_initialised) {
   double life[AT_SETTINGS], settings[SETTING_COUNT];
   get(bytes, AT_RUNNING, life, AT_SETTINGS);
   get(bytes, AT_SETTINGS, settings, SETTING_COUNT);
-  if (life[AT_RUNNING] != (double)initialised) {
+  const int running = life[AT_RUNNING] != 0.0;
+  if (running && !may_be_initialised) {
     return "damaged state: its phase does not fit its finger";
   }
-  if (!isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) || !is_flag(life[AT_TOLERANCE_WRITTEN]) ||
-      !settings_are_sound(settings, m->joints) ||
-      (!initialised && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
+  if (!is_flag(life[AT_RUNNING]) || !isfinite(life[AT_START]) || !is_flag(life[AT_COMMANDED]) ||
+      !is_flag(life[AT_TOLERANCE_WRITTEN]) || !settings_are_sound(settings, m->joints) ||
+      (!running && (life[AT_COMMANDED] != 0.0 || !is_blank(m, bytes)))) {
     return "damaged state: a number is out of its range";
   }
   return NULL; /* the plant looks at its own bytes when it takes them */

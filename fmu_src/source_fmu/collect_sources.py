@@ -24,7 +24,10 @@ from pathlib import Path
 
 BEGIN, END = "external_names_begin.h", "external_names_end.h"
 # Headers that every C library has. They come before names are changed or hidden: theirs must be neither.
-C_LIBRARY = {"errno.h", "float.h", "limits.h", "math.h", "stddef.h", "stdint.h", "stdio.h", "stdlib.h", "string.h"}
+C_LIBRARY = {
+    f"{name}.h"
+    for name in ["errno", "float", "limits", "math", "stdarg", "stddef", "stdint", "stdio", "stdlib", "string"]
+}
 
 BEGIN_TEXT = """\
 /* Made by fmu_src/source_fmu/collect_sources.py. Every C file of this FMU includes it first. */

@@ -274,6 +274,12 @@ class BuildOptions(Options):
         None, _PATH, "folder of binaries by FMI platform [default: those installed]", metavar="DIR"
     )
     fmi: int = option(2, Number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
+    sample_at: str = option(
+        "begin",
+        Choice(("begin", "end")),
+        "end: for masters that hand over the inputs of a step's end",
+        metavar="begin|end",
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import html
 import json
+import math
 import re
 import shutil
 import sys
@@ -65,6 +66,19 @@ def test_a_program_that_loads_the_library(small: UnpackedFmu, tmp_path: Path) ->
     lines = run(driver, small.binary, *arguments(small, samples)).splitlines()
     assert [line.strip() for line in lines] == printed(small)
     assert len(set(lines)) == SAMPLES - 1  # it moves; the first step takes the first sample again
+
+
+@needs_compiler
+def test_a_master_in_c_goes_on_after_bad_samples(small: UnpackedFmu, tmp_path: Path) -> None:
+    """It repeats a discarded step with the inputs that it had before: the same bits as if these had been sent."""
+    driver = compile_driver(small, tmp_path / "driver")
+    sent = [(time, list(inputs)) for time, inputs in moving(small)]
+    held = [(time, list(inputs)) for time, inputs in sent]
+    for k, at, value in ((7, 0, math.nan), (8, 3, math.inf), (30, 2, -1e300)):
+        sent[k][1][at] = value
+        held[k] = (held[k][0], held[k - 1][1])
+    done = [run(driver, small.binary, *arguments(small, write_samples(small, tmp_path / "samples.txt", sent)))]
+    assert [line.strip() for line in done[0].splitlines()] == printed(small, held)
 
 
 @needs_compiler

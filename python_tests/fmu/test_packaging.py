@@ -20,7 +20,7 @@ from lxml import etree
 
 import tendonfmu as tf
 from command import Call
-from fmu_binary import ERROR, FINGER, OK, Instance, UnpackedFmu, fmi_platform
+from fmu_binary import DISCARD, FINGER, OK, Instance, UnpackedFmu, fmi_platform
 from fmu_kinds import MAKERS, Kind, declared_dependencies, kinds
 from optional_parts import MAESTRO, needs, require
 from plant_fmu_rig import DURATION, TOLERANCE, fmu_rig
@@ -334,9 +334,12 @@ def test_inputs_have_the_range_of_a_finger_and_take_more(small_fmu: UnpackedFmu)
         if variable.attrib["causality"] == "input":
             low, high = (float(variable[0].attrib[key]) for key in ("min", "max"))
             assert -1e5 < low == -high < 0 and low <= float(variable[0].attrib["start"]) <= high
-            with Instance(small_fmu) as instance:
-                assert instance.write({variable.attrib["name"]: 100 * high}) == OK
-                assert instance.write({variable.attrib["name"]: 1.1e12}) == ERROR
+            if not variable.attrib["name"].startswith("joint"):  # not used by default
+                with Instance(small_fmu) as instance:
+                    for value, status in ((100 * high, OK), (1.1e12, DISCARD)):
+                        instance.initialise()
+                        assert instance.write({variable.attrib["name"]: value}) == OK
+                        assert instance.step(0.0) == status and instance.call("Reset") == OK
 
 
 # --- checkers ---------------------------------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
 """Random sequences of calls, good and bad, against a twin that gets the good ones only.
 
-The machine below knows the standard's life cycle: the binary must accept and refuse as it says, a refused call must
-leave no trace in the saved state, and outputs are finite. The twin of an FMU of FMI 3.0 is that of FMI 2.0, and the
-other way round: outputs and saved states of both have the same bits, whatever is called.
+The machine below knows the standard's life cycle: the binary must accept and refuse as it says, a refused call and a
+discarded step must leave no trace in the saved state, and outputs are finite. The twin of an FMU of FMI 3.0 is that of
+FMI 2.0, and the other way round: outputs and saved states of both have the same bits, whatever is called.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from fmu_binary import ARM, COULOMB, ERROR, OK, STATIC, Instance, UnpackedFmu, motion
+from fmu_binary import ARM, COULOMB, DISCARD, ERROR, OK, STATIC, WARNING, Instance, UnpackedFmu, motion
 from fmu_kinds import good_arguments
 from plant_rigs import needs_plant
 
@@ -56,6 +56,7 @@ class Calls(RuleBasedStateMachine):
     bad = (*NO_NUMBERS, 1.1e12, 1e308)
     steps = (1e-12, 1e-6, 1e-3, 1 / 60, 0.1, 1.0, 1e6)
     samples_at_the_start_of_a_step = True
+    needs_inputs = True  # for the first sample
 
     @initialize(start=st.floats(-1e3, 1e3), begun=st.booleans())
     def instantiate(self, start: float, begun: bool) -> None:
@@ -68,6 +69,7 @@ class Calls(RuleBasedStateMachine):
 
     def begin(self) -> None:
         self.phase, self.failed, self.now = "instantiated", False, 0.0
+        self.waiting, self.given, self.unsound = True, False, False  # first sample, inputs written, the first one bad
         self.pending = dict(zip(self.related, (0.03, 0.02), strict=False))
 
     def teardown(self) -> None:
@@ -77,18 +79,24 @@ class Calls(RuleBasedStateMachine):
 
     # --- what ought to happen
 
-    def good(self, call: Callable[[Instance], int]) -> None:
+    def good(self, call: Callable[[Instance], int], status: int = OK) -> None:
         """Make a call that the standard allows here."""
-        assert call(self.tried) == OK, self.tried.messages[-1:]
-        assert call(self.twin) == OK
+        assert call(self.tried) == status, self.tried.messages[-1:]
+        assert call(self.twin) == status
 
     def sample(self, call: Callable[[Instance], int]) -> bool:
-        """Make a call that takes a sample; true if it was to be carried out."""
+        """Make a step that takes a sample; true if it was to be carried out."""
         if self.impossible:
             self.refused(call)
+        elif self.unsound:
+            assert call(self.tried) == DISCARD  # not the twin's
+            assert self.tried.messages[-1][:2] == (DISCARD, "logStatusDiscard")
+            assert next(iter(self.inputs)) in self.tried.last_message
         else:
             self.good(call)
-        return not self.failed
+            self.waiting = False
+            return True
+        return False
 
     def refused(self, call: Callable[[Instance], int]) -> None:
         assert call(self.tried) == ERROR
@@ -111,8 +119,14 @@ class Calls(RuleBasedStateMachine):
     @in_phase("initialization")
     @rule()
     def leave(self) -> None:
-        if self.sample(lambda i: i.call("ExitInitializationMode")):
-            self.phase = "step"
+        def call(instance: Instance) -> int:
+            return instance.call("ExitInitializationMode")
+
+        if self.impossible:
+            self.refused(call)
+            return
+        self.good(call, WARNING if self.unsound else OK)
+        self.phase, self.waiting = "step", self.unsound or (self.needs_inputs and not self.given)
 
     @in_phase("step")
     @rule(data=st.data(), moving=st.booleans())
@@ -120,18 +134,19 @@ class Calls(RuleBasedStateMachine):
         for step in data.draw(st.lists(st.sampled_from(self.steps), min_size=1, max_size=10)):
             if moving and self.related and not self.failed:
                 self.good(lambda i: i.write(motion(i.fmu, self.now)))
+                self.given, self.unsound = True, False
             self.do_step(step)
 
     def do_step(self, step: float) -> None:
         point = self.now + step if self.samples_at_the_start_of_a_step else self.now
         if self.failed:
             return
-        if self.samples_at_the_start_of_a_step and point == self.now:  # by rounding: takes no sample
+        if self.samples_at_the_start_of_a_step and point == self.now and not self.waiting:  # by rounding: no sample
             self.good(lambda i: i.step(point, step))
         elif self.sample(lambda i: i.step(point, step)):
             self.now += step
 
-    @precondition(lambda self: self.samples_at_the_start_of_a_step)
+    @precondition(lambda self: self.samples_at_the_start_of_a_step and not self.waiting)
     @in_phase("step")
     @rule()
     def step_at_the_same_time(self) -> None:
@@ -159,6 +174,15 @@ class Calls(RuleBasedStateMachine):
         low, high = self.inputs[name]
         value = data.draw(st.sampled_from([*self.extremes, low + share * (high - low)]))
         self.good(lambda i: i.write({name: value}))
+        self.given, self.unsound = True, self.unsound and name != next(iter(self.inputs))
+
+    @in_phase("instantiated", "initialization", "step")
+    @rule(data=st.data(), sure=st.integers(0, 2))
+    def set_bad_input(self, data: st.DataObject, sure: int) -> None:
+        if sure == 0:
+            value = data.draw(st.sampled_from(self.bad))
+            self.good(lambda i: i.write({next(iter(self.inputs)): value}))
+            self.given = self.unsound = True
 
     @precondition(lambda self: self.tunable)
     @in_phase("instantiated", "initialization", "step")
@@ -183,23 +207,25 @@ class Calls(RuleBasedStateMachine):
         status = self.tried.transfer("Get", kind, (c_uint * 1)(reference), (c_double * 3)(), 1)
         self.failed = status != OK
 
-    @precondition(lambda self: self.related and not (self.phase == "initialization" and self.impossible))
+    @precondition(lambda self: self.related and not (self.waiting and self.impossible))
     @in_phase("initialization", "step", "terminated")
     @rule()
     def derivative(self) -> None:
         arguments = good_arguments(self.tried, "GetDirectionalDerivative")
-        assert self.tried.call("GetDirectionalDerivative", *arguments) == OK
+        expected = WARNING if self.waiting and self.unsound else OK
+        assert self.tried.call("GetDirectionalDerivative", *arguments) == expected
 
     # --- states
 
     @in_phase("instantiated", "initialization", "step", "terminated")
     @rule()
     def save(self) -> None:
-        self.saved = self.tried.save(), self.phase, self.now, dict(self.pending)
+        inputs = self.waiting, self.given, self.unsound
+        self.saved = self.tried.save(), self.phase, self.now, dict(self.pending), inputs
 
     @rule()
     def restore(self) -> None:
-        data, self.phase, self.now, pending = self.saved
+        data, self.phase, self.now, pending, (self.waiting, self.given, self.unsound) = self.saved
         self.pending, self.failed = dict(pending), False
         self.good(lambda i: i.restore(data))
 
@@ -208,7 +234,7 @@ class Calls(RuleBasedStateMachine):
     @rule(data=st.data())
     def bad_call(self, data: st.DataObject) -> None:
         first = next(iter(self.inputs))
-        name = data.draw(st.sampled_from([*self.inputs, *self.tunable, *self.related, self.fixed[0]]))
+        name = data.draw(st.sampled_from([*self.tunable, *self.related, self.fixed[0]]))
         value, back = data.draw(st.sampled_from(self.bad)), data.draw(st.floats(1e-3, 1e9))
         step = data.draw(st.sampled_from([0.0, -0.0, -1e-3, *NO_NUMBERS]))
         damaged = bytearray(self.saved[0])
@@ -240,7 +266,7 @@ class Calls(RuleBasedStateMachine):
     @invariant()
     def outputs_are_the_numbers_of_the_twin(self) -> None:
         readable = hasattr(self, "tried") and self.phase != "instantiated" and not self.failed
-        if readable and not (self.phase == "initialization" and self.impossible):
+        if readable and not (self.waiting and (self.impossible or self.unsound)):
             shown = self.tried.outputs()
             assert all(map(math.isfinite, shown))
             assert bytes((ctypes.c_double * len(shown))(*shown)) == bytes(
@@ -265,6 +291,7 @@ class PlantCalls(Calls):
     bad = (*NO_NUMBERS, 1e5)
     steps = (1e-9, 1e-5, 1e-3, 1 / 60, 0.02)
     samples_at_the_start_of_a_step = False
+    needs_inputs = False
 
 
 def run(machine: type[Calls], fmu: UnpackedFmu, other: UnpackedFmu, examples: int) -> None:

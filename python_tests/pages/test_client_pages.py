@@ -63,6 +63,7 @@ def test_the_snippets_of_fmpy(folder: Path) -> None:
     np.testing.assert_allclose(found["of the recording"], torque, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found["torque"][:-1], torque, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(found["contact"][:-1], reference["contact"])
+    assert found["left_out"] == [40, 41, 42] and abs(found["latest"][0] - found["torque"][-1]) < 0.1  # it went on
     # the tunable parameter changed during the run, and the start value acted
     result = found["result"]
     assert result["contact"][result["time"] <= 0.5].any() and not result["contact"][result["time"] > 0.51].any()

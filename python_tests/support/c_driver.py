@@ -52,11 +52,11 @@ def arguments(fmu: UnpackedFmu, samples: Path) -> list[str | Path]:
     return [fmu.identifier.decode(), fmu.resources.decode(), samples]
 
 
-def rows(fmu: UnpackedFmu) -> list[list[float]]:
-    """Return the outputs of `moving`, after initialisation and after each step; driven from here."""
+def rows(fmu: UnpackedFmu, samples: Sequence[tuple[float, list[float]]] = ()) -> list[list[float]]:
+    """Return the outputs of samples, those of `moving`, after initialisation and after each step; driven from here."""
     found, names = [], fmu.names("input")
     with Instance(fmu) as instance:
-        for k, (time, inputs) in enumerate(moving(fmu)):
+        for k, (time, inputs) in enumerate(samples or moving(fmu)):
             values = dict(zip(names, inputs, strict=True))
             if k == 0:
                 instance.initialise(values, time)
@@ -66,10 +66,10 @@ def rows(fmu: UnpackedFmu) -> list[list[float]]:
     return found
 
 
-def printed(fmu: UnpackedFmu) -> list[str]:
-    """Return what the driver prints for `moving`."""
+def printed(fmu: UnpackedFmu, samples: Sequence[tuple[float, list[float]]] = ()) -> list[str]:
+    """Return what the driver prints for samples, those of `moving`."""
     numbers = len(fmu.names("output"))
     return [
         " ".join([*(struct.pack(">d", x).hex() for x in row[:numbers]), *(str(int(x)) for x in row[numbers:])])
-        for row in rows(fmu)
+        for row in rows(fmu, samples)
     ]

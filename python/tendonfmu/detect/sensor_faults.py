@@ -65,7 +65,7 @@ def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
     stand = max(_longest_stand(part, keys["force_resolution"]) for part in parts)
     if AMPLE * stand < LONGEST_STAND and all(_is_noisy(part.arrays["tendon_force"]) for part in parts):
         keys["longest_stand"] = float(f"{max(AMPLE * stand, keys['hold_time']):.3g}")
-    widest = WIDEST * min(float(part.mean_force.mean()) for part in parts)
+    widest = WIDEST * float(np.mean(np.concatenate([part.mean_force for part in parts])))
     while keys["spring_margin"] <= widest:
         if not finds_a_fault(data, parts, keys):
             return SensorRule(keys, largest, "")

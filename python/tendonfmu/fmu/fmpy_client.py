@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,6 +136,26 @@ def _description_of(path: Path, folder: Path) -> Any:
         raise InputError(f"{path}: {reason}; expected an FMU of `tendonfmu build`") from None
 
 
+def _samples_at_end(folder: Path) -> bool:
+    """Return whether a step of the FMU takes the sample at its end."""
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    places = (
+        "VendorAnnotations/Tool[@name='tendonfmu']/SampleAt",
+        "Annotations/Annotation[@type='tendonfmu.SampleAt']",
+    )
+    return "end" in {root.findtext(place) for place in places}
+
+
+def _steps(time: NDArray[np.float64], at_end: bool) -> Iterator[tuple[float, float]]:
+    """Yield begin and length (s) of the step that takes each sample; length 0: the initialisation has taken it."""
+    lengths = np.diff(time)
+    if not at_end:
+        yield from zip(time.tolist(), [*lengths.tolist(), lengths[-1] if len(lengths) else 1e-3], strict=True)
+        return
+    lengths += time[1:] - (time[:-1] + lengths)  # so that begin and length add up to the sample's own time
+    yield from zip(time[[0, *range(len(lengths))]].tolist(), [0.0, *lengths.tolist()], strict=True)
+
+
 class _Slave:
     """What instances of both versions of FMI have. fmpy raises bare exceptions when the FMU refuses a call."""
 
@@ -238,6 +259,7 @@ class _Run:
         self._parameters = parameters
         self._messages: list[str] = []
         description = _description_of(path, folder)
+        self._at_end = _samples_at_end(folder)
         slaves: dict[str, type[_Slave2 | _Slave3]] = {"2": _Slave2, "3": _Slave3}
         slave = slaves.get(str(description.fmiVersion).partition(".")[0])
         if slave is None or description.coSimulation is None:
@@ -354,23 +376,21 @@ class _Run:
                 references = [vr for group in of_kind for vr in group.references]
                 reading.append((slave.reader(kind, references, len(names)), _rows(table)))
                 columns |= {name: (kind, table[:, i]) for i, name in enumerate(names)}
-        times = recording.time.tolist()
-        steps = np.diff(recording.time).tolist()
-        steps.append(steps[-1] if steps else 1e-3)
 
         self._at = f"{recording.path}: row 1"
         write(inputs(0))
         slave.exit_initialisation()
-        for k, (time, step) in enumerate(zip(times, steps, strict=True)):
+        for k, (begin, length) in enumerate(_steps(recording.time, self._at_end)):
             self._at = f"{recording.path}: row {k + 1}"
             write(inputs(k))
-            slave.step(time, step)
+            if length:
+                slave.step(begin, length)
             for read, row in reading:
                 read(row(k))
             if progress and (k + 1) % 500 == 0:
                 progress(k + 1)
         if progress:
-            progress(len(times))
+            progress(len(recording))
         return {name: values.astype(bool) if kind == "Boolean" else values for name, (kind, values) in columns.items()}
 
 

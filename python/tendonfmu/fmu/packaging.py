@@ -84,11 +84,18 @@ def build_fmu(
     illustrated: bool = True,
     extra: Mapping[str, bytes] | None = None,
     fmi: int = 2,
+    at_end: bool = False,
     experiment: Mapping[str, float] | None = None,
 ) -> Path:
-    """Package the FMU of a finger description."""
-    # experiment: (s)
-    content = members(read_finger(finger), binaries=binaries, illustrated=illustrated, fmi=fmi, experiment=experiment)
+    """Package the FMU of a finger description. at_end: a step takes the sample at its end; experiment: (s)."""
+    content = members(
+        read_finger(finger),
+        binaries=binaries,
+        illustrated=illustrated,
+        fmi=fmi,
+        at_end=at_end,
+        experiment=experiment,
+    )
     archive = pack(content | dict(extra or {}))
     with whole_file(output_path) as file:
         file.write_bytes(archive)
@@ -106,9 +113,9 @@ def model_identifier(name: str) -> str:
     return identifier
 
 
-def guid(resource: bytes, table: VariableTable) -> str:
-    """Return the identifier that the binary expects."""
-    return native.image_guid(resource, variable_generator().salt(table.data))
+def guid(resource: bytes, table: VariableTable, *, at_end: bool = False) -> str:
+    """Return the identifier that the binary expects. at_end: a step takes the sample at its end."""
+    return native.image_guid(resource, (variable_generator().salt(table.data) + at_end) % 2**64)
 
 
 def members(
@@ -117,6 +124,7 @@ def members(
     binaries: Path | None = None,
     illustrated: bool = True,
     fmi: int = 2,
+    at_end: bool = False,
     experiment: Mapping[str, float] | None = None,
 ) -> dict[str, bytes]:
     """Return all files of the FMU."""
@@ -125,14 +133,17 @@ def members(
     version = VERSIONS[fmi]
     sources = _sources(version.sources)
     model = describe_model(description, table)
+    if at_end:
+        model["description"] += "; a step takes the sample at its end"
     if fmi == 3:
         model = in_arrays(model, table, group_sizes(len(description.data["joints"]), len(description.data["tendons"])))
     context: dict[str, Any] = {
         **model,
         **({"default_experiment": experiment} if experiment else {}),
         "fmi": fmi,
+        "sample_at": "end" if at_end else "begin",
         "model_identifier": identifier,
-        "guid": guid(description.image, table),
+        "guid": guid(description.image, table, at_end=at_end),
         "version": native.version(),
         "source_files": sources.pop("sources.txt").decode("ascii").split(),
     }

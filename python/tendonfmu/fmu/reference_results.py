@@ -66,15 +66,19 @@ class ReferenceRun:
     experiment: dict[str, float]  # `start`, `stop` and `step` (s), for the DefaultExperiment of the FMU
 
 
-def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False) -> ReferenceRun:
+def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False, at_end: bool = False) -> ReferenceRun:
     """Run a finger over a recording; inputs, outputs and tolerance become files."""
-    # arrays: as FMI 3.0 has them, the elements of a signal in one column
+    # arrays: as FMI 3.0 has them, the elements of a signal in one column; at_end: a step takes the sample at its end
     grid, step = _on_grid(finger, recording)
-    outputs = run_model(finger, grid)
-    # A client reads after fmi2DoStep(t, h), under the time t + h, what belongs to the sample at t; the first sample is
-    # taken by the initialisation.
+    # A client sets the inputs of t, calls fmi2DoStep(t, h) and reads under the time t + h. What it reads belongs to the
+    # sample at t; or these inputs are the sample at t + h. The first sample is taken by the initialisation.
     rows = np.maximum(np.arange(len(grid)) - 1, 0)
-    reference = {name: values if name == "time" else values[rows] for name, values in outputs.items()}
+    if at_end:
+        held = Recording(grid.path, grid.time, {name: values[rows] for name, values in grid.groups.items()})
+        reference = run_model(finger, held)
+    else:
+        outputs = run_model(finger, grid)
+        reference = {name: values if name == "time" else values[rows] for name, values in outputs.items()}
     name = model_identifier(finger.name)
     experiment = {"start": 0.0, "stop": float(grid.time[-1]), "step": step}
     inputs: Table = {"time": grid.time, **grid.groups}
@@ -98,7 +102,7 @@ def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False)
             _csv(reference if arrays else columns_of(reference)),
             "result",
             "text/csv",
-            "Reference results: all outputs",
+            "Reference results: all outputs" + "; a step takes the sample at its end" * at_end,
         ),
         Related(
             f"{name}_ref.opt",
@@ -212,7 +216,8 @@ def _note(related: Sequence[Related]) -> str:
     files = "".join(f"  {file.name}: {file.description}\n" for file in related)
     rows = (
         "The rows of the results are those of a client that calls fmi2DoStep(t, h), reads the outputs, and writes\n"
-        "them under the time t + h: the outputs belong to the sample at t. The first sample is in the first two rows.\n"
+        "them under the time t + h: the outputs belong to the inputs of t. Those of the first inputs are in the first\n"
+        "two rows.\n"
         "An output agrees if |result - reference| <= RelTol * max |reference| + AbsTol in every row.\n"
     )
     return f"Files in {FOLDER}:\n\n{files}\n" + (rows if any(file.role == "result" for file in related) else "")

@@ -26,6 +26,7 @@ def build(
     ssv: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     binaries: str | os.PathLike[str] | None = None,
     fmi: int = 2,
+    sample_at: str = "begin",
 ) -> Path:
     """Pack a co-simulation FMU, of FMI 2.0 or 3.0. Needs no compiler; the same input gives the same bytes.
 
@@ -46,6 +47,9 @@ def build(
         Folder of binaries by FMI platform. None: those installed.
     fmi
         Version of FMI: 2, or 3 for a finger. With 3, forces, positions and torques are arrays.
+    sample_at
+        Time of the sample that a step of the FMU takes of the inputs as they stand: its "begin", or its "end", for
+        masters that hand over the inputs of a step's end. A rig has "begin" alone.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def build(
     ------
     InputError
         The description, the recording or a parameter set is refused, binaries are missing, the output cannot be
-        written or does not end in .fmu, or `fmi` is 3 with a rig.
+        written or does not end in .fmu, or `fmi` is 3 or `sample_at` "end" with a rig.
 
     Warns
     -----
@@ -73,7 +77,7 @@ def build(
 
         file = finger_file(finger)
         if is_rig(file):
-            return _build_plant(file, target, folder, others, options.fmi, alone=reference is None and not sets)
+            return _build_plant(file, target, folder, others, options, alone=reference is None and not sets)
         others.insert(0, file)
     check_output(target, *others)
     _check_suffix(target)
@@ -81,20 +85,23 @@ def build(
     files: dict[str, bytes] = {}
     experiment = None
     if reference is not None or sets:
-        files, experiment, doubts = _related(model, reference, sets, options.fmi)
+        files, experiment, doubts = _related(model, reference, sets, options)
         for sentence in doubts:
             warnings.warn(sentence, InputWarning, stacklevel=2)  # at the call of tendonfmu.build
-    return build_fmu(model, target, binaries=folder, extra=files, fmi=options.fmi, experiment=experiment)
+    at_end = options.sample_at == "end"
+    return build_fmu(model, target, binaries=folder, extra=files, fmi=options.fmi, at_end=at_end, experiment=experiment)
 
 
 def _build_plant(
-    rig: Path, target: Path, binaries: Path | None, others: Sequence[Path], fmi: int, *, alone: bool
+    rig: Path, target: Path, binaries: Path | None, others: Sequence[Path], options: BuildOptions, *, alone: bool
 ) -> Path:
     from tendonfmu.simulate import build_plant_fmu, read_rig
 
     check_output(target, *read_rig(rig).files, *others)
-    if fmi != 2:
-        raise InputError(f"fmi = {fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
+    if options.fmi != 2:
+        raise InputError(f"fmi = {options.fmi}: the simulated finger of a rig is an FMI 2.0 FMU; expected 2")
+    if options.sample_at != "begin":
+        raise InputError(f"{rig}: a rig, whose outputs are those of a step's end; expected sample_at = 'begin'")
     if not alone:
         raise InputError(f"{rig}: a rig; expected a finger description with a reference or parameter sets")
     _check_suffix(target)
@@ -107,7 +114,7 @@ def _check_suffix(output: Path) -> None:
 
 
 def _related(
-    finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], fmi: int
+    finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], options: BuildOptions
 ) -> tuple[dict[str, bytes], dict[str, float] | None, list[str]]:
     """Return files and experiment of a recording and parameter sets, and a sentence for each doubt about them."""
     # what reads recordings is imported here: most FMUs are packed without one
@@ -118,7 +125,7 @@ def _related(
     if reference is None:
         return related_members(files), None, []
     recording = read_recording(reference)
-    run = reference_run(finger, recording, arrays=fmi == 3)
+    run = reference_run(finger, recording, arrays=options.fmi == 3, at_end=options.sample_at == "end")
     doubts = [finding.line() for finding in belongs(finger, [recording]) if finding.severity == "error"]
     rows, invented = bridged_rows(recording)
     if invented:

@@ -59,6 +59,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "guid": guid(text, table),
         "version": native.version(),
         "source_files": [],
+        "sample_at": "begin",
     }
     page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
     pictures, icon = draw_pictures(rig.finger)
