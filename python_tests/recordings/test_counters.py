@@ -105,6 +105,8 @@ def test_a_timer_that_overflows_is_named_and_never_sorted(tmp_path: Path, bits: 
 def test_a_clock_that_is_set_back_is_no_overflow() -> None:
     assert overflow(np.array([100.0, 101.0, 102.0, 50.0, 51.0])) is None
     assert overflow(np.arange(9.0)) is None
+    assert overflow(np.random.default_rng(5).permutation(np.arange(0.0, 1000.0, 5.0))) is None  # shuffled
+    assert overflow(np.arange(0, 4000, 4) % 1000) == 1000.0  # milliseconds beyond a second
     assert unwrapped(np.array([1, 3, 0, 2]), 4.0, 0.0).tolist() == [1.0, -1.0, 0.0, -2.0]
 
 

@@ -20,6 +20,7 @@ DECIMAL = [float(digits * 10**k) for k in range(4) for digits in (1000, 2000, 24
 TURNS = np.array([2.0 * np.pi, *(2.0**k for k in range(7, 33)), *(360.0 * 10**k for k in range(4)), *DECIMAL])
 # a counter of 16, 24, 31 or 32 bits, and one of 32 bits in ms or µs written in coarser units; a day in s, ms and ns
 OVERFLOWS = (2.0**16, 2.0**24, 2.0**31, 2.0**32, 2.0**32 / 1e3, 2.0**32 / 1e6, 86400.0, 86400e3, 86400e9)
+FRACTIONS = (1e3, 1e6, 1e9)  # ms, µs and ns beyond a second, which start again many times
 
 
 def unwrapped(readings: NDArray[Any], wrap: float, last: float) -> NDArray[np.float64]:
@@ -37,10 +38,11 @@ def overflow(times: NDArray[Any]) -> float | None:
     rises = steps[steps > 0.0]
     if not len(falls) or not len(rises):
         return None
-    usual = float(np.median(rises))
-    for word in OVERFLOWS:
+    beyond = max(10.0 * float(np.median(rises)), 1.0)  # a step over the end may be longer than the usual ones
+    for word in (*OVERFLOWS, *(FRACTIONS if len(falls) > 1 else ())):
         over = word + steps[falls]
-        if (times <= word).all() and (over >= 0.0).all() and (over < max(10.0 * usual, 1.0)).all():
+        is_over = (over >= 0.0).all() and (over < beyond).all() and beyond < 0.1 * word
+        if is_over and (times <= word).all():
             return word
     return None
 

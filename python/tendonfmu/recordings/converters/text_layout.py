@@ -78,7 +78,10 @@ def fields_of(line: str, separator: str) -> list[str]:
 
 def number_of(text: str, decimal: str, thousands: str = "") -> tuple[float, str] | None:
     """Return the number in a cell and its unit, NaN for a missing one, or None if there is none."""
-    plain = text.strip().strip("[](){}").strip()
+    plain = text.strip()
+    if plain[:1] == "(" and plain[-1:] == ")":  # of accountants: a negative number
+        return None
+    plain = plain.strip("[](){}").strip()
     lower = plain.lower()
     if lower in FLAGS:
         return FLAGS[lower], ""
@@ -144,22 +147,20 @@ def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
     return found.layout(given)
 
 
+@dataclass
 class _Lines:
     """The first lines of a log."""
 
-    def __init__(
-        self,
-        file: Path,
-        content: list[tuple[int, str]],
-        rows: list[tuple[int, list[str]]],
-        separator: str,
-        decimal: str,
-        thousands: str,
-        log: LogFormat,
-    ) -> None:
-        self.file, self.content, self.rows, self.log = file, content, rows, log
-        self.separator, self.decimal, self.thousands = separator, decimal, thousands
-        last = rows[-LAST:]
+    file: Path
+    content: list[tuple[int, str]]  # their numbers, and those that are not empty
+    rows: list[tuple[int, list[str]]]  # the cells of those that are no comments
+    separator: str
+    decimal: str
+    thousands: str
+    log: LogFormat
+
+    def __post_init__(self) -> None:
+        last = self.rows[-LAST:]
         self.width = Counter(len(row) for _, row in last).most_common(1)[0][0] if last else 0
         self.even = [row for _, row in last if len(row) == self.width]
         # columns with numbers in most of the last lines
