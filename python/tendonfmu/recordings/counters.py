@@ -41,9 +41,9 @@ def overflow(times: NDArray[Any]) -> float | None:
     beyond = max(10.0 * float(np.median(rises)), 1.0)  # a step over the end may be longer than the usual ones
     for word in (*OVERFLOWS, *(FRACTIONS if len(falls) > 1 else ())):
         over = word + steps[falls]
-        is_over = (over >= 0.0).all() and (over < beyond).all() and beyond < 0.1 * word
+        is_over = (over >= 0.0).all() and (over < beyond).all() and beyond < 0.5 * word
         if is_over and (times <= word).all():
-            return word
+            return float(word)
     return None
 
 

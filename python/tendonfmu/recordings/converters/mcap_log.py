@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
+import io
 import json
+import struct
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +18,7 @@ from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.messages import Decoder, MessageLog, Received, Ros2Types
 
 MAGIC = b"\x89MCAP0\r\n"
+CHUNK_CODE, CHUNK = 0x06, struct.Struct("<BQQQQII")  # code, length, times, size, checksum, length of a name
 RECORDS = ("Schema", "Channel", "Message")
 LARGEST = 1 << 32  # bytes of a record
 
@@ -82,8 +87,10 @@ class McapRecords:
             if raw.read(len(MAGIC)) != MAGIC:
                 raise InputError(f"{self.file}: not an MCAP file; expected one that begins with its mark")
             reader = stream.StreamReader(raw, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST)
+            at = raw.tell()
             try:
                 for record in reader.records:
+                    at = raw.tell()
                     kind = type(record).__name__
                     if kind == "DataEnd":
                         return
@@ -95,5 +102,21 @@ class McapRecords:
                 raise InputError(f"{self.file}: {error}; expected compression by zstd, lz4 or none") from None
             except errors.EndOfFile:
                 self.cut = "the file is cut off"
+                raw.seek(at)
+                with suppress(Exception):  # of what is left of the last chunk, all errors mean its end
+                    for record in stream.StreamReader(_begin_of_chunk(raw.read()), skip_magic=True).records:
+                        if type(record).__name__ in RECORDS:
+                            yield record
             except Exception as error:  # of zstd, lz4, checksums and records
                 self.cut = f"a block is damaged ({error})"
+
+
+def _begin_of_chunk(record: bytes) -> io.BytesIO:
+    """Return the records in a chunk that is cut off: its compression is a stream."""
+    opcode, _, _, _, _, _, length = CHUNK.unpack_from(record)
+    compression, data = record[CHUNK.size :][:length], record[CHUNK.size + length + 8 :]
+    if compression:
+        module = importlib.import_module("zstandard" if compression == b"zstd" else "lz4.frame")
+        stream = module.ZstdDecompressor().decompressobj() if compression == b"zstd" else module.LZ4FrameDecompressor()
+        data = stream.decompress(data)
+    return io.BytesIO(data if opcode == CHUNK_CODE else b"")

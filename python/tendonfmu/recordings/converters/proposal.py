@@ -297,7 +297,7 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     topic = beside[0] if beside else next(with_clock, inspection.topics[0])
     clock = topic.clock
     if clock is None:
-        return _undecided("time", "no field looks like a time")
+        return _undecided("time", 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place')
     summary = next(summary for summary in topic.fields if summary.field.name == clock.name)
     faults = ""
     if clock.backwards or clock.repeated:
