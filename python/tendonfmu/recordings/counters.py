@@ -47,11 +47,13 @@ def overflow(times: NDArray[Any]) -> float | None:
     return None
 
 
-def wrap_of(column: Numbers) -> float | None:
-    """Return the readings after which a word or encoder [N] starts again, in the column's unit, or None."""
+def wrap_of(column: Numbers, turns: bool = True) -> float | None:
+    """Return the readings after which a word, or with turns an encoder, [N] starts again, in its unit, or None."""
     step = finest(column)
     steps = _word(column, step) if step else None
-    return _turn(column, step) if steps is None else steps * step
+    if steps is None:
+        return _turn(column, step) if turns else None
+    return steps * step
 
 
 def finest(column: Numbers) -> float:
@@ -100,4 +102,7 @@ def _turn(column: Numbers, finest_step: float) -> float | None:
     units = [1.0, finest_step] if finest_step else [1.0]
     sizes = np.concatenate([TURNS * unit for unit in units])
     fitting = sizes[(sizes >= span * (1.0 - 1e-9)) & (np.abs(sizes / size - 1.0) < SAME)]
-    return float(fitting[np.argmin(np.abs(fitting - size))]) if len(fitting) else None
+    if len(fitting):
+        return float(fitting[np.argmin(np.abs(fitting - size))])
+    usual = float(f"{span + finest_step:.3g}")  # an encoder of another number of steps, which has been all around
+    return usual if len(jumps) > 2 and usual >= span and abs(usual / size - 1.0) < SAME else None

@@ -53,7 +53,7 @@ def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
     groups = {name: recording.groups[name] for name in UNITS if name in recording.groups}
     for name, values in groups.items():
         for k, column in enumerate(values.T):
-            if (word := wrap_of(column)) is not None:
+            if (word := wrap_of(column, name.endswith("position"))) is not None:
                 yield Trap("wrapped", (f"{name}[{k + 1}]",), word / (finest(column) or 1.0))
     yield from _filled(recording.time, groups)
     yield from _slow(recording.time, groups)

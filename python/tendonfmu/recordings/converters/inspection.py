@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,7 @@ from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps
 CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
+EFFORT = re.compile("force|tension|load|torque|effort|current|tau|amp")  # what jumps by sticking, not by turning
 SAMPLE = 2000  # values of a field that are kept
 TOGETHER = 0.5  # correlation with a signal from which a field may be one
 DRIFT = 3e-6, 1e-3  # of two clocks; less is rounding, and more is no second clock
@@ -68,7 +70,7 @@ class FieldSummary:
         if len(finite):
             if self.count == len(values):
                 self.first = float(finite[0])
-            self.wrap = self.wrap or wrap_of(finite.astype(np.float64))
+            self.wrap = self.wrap or wrap_of(finite.astype(np.float64), not EFFORT.search(self.field.name.lower()))
             self.rising = self.rising and bool((np.diff(finite) > 0).all()) and float(finite[0]) > self.last
             self.last = float(finite[-1])
             self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))

@@ -44,6 +44,7 @@ from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
 NO_SIGN = 0.02  # of the largest torque: the smallest of a magnitude
+WORDS = (2.0**8, 2.0**16, 2.0**32)  # after which signed numbers stored as unsigned start again
 LONGEST_NAME = 40  # characters in a table
 QUANTITY = {
     "tendon_force": "force",
@@ -288,7 +289,8 @@ def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary
     if summary.missing:
         values = f"{summary.missing} of {counted(summary.count, 'value')} {are(summary.missing)} missing"
         why += f'; {values}: see "missing" in "log"'
-    return Line(column, source, guess.unit, sure, why, summary.wrap)
+    wrap = summary.wrap if QUANTITY[group] in ("length", "angle") or (summary.wrap or 0.0) in WORDS else None
+    return Line(column, source, guess.unit, sure, why, wrap)
 
 
 def _time(inspection: Inspection, beside: Member | None) -> Line:
@@ -297,7 +299,9 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     topic = beside[0] if beside else next(with_clock, inspection.topics[0])
     clock = topic.clock
     if clock is None:
-        return _undecided("time", 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place')
+        return _undecided(
+            "time", 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place'
+        )
     summary = next(summary for summary in topic.fields if summary.field.name == clock.name)
     faults = ""
     if clock.backwards or clock.repeated:
