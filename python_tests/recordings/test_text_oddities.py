@@ -136,6 +136,17 @@ def test_names_in_each_cell_are_refused(tmp_path: Path, pair: str) -> None:
             inspected(tmp_path, joined(rows, separator))
 
 
+def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"3 names and 6 fields in a row between commas.*decimal points"):
+        inspected(tmp_path, joined([PLAIN]) + joined(CELLS).replace(".", "\0").replace("\0", ","))
+
+
+def test_numbers_as_names_are_no_row(tmp_path: Path) -> None:
+    for names in (["0", "1", "2"], ["1", "2", "3"]):
+        fields = inspected(tmp_path, joined([names, *CELLS])).topics[0].fields
+        assert [(part.field.name, part.count) for part in fields] == [(name, ROWS) for name in names]
+
+
 def test_a_faulty_first_row_is_not_passed_over(tmp_path: Path) -> None:
     rows = [["0.0", "OVERLOAD", "1.0"], *CELLS[1:]]
     assert inspected(tmp_path, joined([NAMES, *rows])).topics[0].fields[1].missing == 1

@@ -181,6 +181,7 @@ class _Lines:
             self.refuse_texts()
         at = None if self.log.header is False else self.names_at(first, given)
         if at is None:
+            self.refuse_other_names(first or 0)
             start = first if first is not None and self.log.skip is None else (self.rows or self.content)[0][0]
             names = [str(i) for i in range(1, self.width + 1)]
             return self.made(start, names, [], start if self.log.skip is None and start else given, False, False)
@@ -238,6 +239,9 @@ class _Lines:
         """Return the index in `content` of the line of names, or None: the one above the rows with most names."""
         if self.log.skip is not None:
             return 0 if self.log.header or not self.has_number(self.content[0][1]) else None
+        top = fields_of(self.content[0][1], self.separator)
+        if len(top) > 2 and top in (list(map(str, range(self.width))), list(map(str, range(1, self.width + 1)))):
+            return 0  # columns that pandas or Excel has numbered
         before = [line for k, line in self.content if first is None or k < first]
         best, most = None, 0
         for at, line in reversed(list(enumerate(before))):
@@ -264,6 +268,15 @@ class _Lines:
             return False
         known = [re.fullmatch(r"[\[(].*[\])]|-", field) or quantity(field) for field in filled]
         return sum(map(bool, known)) * 2 > len(filled)
+
+    def refuse_other_names(self, first: int) -> None:
+        """Raise InputError if the line above the rows has half as many names as they have fields."""
+        names = next((row for k, row in reversed(self.rows) if k < first), [])
+        if self.separator == "," and len(names) > 1 and len(names) * 2 == self.width:
+            raise InputError(
+                f"{self.file}: {len(names)} names and {self.width} fields in a row between commas, as of numbers with "
+                "decimal commas; write the log with ; between its fields, or with decimal points"
+            )
 
     def refuse_texts(self) -> None:
         """Raise InputError: no column has numbers."""
