@@ -66,6 +66,10 @@ READ: dict[str, str] = {
     "names, units, types": joined([["time", "force", "spool"], UNITS, ["float64"] * 3, *CELLS]),
     "LabVIEW": LVM
     + joined([["X_Value", "force", "spool", "Comment"], *([*r, ""] for r in CELLS)], "\t").replace(".", ","),
+    "LabVIEW, a time for each channel": LVM
+    + joined(
+        [["X_Value", "force", "X_Value", "spool", "Comment"], *([t, f, t, x, ""] for t, f, x in CELLS)], "\t"
+    ).replace(".", ","),
 }
 
 
@@ -76,7 +80,7 @@ def inspected(folder: Path, text: str, name: str = "log.csv") -> Inspection:
 
 @pytest.mark.parametrize("oddity", READ)
 def test_every_row_is_read(tmp_path: Path, oddity: str) -> None:
-    inspection = inspected(tmp_path, READ[oddity], "log.lvm" if oddity == "LabVIEW" else "log.csv")
+    inspection = inspected(tmp_path, READ[oddity], "log.lvm" if "LabVIEW" in oddity else "log.csv")
     proposal = propose(inspection)
     VALIDATOR.validate(proposal.document)
     (tmp_path / "map.json").write_text(json.dumps(proposal.document), encoding="utf-8")
@@ -145,6 +149,12 @@ def test_numbers_as_names_are_no_row(tmp_path: Path) -> None:
     for names in (["0", "1", "2"], ["1", "2", "3"]):
         fields = inspected(tmp_path, joined([names, *CELLS])).topics[0].fields
         assert [(part.field.name, part.count) for part in fields] == [(name, ROWS) for name in names]
+
+
+def test_labview_without_times_wants_a_rate(tmp_path: Path) -> None:
+    text = LVM + joined([["X_Value", "force", "spool"], *(["", *row[1:]] for row in CELLS)], "\t").replace(".", ",")
+    time = propose(inspected(tmp_path, text, "log.lvm")).lines[0]
+    assert (time.source, time.unit) == ("?", "?") and '{"rate": HZ}' in time.why
 
 
 def test_a_faulty_first_row_is_not_passed_over(tmp_path: Path) -> None:

@@ -298,11 +298,11 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     with_clock = (topic for topic in inspection.topics if topic.clock)
     topic = beside[0] if beside else next(with_clock, inspection.topics[0])
     clock = topic.clock
-    if clock is None:
-        return _undecided(
-            "time", 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place'
-        )
-    summary = next(summary for summary in topic.fields if summary.field.name == clock.name)
+    named = next((summary for summary in topic.fields if clock and summary.field.name == clock.name), None)
+    if clock is None or named is None or named.count == named.missing:
+        advice = 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place'
+        return _undecided("time", advice)
+    summary = named
     faults = ""
     if clock.backwards or clock.repeated:
         faults = (

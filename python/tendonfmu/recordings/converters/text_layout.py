@@ -23,6 +23,7 @@ from tendonfmu.recordings.converters.units import quantity
 COMMENTS = ("#", "%", "//")
 FLAGS = {"true": 1.0, "false": 0.0}
 MISSING = ("", "nan", "na", "n/a", "null", "none", "#n/a", "-nan", "<na>", "nat", "--", "---")  # in lower case
+END_OF_HEADER = "***End_of_Header***"  # of LabVIEW
 LAST = 50  # lines of the sample in which the columns of numbers are found
 
 _NO_NUMBER = re.compile(r"[+-]?(1\.#(ind|qnan|snan|nan)\d*|nan\(.*\))")
@@ -133,7 +134,8 @@ def _uncommented(line: str) -> str:
 
 def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
     """Return how a log is written. Raise InputError if no column has numbers, or names and rows do not fit."""
-    given = log.skip or 0
+    ends = [k for k, line in enumerate(lines) if line.startswith(END_OF_HEADER)][:2]  # of the file, and of its channels
+    given = log.skip if log.skip is not None else ends[-1] + 1 if ends else 0
     content = [(k, line) for k, line in enumerate(lines) if k >= given and line.strip()]
     if not content:
         raise InputError(f"{file}: no line after the {given} that the map skips; expected a line of names")
@@ -143,7 +145,8 @@ def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
     last = [row for _, row in rows[-LAST:]]
     decimal = log.decimal or _decimal(last)
     thousands = log.thousands if log.thousands is not None else _thousands(last, decimal)
-    found = _Lines(file, content, rows, separator, decimal, thousands, log)
+    labels = next((fields_of(line, separator)[1:] for line in lines if line.startswith("Y_Unit_Label")), [])
+    found = _Lines(file, content, rows, separator, decimal, thousands, labels, log)
     return found.layout(given)
 
 
@@ -157,6 +160,7 @@ class _Lines:
     separator: str
     decimal: str
     thousands: str
+    labels: list[str]  # units of the channels in the header of LabVIEW
     log: LogFormat
 
     def __post_init__(self) -> None:
@@ -209,20 +213,22 @@ class _Lines:
             self.thousands,
             start,
             names,
-            units or self.stated_units(len(names)),
+            units or self.stated_units(names),
             skip,
             header,
             has_units,
             max(self.width, len(names)),
         )
 
-    def stated_units(self, count: int) -> list[str]:
+    def stated_units(self, names: list[str]) -> list[str]:
         """Return the units in the header of LabVIEW or in the cells; none if there are none."""
-        labels = next((row for _, row in self.rows if row[0] == "Y_Unit_Label"), [])
         cells = [next((row[k] for row in self.even if not is_missing(row[k])), "") for k in range(self.width)]
         numbers = [number_of(cell, self.decimal, self.thousands) for cell in cells]
-        units = ["s", *labels[1:]] if labels else [number[1] if number else "" for number in numbers]
-        return (units + [""] * count)[:count] if any(units) else []
+        labels = iter(self.labels)
+        units = [number[1] if number else "" for number in numbers]
+        if self.labels:
+            units = ["s" if name == "X_Value" else next(labels, "") for name in names]
+        return (units + [""] * len(names))[: len(names)] if any(units) else []
 
     def fitted(self, names: list[str]) -> list[str]:
         """Return a name for each column: rows may end in a separator, or begin with a number that has no name."""

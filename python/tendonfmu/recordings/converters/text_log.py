@@ -91,7 +91,7 @@ def _numbers_of_lists(cells: Sequence[str | None]) -> Any:
 def _pairs(fields: list[Field]) -> list[Topic]:
     """Return a topic for each channel if they come as pairs of a time and a value, otherwise one of all fields."""
     times, values = fields[::2], fields[1::2]
-    are_clocks = all(CLOCK.search(field.name.lower()) and field.kind == NUMBER for field in times)
+    are_clocks = all(CLOCK.search(field.name.lower()) for field in times)
     if len(values) < 2 or len(times) != len(values) or not are_clocks or any(CLOCK.search(f.name) for f in values):
         return [Topic("", tuple(fields))]
     topics, names = [], [value.name for value in values]
@@ -269,8 +269,16 @@ class TextLog:
         for topic in self.topics:
             if part := {name: block[name] for name in wanted.get(topic.name, ())}:
                 # the shorter of the channels end before the last row
-                there = np.isfinite(part.get(topic.fields[0].name, np.zeros(len(next(iter(part.values()))))))
-                yield topic.name, {name: values[there] for name, values in part.items()}
+                clock = part.get(topic.fields[0].name, np.zeros(len(next(iter(part.values())))))
+                is_number = isinstance(clock, np.ndarray)
+                there = np.isfinite(clock) if is_number else np.array([bool(text) for text in clock.to_pylist()])
+                yield (
+                    topic.name,
+                    {
+                        name: values[there] if isinstance(values, np.ndarray) else values.filter(pa.array(there))
+                        for name, values in part.items()
+                    },
+                )
 
     def _parse_fast(
         self, text: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]
