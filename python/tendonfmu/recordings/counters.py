@@ -49,6 +49,8 @@ def overflow(times: NDArray[Any]) -> float | None:
 
 def wrap_of(column: Numbers, turns: bool = True) -> float | None:
     """Return the readings after which a word, or with turns an encoder, [N] starts again, in its unit, or None."""
+    if len(column) < 3 or not np.abs(np.diff(column)).max() > 0.5 * np.ptp(column):
+        return None  # a counter jumps by nearly its range
     step = finest(column)
     steps = _word(column, step) if step else None
     if steps is None:

@@ -183,42 +183,31 @@ class _Lines:
         first = next((k for k, row in self.rows if self.is_row(row)), None)
         if first is None and not self.numeric:
             self.refuse_texts()
-        at = None if self.log.header is False else self.names_at(first, given)
+        at = None if self.log.header is False else self.names_at(first)
+        units: list[str] = []
+        has_units = False
         if at is None:
             self.refuse_other_names(first or 0)
             start = first if first is not None and self.log.skip is None else (self.rows or self.content)[0][0]
-            names = [str(i) for i in range(1, self.width + 1)]
-            return self.made(start, names, [], start if self.log.skip is None and start else given, False, False)
-        number, line = self.content[at]
-        names = fields_of(_uncommented(line), self.separator)
-        below = [(k, row) for k, row in self.rows if k > number]
-        units: list[str] = []
-        has_units = bool(below) and self.is_units(below[0][1], len(names))
-        if below and self.log.units_row is not None:
-            has_units = self.log.units_row
-        if has_units:
-            units = [unit.strip(" []()") for unit in below.pop(0)[1]]
-        # a line with a number in a column of numbers is a row, if a faulty one: it is refused by name, not passed over
-        after = self.content[-1][0] + 1
-        start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), after)
-        return self.made(start, self.fitted(names), units, number, True, has_units)
+            names, number = [str(i) for i in range(1, self.width + 1)], start if self.log.skip is None else given
+        else:
+            number, line = self.content[at]
+            names = self.fitted(fields_of(_uncommented(line), self.separator))
+            below = [(k, row) for k, row in self.rows if k > number]
+            if below:
+                is_units = self.is_units(below[0][1], len(names))
+                has_units = is_units if self.log.units_row is None else self.log.units_row
+            if has_units:
+                units = [unit.strip(" []()") for unit in below.pop(0)[1]]
+            # a line with a number in a column of numbers is a row, if a faulty one: it is refused, not passed over
+            after = self.content[-1][0] + 1
+            start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), after)
+        units = units or self.stated_units(names)
+        marks = self.separator, self.decimal, self.thousands
+        return Layout(*marks, start, names, units, number, at is not None, has_units, max(self.width, len(names)))
 
     def has_some(self, row: Sequence[str]) -> bool:
         return any(self.is_number(row[k]) for k in self.numeric)
-
-    def made(self, start: int, names: list[str], units: list[str], skip: int, header: bool, has_units: bool) -> Layout:
-        return Layout(
-            self.separator,
-            self.decimal,
-            self.thousands,
-            start,
-            names,
-            units or self.stated_units(names),
-            skip,
-            header,
-            has_units,
-            max(self.width, len(names)),
-        )
 
     def stated_units(self, names: list[str]) -> list[str]:
         """Return the units in the header of LabVIEW or in the cells; none if there are none."""
@@ -241,7 +230,7 @@ class _Lines:
                 return ["time", *names]
         return names
 
-    def names_at(self, first: int | None, given: int) -> int | None:
+    def names_at(self, first: int | None) -> int | None:
         """Return the index in `content` of the line of names, or None: the one above the rows with most names."""
         if self.log.skip is not None:
             return 0 if self.log.header or not self.has_number(self.content[0][1]) else None
