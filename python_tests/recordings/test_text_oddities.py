@@ -49,6 +49,7 @@ LVM = (
 READ: dict[str, str] = {
     "quoted decimal commas": table(lambda cell: f'"{cell}"'.replace(".", ",")),
     "rows end in a separator": joined([NAMES, *([*row, ""] for row in CELLS)]),
+    "the first row ends in a separator": joined([NAMES, [*CELLS[0], ""], *CELLS[1:]]),
     "names and rows end in a separator": joined([[*NAMES, ""], *([*row, ""] for row in CELLS)]),
     "names without that of the index": joined([NAMES, *([str(k), *row] for k, row in enumerate(CELLS))]),
     "carriage returns alone": joined([NAMES, *CELLS], end="\r"),
@@ -91,6 +92,7 @@ def test_every_row_is_read(tmp_path: Path, oddity: str) -> None:
 
 
 FAULTY = {
+    "a dash": ("-", "no number"),
     "1.#IND": ("-1.#IND", "no number"),
     "nan(ind)": ("-nan(ind)", "no number"),
     "a word": ("OVERLOAD", "'OVERLOAD'; expected a finite number"),

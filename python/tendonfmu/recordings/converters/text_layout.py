@@ -22,7 +22,7 @@ from tendonfmu.recordings.converters.units import quantity
 
 COMMENTS = ("#", "%", "//")
 FLAGS = {"true": 1.0, "false": 0.0}
-MISSING = ("", "nan", "na", "n/a", "null", "none", "#n/a", "-nan", "<na>", "nat", "--", "---")  # in lower case
+MISSING = ("", "nan", "na", "n/a", "null", "none", "#n/a", "-nan", "<na>", "nat", "-", "--", "---")  # in lower case
 END_OF_HEADER = "***End_of_Header***"  # of LabVIEW
 LAST = 50  # lines of the sample in which the columns of numbers are found
 
@@ -199,9 +199,9 @@ class _Lines:
                 has_units = is_units if self.log.units_row is None else self.log.units_row
             if has_units:
                 units = [unit.strip(" []()") for unit in below.pop(0)[1]]
-            # a line with a number in a column of numbers is a row, if a faulty one: it is refused, not passed over
+            # a line with numbers is a row, if a faulty one: it is refused, not passed over
             after = self.content[-1][0] + 1
-            start = next((k for k, row in below if len(row) == self.width and self.has_some(row)), after)
+            start = next((k for k, row in below if any(map(self.is_number, row))), after)
         units = units or self.stated_units(names)
         marks = self.separator, self.decimal, self.thousands
         return Layout(*marks, start, names, units, number, at is not None, has_units, max(self.width, len(names)))

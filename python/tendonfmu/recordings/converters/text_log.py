@@ -365,6 +365,8 @@ class TextLog:
     def _cells(self, line: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]) -> list[Any] | str:
         """Return the wanted cells of a line, or what is wrong with it: column, NUL and problem."""
         layout, fields = self.layout, fields_of(line, self.layout.separator)
+        if len(fields) == layout.width + 1 and not fields[-1]:
+            fields.pop()  # some rows end in a separator
         if len(fields) != layout.width:
             return (
                 f"\0{counted(len(fields), 'field')} between {layout.separator!r}; expected {layout.width}, as in the "
