@@ -82,6 +82,7 @@ PARTS = {
     "wire data": _file("the manipulator pulled by wires", DATA / "wire", RECORDINGS),
     "so101 data": _file("the servo arm SO-101", DATA / "so101", RECORDINGS),
     "foreign data": _file("recordings of foreign fingers", DATA.parent / "foreign", RECORDINGS),
+    "cases": _file("logs of public reports", DATA.parent / "cases", RECORDINGS),
     "browser": _program("pages in a browser", "Debian: chromium", *BROWSERS),
     "pkg-config": _program("the libraries as pkg-config offers them", "Debian: pkg-config", "pkg-config"),
     "valgrind": _program("memory as valgrind sees it", "Debian: valgrind", "valgrind"),
