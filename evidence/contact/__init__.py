@@ -55,8 +55,8 @@ def scored(folder: Path, take: hand.Take, alarm: Flags) -> Row:
 
 
 def free_rms(folder: Path) -> dict[float, Numbers]:
-    """[n] N·m by pretension, of the fitted finger's residual before the bias update, without any detection."""
-    finger = hand.fitted(folder)
+    """[n] N·m by pretension, of the calibrated finger's residual before the bias update, without any detection."""
+    finger = hand.calibrated()
     squares: dict[float, list[Numbers]] = {}
     for take in hand.takes("free"):
         inputs = hand.recording(folder, take).arrays()
