@@ -5,7 +5,6 @@ What is there is not made again.
 
 from __future__ import annotations
 
-import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,20 +13,18 @@ from typing import Any
 import numpy as np
 
 import tendonfmu as tf
-from evidence.cases import EXAMPLES, INDEX_FINGER, INDEX_RIG, write
+from evidence.cases import EXAMPLES, INDEX_RIG, write
 from tendonfmu.arrays import Numbers
 from tendonfmu.files import read_table, write_table
+from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import read_recording
 from tendonfmu.simulate import read_rig, simulate
 
-sys.path.insert(0, str(EXAMPLES / "rigs"))
-from virtual_hand import TRAINING, record
-
-PRETENSIONS = (10.0, 20.0, 40.0)  # N: trained at the first, on average
+CALIBRATED = EXAMPLES / "demo_recording" / "index_finger_calibrated.json"
+PRETENSIONS = (10.0, 20.0, 40.0)  # N: calibrated at 6 to 20
 PARTS = {"free": 3, "light": 2, "strong": 1}  # recordings of each kind and pretension
 PUSHED = ("light", "strong")
 DURATION = 600.0  # s, of one
-TRAINING_DURATION = 400.0  # s
 REST = {"rest": [0.7, 3.0], "rest_share": 0.6}  # s; share of a joint's strokes that a rest follows
 PUSHES: dict[str, dict[str, Any]] = {
     "light": {"force": [0.1, 2.0], "where": "anywhere"},  # N
@@ -105,28 +102,20 @@ def pushes_of(folder: Path, take: Take) -> list[dict[str, Any]]:
     return list(read_rig(folder / f"{take.name}.json").expanded["pushes"])
 
 
-def training_file(folder: Path) -> Path:
-    """`excite` at low, varied pretension, without contact."""
-    file = folder / "training.parquet"
-    return file if file.exists() else record(folder, "training", TRAINING_DURATION, TRAINING["varied"])
-
-
-def fitted(folder: Path) -> tf.Finger:
-    """The description fitted to the training recording, with the default settings of a fit."""
-    file = folder / "fitted.json"
-    if not file.exists():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tf.fit(INDEX_FINGER, training_file(folder)).finger.write(file)
-    return tf.read_finger(file)
+def calibrated() -> tf.Finger:
+    """The demo's finger as `calibrate` made it of 27 min of other motion, without its detector."""
+    data = dict(tf.read_finger(CALIBRATED).data)
+    data["contact"] = {"threshold": data["contact"]["threshold"]}
+    data.pop("sensor_fault", None)
+    return finger_from_data(data, CALIBRATED)
 
 
 def tuned(folder: Path) -> tf.Finger:
-    """The fitted description, tuned on all free recordings."""
+    """The calibrated finger, tuned on all free recordings."""
     file = folder / "tuned.json"
     if not file.exists():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             free = [recording_file(folder, take) for take in takes("free")]
-            tf.tune(fitted(folder), free).finger.write(file)
+            tf.tune(calibrated(), free).finger.write(file)
     return tf.read_finger(file)

@@ -113,8 +113,8 @@ def write_cases(folder: Path) -> list[Path]:
     return [folder / f"{name}.image" for name in cases]
 
 
-def bench(folder: Path, target: str, files: list[Path]) -> dict[str, float]:
-    """Medians of a program of this folder, ns a step."""
+def bench(folder: Path, target: str, files: list[Path], only: str = "-million") -> list[dict[str, Any]]:
+    """Medians of the benchmarks of a program of this folder whose names have, or with "-" have not, a word."""
     build = folder / "build"
     settings = ["-DTENDONFMU_BUILD_BENCH=ON", f"-DTENDONFMU_BUILD_FMU={'ON' if target == 'bench_fmu' else 'OFF'}"]
     for command in (
@@ -124,6 +124,7 @@ def bench(folder: Path, target: str, files: list[Path]) -> dict[str, float]:
         say(" ".join(command))
         subprocess.run(command, check=True, capture_output=True)
     options = [f"--benchmark_repetitions={REPETITIONS}", "--benchmark_enable_random_interleaving=true"]
+    options.append(f"--benchmark_filter={only}")
     program = build / "evidence" / "speed" / target
     done = subprocess.run(
         [str(program), *options, "--benchmark_format=json", *map(str, files)],
@@ -132,18 +133,32 @@ def bench(folder: Path, target: str, files: list[Path]) -> dict[str, float]:
         text=True,
     )
     rows = json.loads(done.stdout)["benchmarks"]
-    medians = [row for row in rows if row.get("aggregate_name") == "median"]
-    return {row["run_name"]: 1e9 * row["per_step"] for row in medians}
+    return [row for row in rows if row.get("aggregate_name") == "median"]
 
 
 def steps(folder: Path, _workers: int) -> Figures:
-    return bench(folder, "bench_step", write_cases(folder))
+    rows = bench(folder, "bench_step", write_cases(folder))
+    return {row["run_name"]: 1e9 * row["per_step"] for row in rows}
 
 
 def fmu_steps(folder: Path, _workers: int) -> Figures:
-    return bench(folder, "bench_fmu", write_cases(folder)[:1])
+    rows = bench(folder, "bench_fmu", write_cases(folder)[:1])
+    return {row["run_name"]: 1e9 * row["per_step"] for row in rows}
 
 
+def worst(folder: Path, _workers: int) -> Figures:
+    """By case: ns of `SLOW`."""
+    rows = bench(folder, "bench_step", [file for file in write_cases(folder) if file.stem in SLOW_CASES], "million")
+    return {row["run_name"].split("/")[1]: [1e9 * row[name] for name in SLOW] for row in rows}
+
+
+SLOW_CASES = {"shaking": "joints shaking", "presliding": "all that `calibrate` writes"}
+SLOW = {
+    "median": "median",
+    "slowest_sample": "slowest sample, in its fastest round",
+    "one_in_10000": "one in 10,000 is slower",
+    "worst": "slowest",
+}
 STEPS = {
     "avx2/4x8x5": "AVX2, picked at run time",
     "sse2/4x8x5": "SSE2, baseline x86-64",
@@ -162,6 +177,11 @@ def time_table(names: Mapping[str, str], head: str) -> Callable[[Figures], str]:
     return lambda figures: table.table(
         [head, "time, ns"], [[words, f"{figures[name]:,.0f}"] for name, words in names.items() if name in figures]
     )
+
+
+def slow_table(figures: Figures) -> str:
+    rows = [[words, *(f"{figures[case][k]:,.0f}" for case in SLOW_CASES)] for k, words in enumerate(SLOW.values())]
+    return table.table(["of a million steps, AVX2; ns", *SLOW_CASES.values()], rows)
 
 
 # --- the simulated finger ---------------------------------------------------------------------------------------------
@@ -219,6 +239,11 @@ PARTS = {
         steps,
         headlines={"avx2/4x8x5": (0.0, 400.0), "avx2/presliding": (0.0, 1000.0)},
         tables={"steps": time_table(STEPS, "what")},
+    ),
+    "worst": Part(
+        worst,
+        headlines={"shaking.1": (0.0, 3000.0)},
+        tables={"million": slow_table},
     ),
     "fmu_steps": Part(
         fmu_steps,

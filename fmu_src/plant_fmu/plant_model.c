@@ -168,7 +168,8 @@ static model_answer check_inputs(model* m, const variables* values) {
     for (size_t i = 0; i < count; ++i) {
       const variable input = {group, (variable_group_id)g, i, 0};
       if (!variables_accept(m, &input, values->number[g][i])) {
-        snprintf(m->error, sizeof m->error, "%s", variables_refusal(m, &input, values->number[g][i]).bytes);
+        const log_text refusal = variables_refusal(m, &input, values->number[g][i]);
+        snprintf(m->error, sizeof m->error, "%.*s", (int)sizeof m->error - 1, refusal.bytes);
         return MODEL_BAD_INPUTS;
       }
     }

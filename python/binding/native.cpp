@@ -242,6 +242,7 @@ NB_MODULE(_native, m) {
   m.def("version", &tendonfmu_version);
   m.def("image_from_json", &image_from_json);
   m.def("image_guid", &image_guid);
+  m.def("memory_size", [](const nb::bytes& image) { return tendonfmu_memory_size(image.data(), image.size()); });
   nb::class_<bound_finger>(m, "Finger")
       .def(nb::init<const nb::bytes&>())
       .def_prop_ro("joints", &bound_finger::joints)

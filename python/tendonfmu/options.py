@@ -280,6 +280,9 @@ class BuildOptions(Options):
         "end: for masters that hand over the inputs of a step's end",
         metavar="begin|end",
     )
+    c_array: bool = option(
+        False, _YES, "write the finger as a C source for a microcontroller, in place of an FMU", names=("--c-array",)
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,5 +1,5 @@
 """∂T/∂z and ∂Δb/∂z of the estimation on random fingers: against formulas in complex numbers (exact) and against
-central differences of the oracle itself."""
+central differences of the core itself."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import oracle_fit
 from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, twin_of
-from oracle_trace import Trace, run_recorder, with_values
+from oracle_trace import Trace, with_values
 from repetitions import repeated
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import estimation
@@ -65,31 +65,32 @@ def test_torques_jumps_and_their_derivatives(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", repeated(range(FINGERS), 0, 16))
-def test_derivatives_are_the_oracles_differences(seed: int) -> None:
-    """Two columns a finger, of which one turns the jumps where any does."""
+def test_derivatives_are_the_cores_differences(seed: int) -> None:
+    """Every column whose step stays within its bounds."""
     each = case(seed)
     _, _, d_torque, d_jump = each.rows
-    rng = np.random.default_rng([seed, 9])
-    jumping = np.flatnonzero(np.abs(d_jump).max(axis=(0, 1)))
-    columns = {int(rng.integers(0, len(each.z))), int(rng.choice(jumping)) if len(jumping) else 0}
 
     def rows_at(column: int, step: float) -> Array:
         z = each.z.copy()
         z[column] += step
-        changed = with_values(each.description, each.twin.moved(z))
-        return np.stack(run_recorder(changed, each.recording, each.source)[1:3])
+        return np.stack(each.estimator.jacobian(0, z, 0, SAMPLES)[:2])
 
     def difference(column: int, step: float) -> Array:
         return (rows_at(column, step) - rows_at(column, -step)) / (2.0 * step)
 
-    for column in columns:
-        step = 1e-3 * (abs(each.z[column]) or 1.0)
+    compared = 0
+    for column, unknown in enumerate(each.estimator.unknowns):
+        step = 1e-5 * (abs(each.z[column]) or unknown.scale)  # so small that no tendon becomes slack
+        if not unknown.lower + step <= each.z[column] <= unknown.upper - step:
+            continue
         expected = (4.0 * difference(column, step / 2.0) - difference(column, step)) / 3.0
         # rounding of T in units of the derivative: what a difference cannot resolve
         floor = 1e-15 * max(np.abs(each.rows[0]).max(), 1e-3) / step
         found = np.stack([d_torque[..., column], d_jump[..., column]])
         error = np.abs(found - expected)[:, each.compared].max()
-        assert error <= BY_DIFFERENCES * np.abs(expected).max() + 100.0 * floor, each.estimator.unknowns[column].path
+        assert error <= BY_DIFFERENCES * np.abs(expected).max() + 100.0 * floor, unknown.path
+        compared += 1
+    assert compared > 0.8 * len(each.z)
 
 
 def test_any_part_of_a_recording() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 import tendonfmu as tf
 from command import Call
+from map_cases import VALIDATOR
 from small_hand import FINGERS, Columns, worn_columns, write_worn_hand, write_wrist_hand
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files.tables import read_table, write_table
@@ -46,6 +47,35 @@ def test_each_finger_gets_its_columns(hand: tf.Hand, columns: Columns) -> None:
         split = tf.split_recording(tf.read_hand(hand.path), pd.DataFrame(renamed | {"camera": columns["time"]}))
     np.testing.assert_array_equal(split["ring"]["tendon_position[2]"], columns["ring_tendon_position[2]"])
     assert "joint_position" not in split["ring"].groups and "joint_position" in split["index"].groups
+
+
+def test_convert_table_writes_what_a_hand_takes(call: Call, hand: tf.Hand, columns: Columns) -> None:
+    """In one command, from a log with other names and units; what a map says wrongly is named with its finger."""
+    folder = hand.path.parent
+    signals = [name for name in columns if "tendon_" in name]
+    log = {"ms": 1000 * columns["time"]} | {f"s{k}": 1000 * columns[name] for k, name in enumerate(signals)}
+    log["touch"] = (columns["time"] < 0.5).astype(float)
+    pd.DataFrame(log).to_csv(folder / "log.csv", index=False)
+    units = {name: "mN" if "force" in name else "mm" for name in signals}
+    mapped = {name: {"column": f"s{k}", "unit": units[name]} for k, name in enumerate(signals)}
+    mapped |= {"time": {"column": "ms", "unit": "ms"}, "ring_contact": {"column": "touch"}}
+    document = {"format": "tendonfmu-map-1", "columns": mapped}
+    VALIDATOR.validate(document)
+    (folder / "hand_map.json").write_text(json.dumps(document), encoding="utf-8")
+    answer = call("convert", "table", "log.csv", "--map", "hand_map.json", "-o", "day.parquet")
+    assert answer.status == 0, answer.err
+    split = tf.split_recording(hand, folder / "day.parquet")
+    for name in FINGERS:
+        for group in ("tendon_force", "tendon_position"):
+            column = f"{group}[2]"
+            np.testing.assert_allclose(split[name][column], columns[f"{name}_{column}"], rtol=1e-12, atol=1e-12)
+    assert split["ring"].contact is not None and split["index"].contact is None
+    for wrong in ("index_tendon_force[1]", "index_time", "index_torque[1]"):
+        changed = {key: value for key, value in mapped.items() if key != wrong}
+        changed |= {} if wrong in mapped else {wrong: {"column": "s0", "unit": "N"}}
+        (folder / "hand_map.json").write_text(json.dumps(document | {"columns": changed}), encoding="utf-8")
+        answer = call("convert", "table", "log.csv", "--map", "hand_map.json", "-o", "day.parquet")
+        assert answer.status == 2 and wrong in answer.err, answer.err
 
 
 def test_a_label_is_of_one_finger_or_of_all(hand: tf.Hand, columns: Columns) -> None:

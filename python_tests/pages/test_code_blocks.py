@@ -55,6 +55,7 @@ QUICK = (
     Page("guide/your_finger", saved=SAVED["guide/your_finger"], outcome=("two_joints.fmu",)),
     Page("guide/trouble"),
     Page("guide/in_your_loop"),
+    Page("guide/microcontroller", left_out="apt-get", outcome=("finger.h",)),
     Page(
         "reference/finger_description",
         given={"finger.json": FINGER, "monday.parquet": TRAINING},

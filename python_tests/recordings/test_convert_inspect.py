@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from command import Call
+from made_logs import json_messages
 from map_cases import VALIDATOR
 from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.inspection import inspect_log
@@ -41,7 +42,7 @@ def check(folder: Path, name: str = "log.csv") -> None:
 
 def test_units_in_names_are_sure(tmp_path: Path) -> None:
     """Degrees, millimetres and milliseconds, with ; and decimal commas, in other names and another order."""
-    columns = {"q1 (deg)": np.degrees(ANGLE), "Time [ms]": 1000 * T, "Motor1_mm": 1000 * SPOOL}
+    columns: dict[str, Any] = {"q1 (deg)": np.degrees(ANGLE), "Time [ms]": 1000 * T, "Motor1_mm": 1000 * SPOOL}
     columns |= {"loadCell1 [mN]": 1000 * FORCE, "board_temp": 30.0}
     lines = proposed(tmp_path, columns, sep=";", decimal=",")
     assert {name: (line.source, line.unit, line.sure) for name, line in lines.items()} == {
@@ -97,7 +98,8 @@ def test_a_servo_becomes_one_joint(call: Call, tmp_path: Path) -> None:
 def test_faults_are_listed(call: Call, tmp_path: Path) -> None:
     """Gaps, repeated times, missing numbers and texts; as text and as JSON."""
     time = np.r_[T[:100], T[99:200], T[260:]] * 1000
-    frame = pd.DataFrame({"t_ms": time, "force": 5.0, "spool_mm": 1.0, "state": "run"})
+    frame = pd.DataFrame({"t_ms": time, "force": 5.0, "spool_mm": np.cos(time), "state": "run"})
+    frame.loc[0, "force"] = 6.0
     frame.loc[3:5, "force"] = np.nan
     frame.to_csv(tmp_path / "log.csv", index=False)
     answer = call("convert", "inspect", "log.csv")
@@ -112,7 +114,7 @@ def test_faults_are_listed(call: Call, tmp_path: Path) -> None:
     assert clock == {"rows": 341, "gaps": 1, "repeated": 1, "backwards": 0}
     assert topic["clock"]["rate"] == pytest.approx(200.0) and topic["clock"]["largest_step"] == pytest.approx(0.305)
     force = next(field for field in topic["fields"] if field["name"] == "force")
-    assert (force["count"], force["missing"], force["range"]) == (341, 3, [5.0, 5.0])
+    assert (force["count"], force["missing"], force["range"]) == (341, 3, [5.0, 6.0])
     VALIDATOR.validate(found["map"])
     assert found["map"]["log"]["missing"] == "?"  # left to the user
 
@@ -175,19 +177,13 @@ def test_positions_numbered_like_forces_are_those_of_tendons(tmp_path: Path) -> 
 
 def joint_states(folder: Path, topic: str, names: tuple[str, ...], **more: list[float]) -> dict[str, Line]:
     """A topic of messages like JointState, with names, positions (m) and efforts."""
-    from mcap.writer import Writer
-
-    with open(folder / "log.mcap", "wb") as raw:
-        writer = Writer(raw)
-        writer.start()
-        schema = writer.register_schema("State", "jsonschema", b'{"type": "object"}')
-        channel = writer.register_channel(topic, "json", schema)
-        for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True)):
-            message = {"t": k / 200, "name": names, "position": [spool] * len(names), "effort": [force] * len(names)}
-            ns = 1_700_000_000_000_000_000 + 5_000_000 * k
-            writer.add_message(channel, ns, json.dumps(message | more).encode(), ns, k)
-        writer.finish()
-    return {line.column: line for line in propose(inspect_log(folder / "log.mcap")).lines}
+    messages: list[dict[str, Any]] = [
+        {"t": k / 200, "name": names, "position": [spool] * len(names), "effort": [force] * len(names)}
+        | {key: [value * force for value in values] for key, values in more.items()}
+        for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True))
+    ]
+    inspection = inspect_log(json_messages(folder / "log.mcap", topic, messages))
+    return {line.column: line for line in propose(inspection).lines}
 
 
 def test_tendons_of_messages_keep_the_order_of_name(tmp_path: Path) -> None:
@@ -207,6 +203,77 @@ def test_the_name_of_one_element_does_not_make_it_an_external_torque(tmp_path: P
     assert not any(name.startswith("external_torque") for name in lines)
     lines = joint_states(tmp_path, "/tendons", ("flex", "ext"), external_torque=[1.0, 2.0])
     assert lines["external_torque[2]"].source == "/tendons.external_torque[ext]"  # the array says so
+
+
+def test_names_of_elements_are_those_of_the_message_they_are_in(tmp_path: Path) -> None:
+    """As in DynamicJointState: interfaces in another order at one joint, fewer at another, and as many as joints."""
+    interfaces = {"flexor": ("position", "effort"), "extensor": ("effort", "position")}
+    measured = {name: list(zip(SPOOL, FORCE + k, strict=True)) for k, name in enumerate(interfaces)}
+    messages: list[dict[str, Any]] = [
+        {
+            "joint_names": list(interfaces),
+            "interface_values": [
+                {"interface_names": names, "values": [measured[joint][k][name == "effort"] for name in names]}
+                for joint, names in interfaces.items()
+            ],
+        }
+        for k in range(len(T))
+    ]
+    proposal = propose(inspect_log(json_messages(tmp_path / "log.mcap", "/dynamic_joint_states", messages)))
+    sources = {line.column: line.source for line in proposal.lines}
+    for k, joint in enumerate(interfaces, start=1):
+        values = f"/dynamic_joint_states.interface_values[{joint}].values"
+        assert sources[f"tendon_force[{k}]"] == f"{values}[effort]"
+        assert sources[f"tendon_position[{k}]"] == f"{values}[position]"
+    (tmp_path / "map.json").write_text(json.dumps(proposal.document), encoding="utf-8")
+    columns = convert_table(tmp_path / "log.mcap", tmp_path / "map.json").columns
+    assert columns["tendon_force[2]"] == pytest.approx(FORCE + 1.0)
+
+
+def test_fields_that_start_late_are_listed(tmp_path: Path) -> None:
+    messages: list[dict[str, Any]] = [
+        {"name": ["flexor"], "position": [spool], "effort": [force] if k >= 20 else []}
+        for k, (force, spool) in enumerate(zip(FORCE, SPOOL, strict=True))
+    ]
+    inspection = inspect_log(json_messages(tmp_path / "log.mcap", "/joint_states", messages))
+    fields = {part.field.name: (part.count, part.missing) for topic in inspection.topics for part in topic.fields}
+    assert fields["/joint_states.effort[flexor]"] == (400, 20)
+    assert "log.missing" in propose(inspection).undecided
+
+
+def test_the_structure_of_a_message_is_no_signal(tmp_path: Path) -> None:
+    messages: list[dict[str, Any]] = [
+        {"layout": {"dim": [], "data_offset": k}, "data": [force, force + 1.0, 0.5]} for k, force in enumerate(FORCE)
+    ]
+    proposal = propose(inspect_log(json_messages(tmp_path / "log.mcap", "/tendon_tensions", messages)))
+    lines = {line.column: line for line in proposal.lines}
+    assert lines["tendon_force[1]"].source == "/tendon_tensions.data[1]" and "tendon_force[4]" not in lines
+    assert lines["tendon_force[3]"].unit == "?" and "constant at 0.5" in lines["tendon_force[3]"].why
+
+
+def test_numbers_from_zero_are_elements(tmp_path: Path) -> None:
+    for force, spool in (("force{}", "spool{}_mm"), ("F{}", "motor_count{}"), ("tension_{}", "x0_{}_spool")):
+        columns = {"time": T} | {force.format(k): FORCE + k for k in range(4)}
+        columns |= {spool.format(k): 1000 * SPOOL + k for k in range(4)}
+        lines = proposed(tmp_path, columns)
+        for k in range(4):
+            assert lines[f"tendon_force[{k + 1}]"].source == force.format(k)
+            assert lines[f"tendon_position[{k + 1}]"].source == spool.format(k)
+
+
+def test_a_constant_is_no_signal_and_what_moves_with_one_is_marked(call: Call, tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).normal(size=len(T))
+    columns = {"time": T, "force": FORCE, "spool_mm": 1000 * SPOOL, "force_offset": 3.0, "amps": 2 * FORCE + noise}
+    lines = proposed(tmp_path, columns | {"humidity": noise})
+    assert {line.source for line in lines.values()} == {"time", "force", "spool_mm"}
+    answer = call("convert", "inspect", "log.csv")
+    assert "not used: force_offset, amps ?, humidity" in answer.out
+    assert "? amps: moves with tendon_force[1], correlation 0." in answer.out
+    frame = pd.DataFrame({"time": T, "f1": FORCE, "f2": FORCE, "p1": SPOOL, "p2": SPOOL})
+    frame.columns = pd.Index(["time", "force", "force", "pos", "pos"])
+    frame.to_csv(tmp_path / "alike.csv", index=False)
+    proposal = propose(inspect_log(tmp_path / "alike.csv"))
+    assert [line.source for line in proposal.lines] == ["time", 2, 3, 4, 5] and not proposal.unused
 
 
 def test_a_clock_is_found_by_its_values(tmp_path: Path) -> None:

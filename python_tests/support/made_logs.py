@@ -5,7 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -164,17 +164,26 @@ def mcap_cdr(compression: str) -> Any:
 
 
 def mcap_json(file: Path, table: Table) -> None:
+    rows = zip(*(values.tolist() for values in table.values()), strict=True)
+    messages = [
+        {name: None if value != value else value for name, value in zip(table, row, strict=True)} for row in rows
+    ]
+    json_messages(file, "/hand", messages, step=1)
+
+
+def json_messages(file: Path, topic: str, messages: Sequence[Mapping[str, Any]], step: int = 5_000_000) -> Path:
+    """Write messages to an MCAP file, one every so many ns."""
     from mcap.writer import Writer
 
     with open(file, "wb") as raw:
         writer: Any = Writer(raw, chunk_size=2048)
         writer.start()
         schema = writer.register_schema("Tendon", "jsonschema", b'{"type": "object"}')
-        channel = writer.register_channel("/hand", "json", schema)
-        for k, row in enumerate(zip(*(values.tolist() for values in table.values()), strict=True)):
-            message = {name: None if value != value else value for name, value in zip(table, row, strict=True)}
-            writer.add_message(channel, START + k, json.dumps(message).encode(), START + k, k)
+        channel = writer.register_channel(topic, "json", schema)
+        for k, message in enumerate(messages):
+            writer.add_message(channel, START + step * k, json.dumps(message).encode(), START + step * k, k)
         writer.finish()
+    return file
 
 
 def mcap_protobuf(file: Path, table: Table) -> None:

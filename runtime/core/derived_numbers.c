@@ -63,72 +63,53 @@ static void pack_edge(derivation* d, const model_item* item) {
   }
 }
 
-/* --- everything else is a copy -------------------------------------------------------------------------------------
+/* --- everything else ------------------------------------------------------------------------------------------------
  */
 
-static void derive_tendon(derivation* d, const model_item* item) {
-  const derived_numbers* to = &d->finger->derived;
-  const size_t lanes = d->finger->tendon_lanes;
-  const double* values = d->values + item->first;
-  switch (item->kind) {
-    case ITEM_STIFFNESS:
-      to->stiffness[item->tendon] = values[0];
-      to->inverse_stiffness[item->tendon] = bounded_inverse(values[0]);
-      break;
-    case ITEM_MOMENT_ARMS:
-      for (uint32_t j = 0; j < item->count; ++j) {
-        to->moment_arm[j * lanes + item->tendon] = values[j];
-      }
-      break;
-    case ITEM_TENDON_ZERO: to->tendon_zero[item->tendon] = values[0]; break;
-    case ITEM_PULLEY_FRICTION:
-      pack_law(to->pulley_law + ((item->joint + 1) * lanes + item->tendon) * LAW_NUMBERS, values, item->law);
-      break;
-    case ITEM_EDGE_ANGLES: begin_grid(d, item); break;
-    default: pack_edge(d, item); break;
-  }
+#define SETTING(name) \
+  { .setting = offsetof(tendonfmu_finger, derived.settings.name) }
+#define ROW(name) \
+  { .row = offsetof(tendonfmu_finger, derived.name) }
+
+/* what is a copy: to a number of the finger, or to a row of joints */
+static const struct {
+  size_t setting, row; /* one of them 0 */
+} copies[ITEM_EXTENSION + 1] = {
+    [ITEM_TENDON_THRESHOLD] = SETTING(tendon_threshold),
+    [ITEM_JOINT_THRESHOLD] = SETTING(joint_threshold),
+    [ITEM_FILTER_CUTOFF] = SETTING(cutoff_rate),
+    [ITEM_DRIFT_VARIANCE] = SETTING(drift_variance),
+    [ITEM_NOISE_STD] = SETTING(noise_std),
+    [ITEM_NOISE_STD_PER_FORCE] = SETTING(noise_std_per_force),
+    [ITEM_INITIAL_VARIANCE] = SETTING(initial_variance),
+    [ITEM_FORGET_RATE] = SETTING(forget_rate),
+    [ITEM_NOISE_TIME] = SETTING(noise_time),
+    [ITEM_FAULT_HOLD_TIME] = SETTING(fault_hold_time),
+    [ITEM_FAULT_FORCE_RESOLUTION] = SETTING(force_resolution),
+    [ITEM_FAULT_POSITION_RESOLUTION] = SETTING(position_resolution),
+    [ITEM_FAULT_JUMP_MARGIN] = SETTING(jump_margin),
+    [ITEM_FAULT_SPRING_MARGIN] = SETTING(spring_margin),
+    [ITEM_FAULT_LONGEST_STAND] = SETTING(longest_stand),
+    [ITEM_FAULT_RECOVERY_TIME] = SETTING(recovery_time),
+    [ITEM_INITIAL_TORQUE] = ROW(initial_torque),
+    [ITEM_CONTACT_THRESHOLD] = ROW(contact_threshold),
+    [ITEM_CONTACT_PER_FORCE] = ROW(contact_per_force),
+    [ITEM_DEVIATION] = ROW(deviation),
+    [ITEM_DEVIATION_PER_FORCE] = ROW(deviation_per_force),
+    [ITEM_TIP] = ROW(links.tip),
+};
+
+static void derive_copy(const derivation* d, const model_item* item) {
+  char* finger = (char*)d->finger;
+  const size_t row = copies[item->kind].row, setting = copies[item->kind].setting;
+  if (row) {
+    memcpy(*(double**)(void*)(finger + row), d->values + item->first, item->count * sizeof(double));
+  } else if (setting) {
+    memcpy(finger + setting, d->values + item->first, sizeof(double));
+  } /* extensions read their numbers where they are */
 }
 
-static void derive_joint(derivation* d, const model_item* item) {
-  const derived_numbers* to = &d->finger->derived;
-  const double* values = d->values + item->first;
-  if (item->kind == ITEM_COVER) {
-    to->cover_stiffness[item->joint] = values[0];
-    to->cover_rest[item->joint] = values[1];
-  } else {
-    double* laws = item->kind == ITEM_JOINT_FRICTION ? to->joint_law : to->load_law;
-    pack_law(laws + item->joint * LAW_NUMBERS, values, item->law);
-  }
-}
-
-static void derive_finger(derivation* d, const model_item* item) {
-  derived_numbers* to = &d->finger->derived;
-  finger_settings* settings = &to->settings;
-  const double* values = d->values + item->first;
-  const size_t bytes = item->count * sizeof(double);
-  switch (item->kind) {
-    case ITEM_TENDON_THRESHOLD: settings->tendon_threshold = values[0]; break;
-    case ITEM_JOINT_THRESHOLD: settings->joint_threshold = values[0]; break;
-    case ITEM_FILTER_CUTOFF: settings->cutoff_rate = two_pi * values[0]; break;
-    case ITEM_DRIFT_VARIANCE: settings->drift_variance = values[0]; break;
-    case ITEM_NOISE_STD: settings->noise_std = values[0]; break;
-    case ITEM_NOISE_STD_PER_FORCE: settings->noise_std_per_force = values[0]; break;
-    case ITEM_INITIAL_VARIANCE: settings->initial_variance = values[0]; break;
-    case ITEM_FORGET_RATE: settings->forget_rate = values[0]; break;
-    case ITEM_NOISE_TIME: settings->noise_time = values[0]; break;
-    case ITEM_INITIAL_TORQUE:
-      settings->has_initial_torque = 1;
-      memcpy(to->initial_torque, values, bytes);
-      break;
-    case ITEM_CONTACT_THRESHOLD: memcpy(to->contact_threshold, values, bytes); break;
-    case ITEM_CONTACT_PER_FORCE: memcpy(to->contact_per_force, values, bytes); break;
-    case ITEM_DEVIATION: memcpy(to->deviation, values, bytes); break;
-    case ITEM_DEVIATION_PER_FORCE: memcpy(to->deviation_per_force, values, bytes); break;
-    default: break; /* extensions read their parameters where they are */
-  }
-}
-
-static void derive_band(derivation* d, const model_item* item) {
+static void derive_band(const derivation* d, const model_item* item) {
   const size_t number = item->kind - ITEM_BAND_NOISE;
   for (size_t j = 0; j < item->count; ++j) {
     const double value = d->values[item->first + j];
@@ -136,50 +117,42 @@ static void derive_band(derivation* d, const model_item* item) {
   }
 }
 
-static void derive_link(derivation* d, const model_item* item) {
-  const link_geometry* to = &d->finger->derived.links;
-  const double* values = d->values + item->first;
-  switch (item->kind) {
-    case ITEM_LINK_AXIS:
-      memcpy(to->axis + 3 * item->joint, values, 3 * sizeof *values);
-      make_unit(to->axis + 3 * item->joint);
-      break;
-    case ITEM_LINK_OFFSET: memcpy(to->offset + 3 * item->joint, values, 3 * sizeof *values); break;
-    default: /* the tip is the last one */
-      memcpy(to->tip, values, 3 * sizeof *values);
-      find_least_links(to, d->finger->joints, d->finger->derived.least_link);
-      break;
-  }
-}
-
-static void derive_sensors(derivation* d, const model_item* item) {
-  finger_settings* settings = &d->finger->derived.settings;
-  const double value = d->values[item->first];
-  switch (item->kind) {
-    case ITEM_FAULT_HOLD_TIME: settings->fault_hold_time = value; break;
-    case ITEM_FAULT_FORCE_RESOLUTION: settings->force_resolution = value; break;
-    case ITEM_FAULT_POSITION_RESOLUTION: settings->position_resolution = value; break;
-    case ITEM_FAULT_JUMP_MARGIN: settings->jump_margin = value; break;
-    case ITEM_FAULT_SPRING_MARGIN: settings->spring_margin = value; break;
-    case ITEM_FAULT_LONGEST_STAND: settings->longest_stand = value; break;
-    default: settings->recovery_time = value; break;
-  }
-}
-
 static int derive_item(void* context, const model_item* item) {
   derivation* d = context;
-  if (item->kind <= ITEM_LOAD_FRICTION) {
-    derive_joint(d, item);
-  } else if (item->kind <= ITEM_EDGE_FRICTION) {
-    derive_tendon(d, item);
-  } else if (item->kind >= ITEM_BAND_NOISE && item->kind <= ITEM_BAND_FRICTION_RESERVE) {
-    derive_band(d, item);
-  } else if (item->kind < ITEM_LINK_AXIS || item->kind >= ITEM_EXTENSION) {
-    derive_finger(d, item);
-  } else if (item->kind >= ITEM_FAULT_HOLD_TIME) {
-    derive_sensors(d, item);
-  } else {
-    derive_link(d, item);
+  const derived_numbers* to = &d->finger->derived;
+  const size_t lanes = d->finger->tendon_lanes, i = item->tendon, j = item->joint;
+  const double* values = d->values + item->first;
+  switch (item->kind) {
+    case ITEM_COVER:
+      to->cover_stiffness[j] = values[0];
+      to->cover_rest[j] = values[1];
+      break;
+    case ITEM_JOINT_FRICTION: pack_law(to->joint_law + j * LAW_NUMBERS, values, item->law); break;
+    case ITEM_LOAD_FRICTION: pack_law(to->load_law + j * LAW_NUMBERS, values, item->law); break;
+    case ITEM_STIFFNESS:
+      to->stiffness[i] = values[0];
+      to->inverse_stiffness[i] = bounded_inverse(values[0]);
+      break;
+    case ITEM_MOMENT_ARMS:
+      for (uint32_t k = 0; k < item->count; ++k) {
+        to->moment_arm[k * lanes + i] = values[k];
+      }
+      break;
+    case ITEM_TENDON_ZERO: to->tendon_zero[i] = values[0]; break;
+    case ITEM_PULLEY_FRICTION: pack_law(to->pulley_law + ((j + 1) * lanes + i) * LAW_NUMBERS, values, item->law); break;
+    case ITEM_EDGE_ANGLES: begin_grid(d, item); break;
+    case ITEM_EDGE_FRICTION: pack_edge(d, item); break;
+    case ITEM_LINK_AXIS:
+      memcpy(to->links.axis + 3 * j, values, 3 * sizeof *values);
+      make_unit(to->links.axis + 3 * j);
+      break;
+    case ITEM_LINK_OFFSET: memcpy(to->links.offset + 3 * j, values, 3 * sizeof *values); break;
+    default:
+      if (item->kind >= ITEM_BAND_NOISE && item->kind <= ITEM_BAND_FRICTION_RESERVE) {
+        derive_band(d, item);
+      } else {
+        derive_copy(d, item);
+      }
   }
   return 0;
 }
@@ -207,19 +180,19 @@ static void find_what_can_hold(tendonfmu_finger* f) {
 }
 
 static void derive_routing(tendonfmu_finger* f) {
-  double rows[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS] = {0}, inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
+  double matrix[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS]; /* R, then R⁺ */
   const size_t n = f->joints, m = f->tendons, lanes = f->tendon_lanes;
   for (size_t i = 0; i < m; ++i) {
     for (size_t j = 0; j < n; ++j) {
-      rows[i * n + j] = f->derived.moment_arm[j * lanes + i];
+      matrix[i * n + j] = f->derived.moment_arm[j * lanes + i];
     }
   }
   for (size_t at = 0; f->derived.settings.has_bands && at < n * lanes; ++at) {
     f->derived.load_arm[at] = f->derived.moment_arm[at] * f->derived.stiffness[at % lanes];
   }
-  pseudo_inverse(m, n, rows, inverse);
+  pseudo_inverse(m, n, matrix, matrix);
   for (size_t j = 0; j < n; ++j) {
-    memcpy(f->derived.inverse_routing + j * lanes, inverse + j * m, m * sizeof(double));
+    memcpy(f->derived.inverse_routing + j * lanes, matrix + j * m, m * sizeof(double));
   }
 }
 
@@ -236,7 +209,9 @@ static void derive_flags(tendonfmu_finger* f) {
 
 void forget_views(tendonfmu_finger* finger) {
   for (size_t k = 0; k < finger->slots / 4; ++k) {
-    finger->scratch.view[k].key[0] = -1.0;
+    for (size_t lane = 0; lane < 4; ++lane) {
+      finger->scratch.view[k].key[lane] = -1.0;
+    }
   }
 }
 
@@ -247,18 +222,33 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   finger->derived.settings = (finger_settings){.initial_variance = -1.0,
                                                .noise_time = -1.0,
                                                .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
+                                               .has_initial_torque = (options & MODEL_HAS_INITIAL_TORQUE) != 0,
                                                .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
                                                .has_bands = (options & MODEL_DETECTS_BY_BANDS) != 0,
                                                .watches_motors = (options & MODEL_WATCHES_MOTORS) != 0,
                                                .watches_sensors = (options & MODEL_HAS_SENSOR_FAULT) != 0};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
+  finger->derived.settings.cutoff_rate *= two_pi;
+  if (options & MODEL_HAS_LINKS) {
+    find_least_links(&finger->derived.links, finger->joints, finger->derived.least_link);
+  }
   derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
     find_what_can_hold(finger);
   }
   find_extensions(finger);
+  recall_rows(finger);
+  forget_views(finger);
+}
+
+void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared) {
+  memmove(finger->parameters, prepared->parameters, finger->prepared_bytes);
+  finger->derived.settings = prepared->derived.settings;
+  finger->memory.compliance = prepared->memory.compliance;
+  finger->memory.relaxes = prepared->memory.relaxes;
+  finger->memory.step = prepared->memory.step;
   recall_rows(finger);
   forget_views(finger);
 }

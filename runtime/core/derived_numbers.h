@@ -7,5 +7,8 @@
  * R⁺ is only computed again where `routing_changed`. */
 void derive_numbers(tendonfmu_finger* finger, int routing_changed);
 
+/* Copies parameters and all that follows from them, of a finger of the same image. */
+void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
+
 /* Makes the next sample look at all laws anew. */
 void forget_views(tendonfmu_finger* finger);

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "extension_signals.h"
+#include "extensions.h"
 #include "friction_memory.h"
 #include "rows_in_use.h"
 #include "slot_view.h"
@@ -45,10 +45,41 @@ static double seed(const double* direction, size_t i) {
   return direction ? direction[i] : 0.0;
 }
 
+/* A direction in the space of the signals. */
+typedef struct signal_derivative {
+  double force[MODEL_MAX_TENDONS], position[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS], velocity[MODEL_MAX_JOINTS];
+} signal_derivative;
+
+static void pass_signals(const tendonfmu_finger* f, effect_signals* direction, int late) {
+  direction->late = late;
+  for (size_t r = 0; r < f->extensions.signals; ++r) {
+    const extension_row* row = signal_row(f, r);
+    row->effect->signal_pass(row->place, row->parameters, row->memory, direction);
+  }
+}
+
+/* what position and force make of the joint angles, where these come from them */
+static void angles_along(const tendonfmu_finger* f, signal_derivative* d) {
+  for (size_t j = 0; j < f->joints; ++j) {
+    for (size_t i = 0; i < f->tendons; ++i) {
+      const double stretch = d->force[i] * f->derived.inverse_stiffness[i];
+      d->angle[j] += inverse_in_use(f)[j * f->tendon_lanes + i] * (d->position[i] - stretch);
+    }
+  }
+}
+
 /* the inputs' direction as the model sees it: past what the extensions make of the signals */
 static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* direction, signal_derivative* d) {
   memset(d, 0, sizeof *d);
   const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  effect_signals signals = {.joints = f->joints,
+                            .tendons = f->tendons,
+                            .source = source,
+                            .force = d->force,
+                            .position = d->position,
+                            .angle = d->angle,
+                            .velocity = d->velocity,
+                            .inverse_stiffness = f->derived.inverse_stiffness};
   for (size_t i = 0; i < f->tendons; ++i) {
     d->force[i] = seed(direction->tendon_force, i);
     d->position[i] = source == TENDONFMU_TENDON_POSITIONS ? seed(direction->tendon_position, i) : 0.0;
@@ -57,9 +88,11 @@ static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* d
     d->angle[j] = seed(direction->joint_position, j);
     d->velocity[j] = seed(direction->joint_velocity, j);
   }
-  pass_signals(f, d, 0);
-  angles_along(f, d);
-  pass_signals(f, d, 1);
+  pass_signals(f, &signals, 0);
+  if (source == TENDONFMU_TENDON_POSITIONS) {
+    angles_along(f, d);
+  }
+  pass_signals(f, &signals, 1);
 }
 
 /* angle and velocity along a direction of the signals */
@@ -122,7 +155,7 @@ static dual friction_at(const linearisation* l, const effect_laws* laws, size_t 
   const dual grip = slot_grip(l, slot, velocity);
   if (remembers_at(l->finger, slot)) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
-    const int negative = sliding_side(velocity.value, threshold, s->side_before[slot]);
+    const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
     return product(grip, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
@@ -155,7 +188,7 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
 static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
   const finger_state* s = &l->finger->remembered;
   const dual speed = {threshold, 0.0};
-  const double before = s->side_before[slot], now = s->side[slot];
+  const double before = side_before(l->finger, slot), now = s->side[slot];
   if (s->event[slot] == 0.0) {
     return (dual){0.0, 0.0};
   }
@@ -320,7 +353,9 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    if (row->effect->slope) {
+      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    }
     if (row->effect->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }

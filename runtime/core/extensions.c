@@ -12,46 +12,34 @@
 
 enum { SIGNAL_ORDERS = 3 };
 
-typedef struct row_search {
-  tendonfmu_finger* finger;
-  effect_kind kind;
-  int order;
-  size_t found;
-  const double* parameters;
-  size_t memory; /* before the row, numbers */
-} row_search;
-
-static void note_row(row_search* search, uint32_t index, uint32_t first_parameter) {
-  tendonfmu_finger* f = search->finger;
-  const uint32_t* words = f->shape.extensions + (size_t)index * MODEL_EXTENSION_WORDS;
-  const effect_type* effect = effect_by_id(words[0]);
-  const effect_place place = model_extension_place(&f->shape, index);
-  const size_t own = model_extension_memory(effect, &f->shape, place);
-  if (effect->kind == search->kind && effect->order == search->order) {
-    double *memory = f->remembered.extension + search->memory, *next = f->scratch.extension + search->memory;
-    f->extensions.row[search->found++] = (extension_row){.effect = effect,
-                                                         .place = place,
-                                                         .index = index,
-                                                         .first_parameter = first_parameter,
-                                                         .parameters = f->parameters + first_parameter,
-                                                         .memory = memory,
-                                                         .next = next,
-                                                         .memory_count = own};
-  }
-  search->memory += own;
+static const effect_type* effect_of(const tendonfmu_finger* f, uint32_t index) {
+  return effect_by_id(f->shape.extensions[(size_t)index * MODEL_EXTENSION_WORDS]);
 }
 
+/* the rows of a kind from `begin` on; how many. Numbers and memory of all rows follow each other as in the description,
+ * the numbers behind all others. */
 static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin) {
-  row_search search = {.finger = f, .kind = kind, .order = order, .found = begin};
-  uint32_t parameter = f->shape.parameter_count;
-  for (uint32_t i = f->shape.extension_count; i-- > 0;) {
-    parameter -= effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
+  const double* numbers = f->parameters + f->shape.parameter_count;
+  size_t found = begin, memory = 0;
+  for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
+    numbers -= effect_of(f, i)->parameter_count;
   }
   for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
-    note_row(&search, i, parameter);
-    parameter += effect_by_id(f->shape.extensions[(size_t)i * MODEL_EXTENSION_WORDS])->parameter_count;
+    const effect_type* effect = effect_of(f, i);
+    const effect_place place = model_extension_place(&f->shape, i);
+    const size_t own = model_extension_memory(effect, &f->shape, place);
+    if (effect->kind == kind && effect->order == order) {
+      f->extensions.row[found++] = (extension_row){.effect = effect,
+                                                   .place = place,
+                                                   .parameters = numbers,
+                                                   .memory = own ? f->remembered.extension + memory : NULL,
+                                                   .next = own ? f->scratch.extension + memory : NULL,
+                                                   .memory_count = own};
+    }
+    numbers += effect->parameter_count;
+    memory += own;
   }
-  return search.found - begin;
+  return found - begin;
 }
 
 static void find_axis_cosines(tendonfmu_finger* f) {
@@ -59,8 +47,12 @@ static void find_axis_cosines(tendonfmu_finger* f) {
   const double* axis = f->derived.links.axis; /* unit vectors */
   for (size_t j = 0; j < f->joints; ++j) {
     for (size_t k = 0; k < f->joints; ++k) {
-      const double *a = axis + 3 * j, *b = axis + 3 * k;
-      f->derived.axis_cosine[j * f->joints + k] = linked ? a[0] * b[0] + a[1] * b[1] + a[2] * b[2] : 1.0;
+      double cosine = 1.0;
+      if (linked) {
+        const double *a = axis + 3 * j, *b = axis + 3 * k;
+        cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+      }
+      f->derived.axis_cosine[j * f->joints + k] = cosine;
     }
   }
 }
@@ -90,14 +82,6 @@ void find_extensions(tendonfmu_finger* f) {
   find_memory(f);
   clear_grips(f);
   f->extensions.gripped = f->extensions.friction > 0 || f->memory.elements > 0;
-}
-
-const extension_row* extension_of(const tendonfmu_finger* f, uint32_t index) {
-  const extension_row* row = f->extensions.row;
-  while (row->index != index) {
-    ++row;
-  }
-  return row;
 }
 
 /* --- what the others remember ---------------------------------------------------------------------------------------
@@ -149,6 +133,28 @@ effect_sample remembered_sample(const tendonfmu_finger* f) {
                           .tendon_threshold = f->derived.settings.tendon_threshold,
                           .joint_threshold = f->derived.settings.joint_threshold};
   return sample;
+}
+
+/* --- signals --------------------------------------------------------------------------------------------------------
+ */
+
+void shape_signals(tendonfmu_finger* f, double time, int late) {
+  const finger_scratch* s = &f->scratch;
+  effect_signals signals = {.joints = f->joints,
+                            .tendons = f->tendons,
+                            .first = f->remembered.scalar[STATE_INITIALISED] == 0.0,
+                            .source = (int)f->remembered.scalar[STATE_SOURCE],
+                            .late = late,
+                            .time = time,
+                            .force = s->force,
+                            .position = s->position,
+                            .angle = s->angle,
+                            .velocity = s->velocity + f->joints * f->tendon_lanes,
+                            .inverse_stiffness = f->derived.inverse_stiffness};
+  for (size_t n = 0; n < f->extensions.signals; ++n) {
+    const extension_row* row = signal_row(f, n);
+    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
+  }
 }
 
 /* --- friction -------------------------------------------------------------------------------------------------------
@@ -259,5 +265,7 @@ void add_extension_torques(tendonfmu_finger* f) {
 }
 
 void remember_extensions(tendonfmu_finger* f) {
-  memcpy(f->remembered.extension, f->scratch.extension, f->shape.extension_memory * sizeof(double));
+  if (f->shape.extension_memory) {
+    memcpy(f->remembered.extension, f->scratch.extension, f->shape.extension_memory * sizeof(double));
+  }
 }

@@ -18,9 +18,6 @@ static inline const extension_row* torque_row(const tendonfmu_finger* finger, si
   return finger->extensions.row + finger->extensions.signals + finger->extensions.friction + n;
 }
 
-/* Row of the extension `index` of the description. */
-const extension_row* extension_of(const tendonfmu_finger* finger, uint32_t index);
-
 /* Slots of a friction row: its member k, as effect_type.grip() counts it, acts on slot friction_slot(k),
  * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints. */
 size_t friction_members(const tendonfmu_finger* finger, effect_place place);
@@ -41,6 +38,9 @@ static inline int sliding_side(double velocity, double threshold, double side) {
 }
 
 /* --- a step, in this order ---------------------------------------------------------------------------------------- */
+
+/* Signals in scratch, before the joint angles are known (late 0) and after (late 1); time of the sample, s. */
+void shape_signals(tendonfmu_finger* finger, double time, int late);
 
 /* What friction and torque rows will remember; angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);

@@ -290,6 +290,35 @@ tendonfmu_status tendonfmu_get_directional_derivative(tendonfmu_finger* finger, 
   return TENDONFMU_OK;
 }
 
+/* one finger of a hand: its sample, the first one too, and its outputs */
+static tendonfmu_status take_with_outputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
+                                          const tendonfmu_outputs* outputs) {
+  const tendonfmu_status status = finger ? take(finger, time, inputs) : TENDONFMU_BAD_ARGUMENT;
+  if (status == TENDONFMU_OK && outputs) {
+    samples_give_outputs(finger, outputs, 0);
+  }
+  return status;
+}
+
+tendonfmu_status tendonfmu_step_hand(size_t count, tendonfmu_finger* const* fingers, double time,
+                                     const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs,
+                                     tendonfmu_status* statuses) {
+  tendonfmu_status first = TENDONFMU_OK;
+  if (count && (!fingers || !inputs)) {
+    return TENDONFMU_BAD_ARGUMENT;
+  }
+  for (size_t k = 0; k < count; ++k) {
+    const tendonfmu_status status = take_with_outputs(fingers[k], time, &inputs[k], outputs ? &outputs[k] : NULL);
+    if (statuses) {
+      statuses[k] = status;
+    }
+    if (first == TENDONFMU_OK) {
+      first = status;
+    }
+  }
+  return first;
+}
+
 /* --- parameters --------------------------------------------------------------------------------------------------- */
 
 size_t tendonfmu_parameter_count(const tendonfmu_finger* finger) {
@@ -364,6 +393,14 @@ tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t
   return TENDONFMU_OK;
 }
 
+static int say_fixed(const tendonfmu_finger* finger, const model_item* item, uint32_t index) {
+  char path[PARAMETER_PATH_BYTES];
+  parameter_path(item, index, path);
+  message_start(error_line(finger), path);
+  message_text(error_line(finger), " is fixed once the first sample is taken");
+  return -1;
+}
+
 /* checks one value on its way into the candidate; sets *routing when it moves a tendon */
 static tendonfmu_status check_candidate(tendonfmu_finger* finger, size_t index, double value, int* routing) {
   if (!has_parameter(finger, index)) {
@@ -374,10 +411,7 @@ static tendonfmu_status check_candidate(tendonfmu_finger* finger, size_t index, 
     return TENDONFMU_BAD_PARAMETER;
   }
   if (tendonfmu_is_initialised(finger) && !parameter_range_of(&item, (uint32_t)index).tunable) {
-    char path[PARAMETER_PATH_BYTES];
-    parameter_path(&item, (uint32_t)index, path);
-    message_start(error_line(finger), path);
-    message_text(error_line(finger), " is fixed once the first sample is taken");
+    say_fixed(finger, &item, (uint32_t)index);
     return TENDONFMU_WRONG_ORDER;
   }
   *routing |= item.kind == ITEM_MOMENT_ARMS;
@@ -405,6 +439,37 @@ tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count
   }
   memcpy(finger->parameters, finger->candidate, bytes);
   derive_numbers(finger, routing);
+  return TENDONFMU_OK;
+}
+
+typedef struct fixed_search {
+  const tendonfmu_finger* finger;
+  const double* values; /* [p] */
+} fixed_search;
+
+/* names the first parameter of an item that is fixed and has another value */
+static int find_fixed(void* context, const model_item* item) {
+  const fixed_search* s = context;
+  for (uint32_t i = item->first; i < item->first + item->count; ++i) {
+    if (s->values[i] != s->finger->parameters[i] && !parameter_range_of(item, i).tunable) {
+      return say_fixed(s->finger, item, i);
+    }
+  }
+  return 0;
+}
+
+tendonfmu_status tendonfmu_take_parameters(tendonfmu_finger* finger, const tendonfmu_finger* prepared) {
+  if (!finger || !prepared) {
+    return missing(finger);
+  }
+  if (prepared->image_id != finger->image_id || prepared->prepared_bytes != finger->prepared_bytes) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT, "prepared: a finger of another image");
+  }
+  fixed_search search = {finger, prepared->parameters};
+  if (tendonfmu_is_initialised(finger) && model_visit(&finger->shape, find_fixed, &search)) {
+    return TENDONFMU_WRONG_ORDER;
+  }
+  take_prepared_numbers(finger, prepared);
   return TENDONFMU_OK;
 }
 
@@ -496,5 +561,6 @@ tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name
                 "processor and build have it");
   }
   finger->kernel = kernel;
+  forget_views(finger); /* the kernels fill them by one or by four */
   return TENDONFMU_OK;
 }

@@ -13,214 +13,209 @@ enum { ROW_BYTES = 64 };
 typedef struct cursor {
   unsigned char* base; /* NULL: only count */
   size_t used;
+  size_t row_bytes; /* rows begin at multiples of this */
 } cursor;
 
+/* NULL for none: what a finger lacks is not found at the place of something else */
 static void* take(cursor* c, size_t bytes) {
-  void* place = c->base ? c->base + c->used : NULL;
-  c->used += (bytes + ROW_BYTES - 1) / ROW_BYTES * ROW_BYTES;
+  c->used = (c->used + c->row_bytes - 1) / c->row_bytes * c->row_bytes;
+  void* place = c->base && bytes ? c->base + c->used : NULL;
+  c->used += bytes;
   return place;
 }
 
-static double* take_numbers(cursor* c, size_t count) {
-  return take(c, count * sizeof(double));
-}
+/* --- rows -----------------------------------------------------------------------------------------------------------
+ */
 
-/* consecutive rows, each [count], with no gap: `state` must be one run */
-static double* part(double** run, size_t count) {
-  double* place = *run;
-  *run = place ? place + count : NULL;
-  return place;
-}
+#define AT(name)          offsetof(tendonfmu_finger, name)
+#define ROWS(first, last) .place = AT(first), .pointers = (AT(last) - AT(first)) / sizeof(double*) + 1
+#define ROW(name)         ROWS(name, name)
+#define WITHIN(most)      .low = -(most), .high = (most)
+#define INSTANT           WITHIN(LARGEST_TIME), .spare = 1
+#define FLAG              .high = 1.0, .whole = 1
 
-static void lay_out_parameters(tendonfmu_finger* f, cursor* c) {
-  const size_t p = f->shape.parameter_count;
-  f->start = take_numbers(c, p);
-  f->parameters = take_numbers(c, p);
-  f->candidate = take_numbers(c, p);
-}
+static const finger_row scalars[STATE_SCALARS] = {
+    [STATE_INITIALISED] = {FLAG},
+    [STATE_SOURCE] = {.low = 1.0, .high = 3.0, .whole = 1},
+    [STATE_TIME] = {INSTANT},
+    [STATE_FIRST_SAMPLE] = {FLAG},
+    [STATE_VELOCITY_GAIN] = {.high = DBL_MAX},
+    [STATE_CONTACT] = {FLAG},
+    [STATE_ABSORBED] = {.high = LARGEST_SQUARE},
+    [STATE_ABSORBED_BEFORE] = {.high = LARGEST_SQUARE},
+    [STATE_UNWELL] = {FLAG},
+    [STATE_STEP] = {.high = 2.0 * LARGEST_TIME},
+};
 
-static void lay_out_derived(tendonfmu_finger* f, cursor* c) {
-  derived_numbers* d = &f->derived;
-  const size_t n = f->joints, lanes = f->tendon_lanes, joints = f->joint_lanes;
-  const size_t records = 2 + (size_t)f->shape.edge_law_count + 2 * (size_t)f->shape.edge_count;
-  size_t angles = 0;
-  for (size_t j = 0; j < n; ++j) {
-    angles += f->shape.most_points[j] * lanes;
-  }
-  d->stiffness = take_numbers(c, lanes);
-  d->inverse_stiffness = take_numbers(c, lanes);
-  d->bidirectional = take_numbers(c, lanes);
-  d->tendon_zero = take_numbers(c, lanes);
-  d->moment_arm = take_numbers(c, n * lanes);
-  d->inverse_routing = take_numbers(c, n * lanes);
-  d->pulley_law = take_numbers(c, n * lanes * LAW_NUMBERS);
-  d->edge_law = take_numbers(c, records * LAW_NUMBERS);
-  d->edge_segment = take_numbers(c, records * 2);
-  d->edge_angle = take_numbers(c, angles);
-  d->edge_angle_row = take(c, n * sizeof(size_t));
-  d->edge_record = take(c, n * lanes * sizeof(uint32_t));
-  d->can_hold = take(c, n * lanes / 4);
-  d->joint_law = take_numbers(c, joints * LAW_NUMBERS);
-  d->load_law = take_numbers(c, joints * LAW_NUMBERS);
-  d->cover_stiffness = take_numbers(c, joints);
-  d->cover_rest = take_numbers(c, joints);
-  d->contact_threshold = take_numbers(c, joints);
-  d->contact_per_force = take_numbers(c, joints);
-  d->initial_torque = take_numbers(c, joints);
-  d->deviation = take_numbers(c, joints);
-  d->deviation_per_force = take_numbers(c, joints);
-  const size_t banded = f->shape.options & MODEL_DETECTS_BY_BANDS ? n : 0;
-  d->band_square = take_numbers(c, banded * BANDS * BAND_NUMBERS);
-  d->load_arm = take_numbers(c, banded * lanes);
-  const size_t links = f->shape.options & MODEL_HAS_LINKS ? n : 0;
-  d->links.axis = take_numbers(c, 3 * links);
-  d->links.offset = take_numbers(c, 3 * links);
-  d->links.tip = take_numbers(c, links ? 3 : 0);
-  d->least_link = take(c, links * sizeof(int));
-}
+static const finger_row sensors[SENSOR_ROWS] = {
+    [SENSOR_FAULT] = {.high = POSITION_FAILS, .whole = 1},
+    [SENSOR_FAULT_SINCE] = {INSTANT},
+    [SENSOR_UNSOUND_AT] = {INSTANT},
+    [SENSOR_KNOWN] = {FLAG},
+    [SENSOR_FORCE] = {WITHIN(DBL_MAX)},
+    [SENSOR_POSITION] = {WITHIN(DBL_MAX)},
+    [SENSOR_JOINT_SIDE] = {WITHIN(DBL_MAX)},
+    [SENSOR_HELD_FORCE] = {WITHIN(DBL_MAX)},
+    [SENSOR_FORCE_HELD_SINCE] = {INSTANT},
+    [SENSOR_HAS_TAUT] = {FLAG},
+    [SENSOR_TAUT_FORCE] = {WITHIN(DBL_MAX)},
+    [SENSOR_TAUT_SPRING] = {WITHIN(DBL_MAX)},
+    [SENSOR_HELD_POSITION] = {WITHIN(DBL_MAX)},
+    [SENSOR_POSITION_HELD_SINCE] = {INSTANT},
+    [SENSOR_FORCE_THEN] = {WITHIN(DBL_MAX)},
+    [SENSOR_JOINT_SIDE_THEN] = {WITHIN(DBL_MAX)},
+};
 
-static void lay_out_memory(tendonfmu_finger* f, cursor* c) {
-  finger_scratch* s = &f->scratch;
-  const size_t slots = f->shape.elements ? f->slots : 0, stretching = f->shape.stretches ? slots : 0;
-  f->memory.remembers = take_numbers(c, slots);
-  for (size_t e = 0; e < f->shape.elements; ++e) {
-    friction_element* element = &f->memory.element[e];
-    double** const rows[] = {&element->share, &element->stiffness, &element->per_distance, &element->relaxation_time,
-                             &element->kept,  &element->stiff,     &element->soft};
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
-      *rows[i] = take_numbers(c, slots);
-    }
-  }
-  f->memory.sections = take_numbers(c, stretching);
-  s->travelled = take_numbers(c, slots);
-  s->own_limit = take_numbers(c, slots ? f->joint_lanes : 0);
-  s->element = take_numbers(c, f->shape.elements * 2 * slots);
-  s->by_turning = take_numbers(c, 2 * slots);
-  s->by_limit = take_numbers(c, 2 * slots);
-  s->tension = take_numbers(c, 2 * stretching);
-}
-
-static void lay_out_extensions(tendonfmu_finger* f, cursor* c) {
-  f->extensions.row = take(c, f->shape.extension_count * sizeof(extension_row));
-  f->derived.axis_cosine = take_numbers(c, f->shape.extension_count ? f->joints * f->joints : 0);
-  f->scratch.extension = take_numbers(c, f->shape.extension_memory);
-  const size_t slots = f->shape.extension_count ? f->slots : 0;
-  f->scratch.grip = take_numbers(c, slots);
-  f->scratch.bias_grip = take_numbers(c, slots);
-  lay_out_memory(f, c);
-}
-
-#define AT(name)     offsetof(finger_state, name)
-#define ANYTHING     -DBL_MAX, DBL_MAX, 0
-#define FLAG         0.0, 1.0, 1
-#define SIGN         -1.0, 1.0, 1
-#define UP_TO(most)  0.0, most, 0
-#define WITHIN(most) -(most), most, 0
-
-const state_row state_rows[] = {
-    {AT(angle), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(speed), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(torque), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(friction), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(compensated), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(bias), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(joint_contact), ROW_OF_JOINTS, 1, 0, FLAG, 0},
-    {AT(variance), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SQUARE), 1},
-    {AT(gain), ROW_OF_JOINTS, 1, 0, UP_TO(1.0), 1},
-    {AT(residual), ROW_OF_JOINTS, 1, 0, ANYTHING, 0},
-    {AT(level), ROW_OF_JOINTS, 1, 0, UP_TO(LARGEST_SUM), 0},
-    {AT(total_variance), ROW_OF_JOINTS, 1, 0, UP_TO(DBL_MAX), 1},
-    {AT(force), ROW_OF_TENDONS, 1, 0, ANYTHING, 0},
-    {AT(slack), ROW_OF_TENDONS, 1, 0, FLAG, 0},
-    {AT(moving), ROW_OF_SLOTS, 1, 0, FLAG, 0},
-    {AT(side), ROW_OF_SLOTS, 1, 0, SIGN, 0},
-    {AT(side_before), ROW_OF_SLOTS, 1, 0, SIGN, 0},
-    {AT(event), ROW_OF_SLOTS, 1, 0, SIGN, 0},
-    {AT(stuck_since), ROW_OF_SLOTS, 1, 0, -LARGEST_TIME, LARGEST_SQUARE, 0, 1}, /* of time, or of absorption */
-    {AT(last_stuck), ROW_OF_SLOTS, 1, 0, WITHIN(LARGEST_TIME), 1},
-    {AT(jumped), ROW_OF_JOINTS, 1, MODEL_DETECTS_BY_BANDS, WITHIN(LARGEST_SUM), 0},
-    {AT(bands), ROW_OF_BANDS, 1, MODEL_DETECTS_BY_BANDS, WITHIN(2.0 * LARGEST_SUM), 1},
-    {AT(sensor), ROW_OF_TENDONS, SENSOR_ROWS, MODEL_HAS_SENSOR_FAULT, ANYTHING, 1},
-    {AT(watch), ROW_OF_JOINTS, 1, MODEL_HAS_SENSOR_FAULT, 0.0, JOINT_BEGINS_ANEW, 1, 0},
-    {AT(element), ROW_OF_ELEMENTS, 2, 0, WITHIN(LARGEST_SUM), 1},
-    {AT(by_turning), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
-    {AT(by_limit), ROW_OF_MEMORY, 2, 0, ANYTHING, 1},
-    {AT(tension), ROW_OF_CORDS, 2, 0, ANYTHING, 1},
-    {AT(extension), ROW_OF_EXTENSIONS, 1, 0, ANYTHING, 1},
+const finger_row state_rows[] = {
+    {ROW(remembered.scalar), .count = STATE_SCALARS, .parts = scalars},
+    {ROWS(remembered.angle, remembered.bias), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
+    {ROW(remembered.joint_contact), .unit = OF_JOINTS, FLAG},
+    {ROW(remembered.variance), .unit = OF_JOINTS, .high = LARGEST_SQUARE, .spare = 1},
+    {ROW(remembered.gain), .unit = OF_JOINTS, .high = 1.0, .spare = 1},
+    {ROW(remembered.residual), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
+    {ROW(remembered.level), .unit = OF_JOINTS, .high = LARGEST_SUM},
+    {ROW(remembered.total_variance), .unit = OF_JOINTS, .high = DBL_MAX, .spare = 1},
+    {ROW(remembered.force), .unit = OF_TENDONS, WITHIN(DBL_MAX)},
+    {ROW(remembered.slack), .unit = OF_TENDONS, FLAG},
+    {ROW(remembered.moving), .unit = OF_SLOTS, FLAG},
+    {ROW(remembered.side), .unit = OF_SLOTS, WITHIN(1.0), .whole = 1},
+    {ROW(remembered.event), .unit = OF_SLOTS, .low = -3.0, .high = 1.0, .whole = 1},
+    {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = -LARGEST_TIME, .high = LARGEST_SQUARE, .spare = 1},
+    {ROW(remembered.last_stuck), .unit = OF_SLOTS, INSTANT},
+    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(LARGEST_SUM)},
+    {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double), .when = WITH_BANDS,
+     WITHIN(2.0 * LARGEST_SUM), .spare = 1},
+    {ROW(remembered.sensor), .unit = OF_TENDONS, .count = SENSOR_ROWS, .when = WITH_SENSOR_FAULT, .parts = sensors},
+    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = JOINT_BEGINS_ANEW, .whole = 1},
+    {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(LARGEST_SUM), .spare = 1},
+    {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
+     WITHIN(DBL_MAX), .spare = 1},
+    {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(DBL_MAX), .spare = 1},
+    {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(DBL_MAX), .spare = 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
 
-size_t state_row_length(const tendonfmu_finger* finger, const state_row* row) {
-  if ((finger->shape.options & row->option) != row->option) {
-    return 0;
+/* the parameters in force and all that follows from them: one run, which another finger may take over */
+static const finger_row prepared_rows[] = {
+    {ROW(parameters), .unit = OF_PARAMETERS},
+    {ROWS(derived.stiffness, derived.tendon_zero), .unit = OF_TENDONS},
+    {ROWS(derived.moment_arm, derived.inverse_routing), .unit = OF_MATRIX},
+    {ROW(derived.pulley_law), .unit = OF_MATRIX, .count = LAW_NUMBERS},
+    {ROW(derived.edge_law), .unit = OF_RECORDS, .count = LAW_NUMBERS},
+    {ROW(derived.edge_segment), .unit = OF_RECORDS, .count = 2},
+    {ROW(derived.edge_angle), .unit = OF_ANGLES},
+    {ROWS(derived.joint_law, derived.load_law), .unit = OF_JOINTS, .count = LAW_NUMBERS},
+    {ROWS(derived.cover_stiffness, derived.deviation_per_force), .unit = OF_JOINTS},
+    {ROW(derived.band_square), .unit = OF_JOINTS, .count = BANDS * BAND_NUMBERS, .when = WITH_BANDS},
+    {ROW(derived.load_arm), .unit = OF_MATRIX, .when = WITH_BANDS},
+    {ROWS(derived.links.axis, derived.links.tip), .unit = OF_JOINTS, .count = 3, .when = WITH_LINKS},
+    {ROW(derived.axis_cosine), .unit = OF_JOINTS, .count = MODEL_MAX_JOINTS, .when = WITH_EXTENSIONS},
+    {ROW(memory.remembers), .unit = OF_SLOTS, .when = WITH_MEMORY},
+    {ROWS(memory.element[0].share, memory.element[0].soft), .unit = OF_SLOTS, .when = WITH_MEMORY},
+    {ROWS(memory.element[1].share, memory.element[1].soft), .unit = OF_SLOTS, .when = WITH_TWO_ELEMENTS},
+    {ROW(memory.sections), .unit = OF_SLOTS, .when = WITH_CORDS},
+};
+
+static const finger_row other_rows[] = {
+    {ROWS(start, candidate), .unit = OF_PARAMETERS},
+    {ROW(scratch.extension), .unit = OF_EXTENSIONS},
+    {ROWS(scratch.grip, scratch.bias_grip), .unit = OF_SLOTS, .when = WITH_EXTENSIONS},
+    {ROW(scratch.travelled), .unit = OF_SLOTS, .when = WITH_MEMORY},
+    {ROW(scratch.own_limit), .unit = OF_JOINTS, .when = WITH_MEMORY},
+    {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
+    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
+    {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
+    {ROWS(scratch.force, scratch.slack), .unit = OF_TENDONS},
+    {ROWS(scratch.angle, scratch.residual_variance), .unit = OF_JOINTS},
+    {ROWS(scratch.edge, scratch.force_between), .unit = OF_MATRIX},
+    {ROWS(scratch.slip_torque, scratch.unknown), .unit = OF_JOINTS, .when = WITH_BANDS},
+    {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = WITH_BANDS},
+    {ROW(scratch.sensor), .unit = OF_TENDONS, .count = SENSOR_ROWS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = WITH_SENSOR_FAULT},
+    {ROWS(scratch.leverage, scratch.row_in_use), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
+    {ROWS(scratch.watch, scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.velocity), .unit = OF_SLOTS},
+};
+
+static int is_present(const model_shape* shape, row_condition when) {
+  switch (when) {
+    case WITH_BANDS: return (shape->options & MODEL_DETECTS_BY_BANDS) != 0;
+    case WITH_SENSOR_FAULT: return (shape->options & MODEL_HAS_SENSOR_FAULT) != 0;
+    case WITH_LINKS: return (shape->options & MODEL_HAS_LINKS) != 0;
+    case WITH_EXTENSIONS: return shape->extension_count > 0;
+    case WITH_MEMORY: return shape->elements > 0;
+    case WITH_TWO_ELEMENTS: return shape->elements > 1;
+    case WITH_CORDS: return shape->elements > 0 && shape->stretches;
+    default: return 1;
   }
-  switch (row->lanes) {
-    case ROW_OF_JOINTS: return row->rows * finger->joint_lanes;
-    case ROW_OF_TENDONS: return row->rows * finger->tendon_lanes;
-    case ROW_OF_SLOTS: return row->rows * finger->slots;
-    case ROW_OF_MEMORY: return finger->shape.elements ? row->rows * finger->slots : 0;
-    case ROW_OF_ELEMENTS: return finger->shape.elements * row->rows * finger->slots;
-    case ROW_OF_CORDS: return finger->shape.elements && finger->shape.stretches ? row->rows * finger->slots : 0;
-    case ROW_OF_BANDS: return finger->joint_lanes * (sizeof(band_memory) / sizeof(double));
-    default: return finger->shape.extension_memory;
+}
+
+static size_t edge_records(const model_shape* shape) {
+  return 2 + (size_t)shape->edge_law_count + 2 * (size_t)shape->edge_count;
+}
+
+static size_t edge_angles(const tendonfmu_finger* f) {
+  size_t angles = 0;
+  for (size_t j = 0; j < f->joints; ++j) {
+    angles += f->shape.most_points[j] * f->tendon_lanes;
   }
+  return angles;
+}
+
+size_t unit_length(const tendonfmu_finger* f, row_unit unit) {
+  switch (unit) {
+    case OF_JOINTS: return f->joint_lanes;
+    case OF_TENDONS: return f->tendon_lanes;
+    case OF_MATRIX: return f->joints * f->tendon_lanes;
+    case OF_SLOTS: return f->slots;
+    case OF_ELEMENTS: return f->shape.elements * f->slots;
+    case OF_PARAMETERS: return f->shape.parameter_count;
+    case OF_RECORDS: return edge_records(&f->shape);
+    case OF_ANGLES: return edge_angles(f);
+    case OF_EXTENSIONS: return f->shape.extension_memory;
+    default: return 1;
+  }
+}
+
+size_t row_count(const tendonfmu_finger* f, const finger_row* row) {
+  return !is_present(&f->shape, row->when) ? 0 : row->count ? row->count : 1;
+}
+
+static void place_rows(tendonfmu_finger* f, cursor* c, const finger_row* rows, size_t count) {
+  for (const finger_row* row = rows; row < rows + count; ++row) {
+    double** pointer = (double**)(void*)((char*)f + row->place);
+    const size_t bytes = row_count(f, row) * unit_length(f, row->unit) * sizeof(double);
+    for (size_t k = 0; k < row->pointers; ++k) {
+      pointer[k] = take(c, bytes);
+    }
+  }
+}
+
+static void lay_out_prepared(tendonfmu_finger* f, cursor* c) {
+  derived_numbers* d = &f->derived;
+  const size_t n = f->joints, matrix = n * f->tendon_lanes;
+  take(c, 0); /* to where a row begins */
+  const size_t begin = c->used;
+  place_rows(f, c, prepared_rows, sizeof prepared_rows / sizeof prepared_rows[0]);
+  d->edge_angle_row = take(c, n * sizeof(size_t));
+  d->edge_record = take(c, matrix * sizeof(uint32_t));
+  d->can_hold = take(c, matrix / 4);
+  d->least_link = take(c, is_present(&f->shape, WITH_LINKS) ? n * sizeof(int) : 0);
+  f->prepared_bytes = c->used - begin;
 }
 
 static void lay_out_state(tendonfmu_finger* f, cursor* c) {
-  f->state_count = STATE_SCALARS;
-  for (size_t k = 0; k < state_row_count; ++k) {
-    f->state_count += state_row_length(f, &state_rows[k]);
-  }
-  f->state = take_numbers(c, f->state_count);
-  double* run = f->state;
-  f->remembered.scalar = part(&run, STATE_SCALARS);
-  for (size_t k = 0; k < state_row_count; ++k) {
-    double** pointer = (double**)(void*)((char*)&f->remembered + state_rows[k].place);
-    *pointer = part(&run, state_row_length(f, &state_rows[k]));
-  }
-}
-
-static void lay_out_scratch(tendonfmu_finger* f, cursor* c) {
-  finger_scratch* s = &f->scratch;
-  const size_t matrix = f->joints * f->tendon_lanes;
-  double** const tendon_rows[] = {&s->force, &s->position, &s->slack};
-  double** const joint_rows[] = {&s->angle,     &s->torque,           &s->friction,      &s->bias_step,
-                                 &s->load,      &s->joint_friction,   &s->load_friction, &s->joint_bias,
-                                 &s->load_bias, &s->residual_variance};
-  double** const band_rows[] = {&s->slip_torque, &s->limit, &s->motor_load, &s->unknown};
-  double** const limit_rows[] = {&s->edge_limit, &s->pulley_limit};
-  const int banded = (f->shape.options & MODEL_DETECTS_BY_BANDS) != 0;
-  double** const matrices[] = {&s->edge,      &s->pulley,      &s->edge_bias, &s->pulley_bias,
-                               &s->edge_loss, &s->pulley_loss, &s->force_at,  &s->force_between};
-  for (size_t i = 0; i < sizeof tendon_rows / sizeof tendon_rows[0]; ++i) {
-    *tendon_rows[i] = take_numbers(c, f->tendon_lanes);
-  }
-  for (size_t i = 0; i < sizeof joint_rows / sizeof joint_rows[0]; ++i) {
-    *joint_rows[i] = take_numbers(c, f->joint_lanes);
-  }
-  for (size_t i = 0; i < sizeof matrices / sizeof matrices[0]; ++i) {
-    *matrices[i] = take_numbers(c, matrix);
-  }
-  for (size_t i = 0; i < sizeof band_rows / sizeof band_rows[0]; ++i) {
-    *band_rows[i] = take_numbers(c, banded ? f->joint_lanes : 0);
-  }
-  for (size_t i = 0; i < sizeof limit_rows / sizeof limit_rows[0]; ++i) {
-    *limit_rows[i] = take_numbers(c, banded ? f->slots : 0);
-  }
-  const size_t sensors = f->shape.options & MODEL_HAS_SENSOR_FAULT ? 1 : 0;
-  s->sensor = take_numbers(c, sensors * SENSOR_ROWS * f->tendon_lanes);
-  s->watch = take_numbers(c, sensors * f->joint_lanes);
-  s->inverse_routing = take_numbers(c, sensors * f->joints * f->tendon_lanes);
-  s->leverage = take_numbers(c, sensors * f->tendon_lanes);
-  s->determined = take_numbers(c, sensors * f->tendon_lanes);
-  s->row_in_use = take_numbers(c, sensors * f->tendon_lanes);
-  s->angle_shift = take_numbers(c, sensors * f->joint_lanes);
-  s->velocity = take_numbers(c, f->slots);
-  s->view = take(c, f->slots / 4 * sizeof *s->view);
+  take(c, 0); /* to where a row begins */
+  const size_t begin = c->used;
+  c->row_bytes = sizeof(double); /* one run */
+  place_rows(f, c, state_rows, state_row_count);
+  c->row_bytes = ROW_BYTES;
+  f->state = f->remembered.scalar;
+  f->state_count = (c->used - begin) / sizeof(double);
 }
 
 static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned char* base, uint32_t** words) {
-  cursor c = {base, 0};
+  cursor c = {base, 0, ROW_BYTES};
   take(&c, sizeof *f);
   f->shape = *shape;
   f->joints = shape->joints;
@@ -229,11 +224,11 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   f->tendon_lanes = (f->tendons + 3) / 4 * 4;
   f->slots = f->joints * f->tendon_lanes + f->joint_lanes;
   *words = take(&c, sizeof(uint32_t) * (shape->word_count + (size_t)MODEL_EXTENSION_WORDS * shape->extension_count));
-  lay_out_parameters(f, &c);
-  lay_out_derived(f, &c);
   lay_out_state(f, &c);
-  lay_out_extensions(f, &c);
-  lay_out_scratch(f, &c);
+  lay_out_prepared(f, &c);
+  place_rows(f, &c, other_rows, sizeof other_rows / sizeof other_rows[0]);
+  f->extensions.row = take(&c, f->shape.extension_count * sizeof(extension_row));
+  f->scratch.view = take(&c, f->slots / 4 * sizeof(slot_view));
   return c.used;
 }
 

@@ -44,7 +44,6 @@ typedef struct finger_settings {
 typedef struct extension_row {
   const effect_type* effect;
   effect_place place;
-  uint32_t index, first_parameter; /* in the description's order; among the parameters */
   const double* parameters;
   double *memory, *next; /* as the last sample left it; as the present one will */
   size_t memory_count;   /* of the effect itself */
@@ -160,10 +159,9 @@ typedef struct finger_state {
   /* [M] per tendon */
   double *force, *slack;
   /* [n × M + N] per slot, fig. 5 */
-  double* moving;                   /* 1 or 0 at the last sample */
-  double* side;                     /* sgn(v) of the last moving sample; 0: never moved */
-  double* side_before;              /* side before the last sample */
-  double* event;                    /* of the last sample: 1 came to rest, −1 began to move, 0 neither */
+  double* moving; /* 1 or 0 at the last sample */
+  double* side;   /* sgn(v) of the last moving sample; 0: never moved */
+  double* event;  /* of the last sample: 1 came to rest, s − 2 began to move after moving to side s, 0 neither */
   double *stuck_since, *last_stuck; /* s */
   double* jumped;                   /* [N] Σ Δb, N·m; this and the next with contact.bands only */
   double* bands;                    /* [N] band_memory */
@@ -176,40 +174,56 @@ typedef struct finger_state {
   double* extension;             /* as the extensions ask for */
 } finger_state;
 
-/* Which lanes of a row stand for something; the others hold 0, unless they are tracked along. */
-typedef enum row_lanes {
-  ROW_OF_JOINTS,
-  ROW_OF_TENDONS,
-  ROW_OF_SLOTS,
-  ROW_OF_MEMORY, /* of slots, where friction has a memory */
-  ROW_OF_ELEMENTS,
-  ROW_OF_CORDS,
-  ROW_OF_BANDS,
-  ROW_OF_EXTENSIONS
-} row_lanes;
+/* What a row has so many numbers of. */
+typedef enum row_unit {
+  OF_FINGER,
+  OF_JOINTS,   /* N */
+  OF_TENDONS,  /* M */
+  OF_MATRIX,   /* n × M */
+  OF_SLOTS,    /* n × M + N */
+  OF_ELEMENTS, /* slots, of each element side by side */
+  OF_PARAMETERS,
+  OF_RECORDS,   /* laws of the edges, as edge_law has them */
+  OF_ANGLES,    /* working points of the edges, most points × M a joint */
+  OF_EXTENSIONS /* what they remember */
+} row_unit;
 
-/* A row of the state, or some of a kind: where finger_state points to it, and what may stand in a saved one. */
-typedef struct state_row {
-  size_t place; /* offset in finger_state */
-  row_lanes lanes;
-  size_t rows;
-  uint32_t option; /* without which it is empty; 0: always there */
+/* Of what finger it is a part; NULL in any other. */
+typedef enum row_condition {
+  ALWAYS,
+  WITH_BANDS,
+  WITH_SENSOR_FAULT,
+  WITH_LINKS,
+  WITH_EXTENSIONS,
+  WITH_MEMORY, /* of friction */
+  WITH_TWO_ELEMENTS,
+  WITH_CORDS /* that stretch */
+} row_condition;
+
+/* Rows of numbers, each with a pointer in struct tendonfmu_finger: all of its memory follows from such. */
+typedef struct finger_row {
+  size_t place, pointers; /* offset of the first pointer; how many side by side */
+  row_unit unit;
+  size_t count; /* of the unit; 0: 1 */
+  row_condition when;
+  /* what may stand in a saved state */
   double low, high;
-  int whole;       /* whole numbers only */
-  int spare_lanes; /* lanes that stand for nothing are tracked along */
-} state_row;
+  int whole;                      /* whole numbers only */
+  int spare;                      /* lanes that stand for nothing are tracked along; else they hold 0 */
+  const struct finger_row* parts; /* [count] where each has limits of its own */
+} finger_row;
 
-/* All but the scalars, in the order of the state. */
-extern const state_row state_rows[];
+/* The state in its order. */
+extern const finger_row state_rows[];
 extern const size_t state_row_count;
 
 /* The laws of four neighbouring slots as they look at present: on the side to which each lane moves, and between the
  * working points among which the joint before stands. A view is valid until a velocity changes sign or the angle leaves
  * [low, high); most samples find it valid. Rows of four lanes; laws by number (LAW_COULOMB, …). */
 typedef struct slot_view {
-  double key[4];                      /* lane 0: bits of the negative sides; −1: to be filled */
-  double blends[4];                   /* lane 0: 1 where any lane stands between two working points */
-  double low[4], high[4];             /* rad */
+  double key[4];          /* bits of the negative sides; −1: to be filled. This and the next in lane 0 for */
+  double blends[4];       /* all, in plain C in each lane; 1 where one stands between two working points */
+  double low[4], high[4]; /* rad */
   double begin[4], inverse_length[4]; /* of the segment: rad, 1/rad; 0 outside the grid */
   double below[LAW_SIDE_NUMBERS][4];  /* F_B at the working point below; joints: T_jv0 */
   double above[LAW_SIDE_NUMBERS][4];  /* F_B at the one above */
@@ -219,37 +233,38 @@ typedef struct slot_view {
 /* Of one sample only; nothing in it decides what the next one gives. */
 typedef struct finger_scratch {
   double *force, *position;        /* [M] inputs, padded */
+  double* slack;                   /* [M] */
   double* velocity;                /* [n × M + N] */
   slot_view* view;                 /* [(n × M + N) / 4] */
-  double* angle;                   /* [N] */
   double *edge, *pulley;           /* [n × M] F_B, F_A; pulley in the row of its slot */
   double *edge_bias, *pulley_bias; /* [n × M] b of the same */
   double *force_at,
       *force_between; /* [n × M] f_A before each joint and f_B, as they multiply an F: |f| if bidirectional */
-  double* slack;      /* [M] */
+  double* angle;      /* [N] */
   double *torque, *friction, *bias_step, *load;                    /* [N] τ, T, Δb, Σ f_B */
   double *joint_friction, *load_friction, *joint_bias, *load_bias; /* [N] T_jv0, T_jvf and their b */
+  double* residual_variance;                                       /* [N] S, (N·m)²; of a guided sample only */
   /* with contact.bands only */
   double *edge_limit, *pulley_limit; /* [n × M + N] |F| of the law, whether it acts or not; joints T_jv0, T_jvf */
   double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
   double* motor_load;                /* [N] x, N·m */
   double* unknown;                   /* [N] max(V, W) before this sample, N·m */
   band_shares shares;                /* of the last step */
-  double* residual_variance;         /* [N] S, (N·m)²; of a guided sample only */
-  double* sensor; /* [SENSOR_ROWS × M] as in the state, after this sample; this and the next with sensor_fault only */
-  double* watch;  /* [N] likewise */
-  double* inverse_routing;         /* [n × M] R⁺ of the rows in use */
-  double* leverage;                /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;              /* [M] 1: the others determine the angles */
-  double* row_in_use;              /* [M] 1 or 0 */
-  double* angle_shift;             /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;           /* no row in use belongs to a failing sensor */
-  int unwell;                      /* as in the state, after this sample */
-  double* extension;               /* the memory of the extensions after this sample */
-  double *edge_loss, *pulley_loss; /* [n × M] N, what a tendon loses there */
-  double *grip, *bias_grip;        /* [n × M + N] what friction rows make of F and b; with extensions only */
-  double* own_limit;               /* [N] N·m, what torque rows add to the limit of a joint; with a memory only */
-  double* travelled;               /* [n × M + N] Δ; this and the next with a memory only */
+  /* with sensor_fault only */
+  double* sensor;           /* [SENSOR_ROWS × M] as in the state, after this sample */
+  double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
+  double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;       /* [M] 1: the others determine the angles */
+  double* row_in_use;       /* [M] 1 or 0 */
+  double* watch;            /* [N] as in the state, after this sample */
+  double* angle_shift;      /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;    /* no row in use belongs to a failing sensor */
+  int unwell;               /* as in the state, after this sample */
+  double* extension;        /* the memory of the extensions after this sample */
+  double *grip, *bias_grip; /* [n × M + N] what friction rows make of F and b; with extensions only */
+  /* with a memory only */
+  double* own_limit;                                 /* [N] N·m, what torque rows add to the limit of a joint */
+  double* travelled;                                 /* [n × M + N] Δ */
   double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
   effect_sample sample;                              /* as the extensions see it */
 } finger_scratch;
@@ -271,7 +286,8 @@ struct tendonfmu_finger {
   size_t slots;                     /* n·M + N */
   uint64_t image_id;                /* checksum of the image */
   const step_kernel* kernel;
-  double *start, *parameters, *candidate; /* [p] of the image, in force, being checked */
+  double *start, *candidate, *parameters; /* [p] of the image, being checked, in force */
+  size_t prepared_bytes;                  /* from `parameters` on: these and all arrays that follow from them */
   double* state;                          /* [state_count], what `remembered` points into */
   size_t state_count;
   extension_rows extensions;
@@ -299,6 +315,12 @@ static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
   return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
 }
 
+/* Side before the last sample of a slot that rested then, or rests now. */
+static inline double side_before(const tendonfmu_finger* finger, size_t slot) {
+  const double event = finger->remembered.event[slot];
+  return event < 0.0 ? event + 2.0 : finger->remembered.side[slot];
+}
+
 /* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted
  * when it began to move. */
 static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) {
@@ -309,8 +331,9 @@ static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) 
              : finger->derived.settings.forget_rate * (s->last_stuck[slot] - since);
 }
 
-/* Numbers of a row. */
-size_t state_row_length(const tendonfmu_finger* finger, const state_row* row);
+/* How many of a unit stand behind each pointer of a row, 0 where the finger lacks it, and how long that is. */
+size_t row_count(const tendonfmu_finger* finger, const finger_row* row);
+size_t unit_length(const tendonfmu_finger* finger, row_unit unit);
 
 /* Bytes needed for a finger of a checked image header. */
 size_t finger_memory_size(const model_shape* shape);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "model_image.h"
+#include "sine_cosine.h"
 
 static double dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -41,7 +42,8 @@ static void to_base(const rotation* frame, const double own[3], double base[3]) 
 
 /* turned about a unit vector in its own frame (Rodrigues) */
 static void turn(rotation* frame, const double axis[3], double angle) {
-  const double s = sin(angle), c = cos(angle);
+  const sine_cosine of = sine_cosine_of(angle);
+  const double s = of.sine, c = of.cosine;
   const rotation before = *frame;
   for (int k = 0; k < 3; ++k) {
     const double across[3] = {k == 0   ? 0.0

@@ -279,9 +279,8 @@ int parameter_check_relations(const model_shape* shape, const double* values, me
 
 int parameter_check_routing(const model_shape* shape, const double* values, message_line message) {
   routing r = {.values = values};
-  double inverse[MODEL_MAX_TENDONS * MODEL_MAX_JOINTS];
   model_visit(shape, collect_arms, &r);
-  if (pseudo_inverse(shape->tendons, shape->joints, r.rows, inverse) < shape->joints) {
+  if (pseudo_inverse(shape->tendons, shape->joints, r.rows, r.rows) < shape->joints) {
     message_start(message,
                   "tendons: moment_arms are not of full column rank, so the joint angles do not follow from "
                   "the tendon positions; expected ");

@@ -101,9 +101,10 @@ static void give_numbers(double* to, const double* from, size_t count, size_t ro
   }
 }
 
+/* from NULL: 0 */
 static void give_flags(unsigned char* to, const double* from, size_t count, size_t row) {
   for (size_t i = 0; to && i < count; ++i) {
-    to[row * count + i] = from[i] != 0.0;
+    to[row * count + i] = from && from[i] != 0.0;
   }
 }
 
@@ -130,15 +131,10 @@ static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
 
 /* failing sensors and what they hide; 0 without sensor_fault */
 static void give_sensors(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  const int watches = finger->derived.settings.watches_sensors;
-  if (outputs->sensor_fault && watches) {
-    give_flags(outputs->sensor_fault, sensor_row(finger, finger->remembered.sensor, SENSOR_FAULT), finger->tendons,
-               row);
-  } else if (outputs->sensor_fault) {
-    memset(outputs->sensor_fault + row * finger->tendons, 0, finger->tendons);
-  }
+  double* sensor = finger->remembered.sensor;
+  give_flags(outputs->sensor_fault, sensor ? sensor_row(finger, sensor, SENSOR_FAULT) : NULL, finger->tendons, row);
   if (outputs->contact_observable) {
-    outputs->contact_observable[row] = watches && !any_joint_is_blind(finger);
+    outputs->contact_observable[row] = sensor && !any_joint_is_blind(finger);
   }
 }
 

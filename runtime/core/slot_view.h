@@ -4,10 +4,11 @@
 
 #include "finger_memory.h"
 
-/* Fills the view of four slots from `slot` on.
+/* Fills the view of `count` slots from `slot` on, 1 or 4: its lanes from slot % 4 on.
  *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints
  *   negative      one bit a lane: the law's side for v < 0 */
-void slot_view_fill(const tendonfmu_finger* finger, size_t slot, double angle, int negative, slot_view* view);
+void slot_view_fill(const tendonfmu_finger* finger, size_t slot, size_t count, double angle, int negative,
+                    slot_view* view);
 
 /* Segment of a grid in which an angle lies, as the number of working points at or below it. */
 size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle);

@@ -42,8 +42,8 @@ class pass_worker {
     }
   }
 
-  segment_sum sum(const recording_track& recording, const segment_states& states, const bias_gains& gains,
-                  std::size_t segment, std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
+  segment_sum sum(const recording_track& recording, const bias_gains& gains, std::size_t segment,
+                  std::atomic<std::size_t>* done, const std::atomic<bool>& stopped) {
     const std::size_t first = segment * recording.segment_length();
     const std::size_t last = std::min(first + recording.segment_length(), recording.samples());
     const auto q = static_cast<Eigen::Index>(columns_.count);
@@ -52,7 +52,7 @@ class pass_worker {
     for (joint_sum& joint : joints_) {
       joint.begin_segment();
     }
-    finger_.resume(states[segment], numbers_);
+    finger_.resume(recording.states()[segment], numbers_);
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
@@ -111,12 +111,12 @@ class pass_worker {
   }
 
   void add_row(const sensitivity_term& term, double factor, joint_sum* joint) const {
-    if (term.run_length > 0) {
-      joint->rows.add_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), factor);
+    if (term.side->run_length > 0) {
+      joint->rows.add_run(columns_.unknown[term.side->run_first], term.side->run_length, term.run_slope.data(), factor);
     } else {
       for (std::size_t k = 0; k < 4; ++k) {
-        if (term.column[k] >= 0) {
-          joint->rows.add(columns_.unknown[static_cast<std::size_t>(term.column[k])], factor * term.slope[k]);
+        if (term.side->column[k] >= 0) {
+          joint->rows.add(columns_.unknown[static_cast<std::size_t>(term.side->column[k])], factor * term.slope[k]);
         }
       }
     }
@@ -127,12 +127,13 @@ class pass_worker {
   }
 
   void add_jump(const sensitivity_term& term, double factor, joint_sum* joint) const {
-    if (term.run_length > 0) {
-      joint->rows.jump_run(columns_.unknown[term.run_first], term.run_length, term.run_slope.data(), -factor);
+    if (term.side->run_length > 0) {
+      joint->rows.jump_run(columns_.unknown[term.side->run_first], term.side->run_length, term.run_slope.data(),
+                           -factor);
     } else {
       for (std::size_t k = 0; k < 4; ++k) {
-        if (term.column[k] >= 0) {
-          joint->rows.jump(columns_.unknown[static_cast<std::size_t>(term.column[k])], -factor * term.slope[k]);
+        if (term.side->column[k] >= 0) {
+          joint->rows.jump(columns_.unknown[static_cast<std::size_t>(term.side->column[k])], -factor * term.slope[k]);
         }
       }
     }
@@ -208,12 +209,6 @@ class data_pass {
         tasks_.push_back({r, s});
       }
     }
-    if (remembers_numbers(problem.finger.get())) {
-      free_finger finger(problem.image.data(), problem.image.size());
-      for (const recording_track& recording : problem.recordings) {
-        states_.push_back(states_with(recording, &finger, numbers_));
-      }
-    }
     waiting_.resize(tasks_.size());
     const auto q = static_cast<Eigen::Index>(problem.columns.count);
     sum_ = MatrixXd::Zero(q, q);
@@ -277,18 +272,13 @@ class data_pass {
     std::vector<std::thread> threads_;
   };
 
-  const segment_states& states(std::size_t recording) const {
-    return states_.empty() ? problem_.recordings[recording].states() : states_[recording];
-  }
-
   void work() {
     try {
       pass_worker worker(problem_, numbers_, expanded_);
       for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
         const pass_task& task = tasks_[k];
-        auto segment =
-            std::make_unique<segment_sum>(worker.sum(problem_.recordings[task.recording], states(task.recording),
-                                                     gains_[task.recording], task.segment, &done_, stopped_));
+        auto segment = std::make_unique<segment_sum>(
+            worker.sum(problem_.recordings[task.recording], gains_[task.recording], task.segment, &done_, stopped_));
         const std::lock_guard<std::mutex> lock(mutex_);
         waiting_[k] = std::move(segment);
         join_waiting();
@@ -319,7 +309,6 @@ class data_pass {
   const std::vector<double> numbers_;
   const bool expanded_;
   std::vector<bias_gains> gains_;
-  std::vector<segment_states> states_; /* empty: those kept with the recordings */
   std::vector<pass_task> tasks_;
   std::vector<std::unique_ptr<segment_sum>> waiting_;
   std::vector<VectorXd> held_;

@@ -37,7 +37,7 @@ class free_finger {
 };
 
 /* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction, or of
- * friction with a memory. The states kept with a recording, which are those of the start, are then found anew. */
+ * friction with a memory. The states kept with a recording, which are those of the start, then hold for no others. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
 /* The finger's state at the beginning of each segment of a recording. */

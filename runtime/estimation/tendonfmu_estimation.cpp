@@ -19,12 +19,6 @@ struct tendonfmu_estimator {
       : problem(image, size, group, scale) {}
   fit_problem problem;
   mutable std::string error;
-  /* of a finger that remembers_numbers(): the states of one recording at the unknowns last asked for */
-  struct {
-    std::size_t recording = 0;
-    std::vector<double> z;
-    tendonfmu::estimation::segment_states states;
-  } last;
 };
 
 namespace {
@@ -44,22 +38,6 @@ std::vector<double> checked(const fit_problem& problem, const double* z) {
     values[k] = std::min(std::max(values[k], u.lower), u.upper);
   }
   return values;
-}
-
-const segment_states& states_at(tendonfmu_estimator* estimator, std::size_t recording, const std::vector<double>& z,
-                                const std::vector<double>& numbers, free_finger* finger) {
-  const recording_track& r = estimator->problem.recordings[recording];
-  if (!remembers_numbers(finger->get())) {
-    return r.states();
-  }
-  auto& last = estimator->last;
-  if (last.states.empty() || last.recording != recording || last.z != z) {
-    last.states.clear(); /* nothing, should anything fail from here on */
-    last.z = z;
-    last.recording = recording;
-    last.states = states_with(r, finger, numbers);
-  }
-  return last.states;
 }
 
 void known_recording(const fit_problem& problem, std::size_t recording) {
@@ -98,10 +76,10 @@ void replay(tendonfmu_estimator* estimator, std::size_t recording, const std::ve
   if (count == 0) {
     return;
   }
-  const std::size_t segment = first / r.segment_length();
+  const std::size_t segment = remembers_numbers(finger->get()) ? 0 : first / r.segment_length();
   const std::vector<double> numbers = problem.unknowns.write(z.data());
   if (segment > 0) {
-    finger->resume(states_at(estimator, recording, z, numbers, finger)[segment], numbers);
+    finger->resume(r.states()[segment], numbers);
   } else {
     finger->begin(numbers, r.kinematics_source());
   }

@@ -24,11 +24,16 @@ const char* const one_joint = R"({"format": "tendonfmu-finger-1", "name": "one",
 class call_session {
  public:
   call_session(FuzzedDataProvider& data, const byte_list& image)
-      : data_(data), finger_(tendonfmu_create(image.data(), image.size(), nullptr, 0)) {
-    PROMISE(finger_ != nullptr);
+      : data_(data),
+        finger_(tendonfmu_create(image.data(), image.size(), nullptr, 0)),
+        spare_(tendonfmu_create(image.data(), image.size(), nullptr, 0)) {
+    PROMISE(finger_ != nullptr && spare_ != nullptr);
     kept_ = promises::saved(finger_);
   }
-  ~call_session() { tendonfmu_destroy(finger_); }
+  ~call_session() {
+    tendonfmu_destroy(finger_);
+    tendonfmu_destroy(spare_);
+  }
   call_session(const call_session&) = delete;
   call_session& operator=(const call_session&) = delete;
 
@@ -47,10 +52,10 @@ class call_session {
 
  private:
   tendonfmu_status one_call() {
-    switch (data_.ConsumeIntegralInRange(0, 12)) {
+    switch (data_.ConsumeIntegralInRange(0, 13)) {
       case 0: return first_sample();
       case 1: return tendonfmu_reset(finger_);
-      case 2: return write_parameters();
+      case 2: return with_sound_parameters(write_parameters(finger_));
       case 3: return write_one_parameter();
       case 4: kept_ = promises::saved(finger_); return TENDONFMU_OK;
       case 5: return tendonfmu_restore_state(finger_, kept_.data(), kept_.size());
@@ -59,6 +64,7 @@ class call_session {
       case 8: return derive();
       case 9: return tendonfmu_set_kinematics_source(finger_, data_.ConsumeIntegralInRange(-1, 5));
       case 10: return choose_kernel();
+      case 11: return take_prepared();
       default: return step();
     }
   }
@@ -123,13 +129,19 @@ class call_session {
     return status;
   }
 
-  tendonfmu_status write_parameters() {
+  tendonfmu_status write_parameters(tendonfmu_finger* finger) {
     std::vector<std::size_t> indices(data_.ConsumeIntegralInRange<std::size_t>(0, 4));
     for (std::size_t& index : indices) {
-      index = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger_));
+      index = data_.ConsumeIntegralInRange<std::size_t>(0, tendonfmu_parameter_count(finger));
     }
     const std::vector<double> values = row(indices.size(), 1.0);
-    return with_sound_parameters(tendonfmu_set_parameters(finger_, indices.size(), indices.data(), values.data()));
+    return tendonfmu_set_parameters(finger, indices.size(), indices.data(), values.data());
+  }
+
+  // of the spare, whose last call may have been refused
+  tendonfmu_status take_prepared() {
+    write_parameters(spare_);
+    return with_sound_parameters(tendonfmu_take_parameters(finger_, spare_));
   }
 
   tendonfmu_status write_one_parameter() {
@@ -177,7 +189,7 @@ class call_session {
   }
 
   FuzzedDataProvider& data_;
-  tendonfmu_finger* finger_;
+  tendonfmu_finger *finger_, *spare_;
   byte_list kept_;
   std::vector<double> force_, position_, angle_, velocity_;
   std::size_t rows_taken_ = 0;

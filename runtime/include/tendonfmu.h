@@ -11,8 +11,8 @@
  *   Ownership  The caller owns every pointer it passes; nothing is kept beyond the call, except the memory
  *              given to tendonfmu_place(), which the finger lives in until the caller takes it back.
  *   Threads    A finger may be used by one thread at a time. Different fingers share nothing.
- *   Real time  initialise, step, run, get_*, set_*, save_state, restore_state and reset allocate nothing, take no
- *              lock and make no system call. Only tendonfmu_create() and tendonfmu_destroy() use the heap.
+ *   Real time  initialise, step, step_hand, run, get_*, set_*, take_parameters, save_state, restore_state and reset
+ * allocate nothing, take no lock and make no system call. Only tendonfmu_create() and tendonfmu_destroy() use the heap.
  *   Errors     A function that fails returns a status other than TENDONFMU_OK, leaves the finger as it was, and
  *              says why in one line in tendonfmu_last_error().
  *   Host       Floating-point mode, locale, signals and working directory are neither changed nor relied on.
@@ -66,7 +66,7 @@ size_t tendonfmu_memory_size(const void* image, size_t image_size);
 /* Places a finger into memory of the caller: no allocation, for microcontrollers and real-time start-up.
  *   memory        [memory_size >= tendonfmu_memory_size()] bytes, any alignment; must not be moved while in use
  * The image is copied and may be freed afterwards. Creation, tendonfmu_reset(), restoring a state with other parameters
- * and writing moment arms use up to 32 KiB of stack; every other call less than 8 KiB. Returns NULL when refused, with
+ * and writing moment arms use up to 24 KiB of stack; every other call less than 8 KiB. Returns NULL when refused, with
  * the reason in message. */
 tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* image, size_t image_size, char* message,
                                   size_t message_size);
@@ -130,6 +130,15 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
  *                 and the outputs of the rows before it are written */
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
                                const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done);
+
+/* Takes the sample at `time` of every finger of a hand, and copies what it gives. A finger that has taken no sample
+ * takes its first one. Where one sample is refused, that finger stays as it was and the others take theirs. fingers
+ * [count], each another one inputs        [count], those of finger k outputs       [count], or NULL: not wanted; those
+ * of a finger that refuses are left alone statuses      [count] receives what tendonfmu_step() would return of each, or
+ * NULL Returns TENDONFMU_OK, or the status of the first finger that refuses. */
+tendonfmu_status tendonfmu_step_hand(size_t count, tendonfmu_finger* const* fingers, double time,
+                                     const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs,
+                                     tendonfmu_status* statuses);
 
 /* What the caller of tendonfmu_run_guided() knows of a recording, and one more of its results. NULL arrays: learn from
  * all samples, no torque known, not wanted. */
@@ -201,6 +210,13 @@ tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t
  * finger (static >= coulomb, angles increasing, moment arms of full column rank). Takes effect with the next sample. */
 tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count, const size_t* indices,
                                           const double* values);
+
+/* Takes over all parameters of another finger of the same image. Their checks and all that follows from them were done
+ * when they were written into that one, so this is a copy, bounded by the number of parameters: for a control loop
+ * whose parameters another thread prepares. It allocates nothing and takes no lock; `prepared` is only read, and the
+ * caller sees to it that nobody writes it meanwhile. What a later sample gives is as after tendonfmu_set_parameters().
+ * TENDONFMU_WRONG_ORDER where a parameter that is fixed once the first sample is taken differs. */
+tendonfmu_status tendonfmu_take_parameters(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
 
 /* One parameter by its path. */
 tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const char* path, double* value);

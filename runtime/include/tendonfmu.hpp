@@ -246,6 +246,12 @@ class finger {
                : status::bad_argument;
   }
 
+  /* All parameters of another finger of the same image: bounded time, for a loop that another thread prepares them for.
+   */
+  status take_parameters(const finger& prepared) noexcept {
+    return to_status(tendonfmu_take_parameters(handle_, prepared.handle_));
+  }
+
   /* --- State: of state_size() bytes; to be restored into this finger or another one of the same image --- */
 
   std::size_t state_size() const noexcept {

@@ -5,7 +5,7 @@
 #include "exponential_kernels.h"
 
 void exponential_plain(const double* x, double* result, size_t count) {
-  for (size_t i = 0; i < count; i += 4) {
+  for (size_t i = 0; i < count; i += QUAD_LANES) {
     quad_store(result + i, exp_of_minus(quad_load(x + i)));
   }
 }

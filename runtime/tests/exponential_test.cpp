@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "core_inside.h"
-#include "sine_cosine.h"
 #include "test_finger.h"
 
 extern "C" {
 #include "exponential_kernels.h"
+#include "sine_cosine.h"
 }
 
 namespace {
@@ -110,6 +110,21 @@ TEST(Exponential, OneMinusIsExactForSmallArguments) {
   for (const double x : {1e-3, 1e-5, 1e-9, 1e-300}) {
     EXPECT_DOUBLE_EQ(law_one_minus_exponential(x), -std::expm1(-x));
   }
+}
+
+TEST(Logarithm, IsWithinAnUlp) {
+  std::mt19937_64 random(8);
+  double worst = 0.0;
+  for (int i = 0; i < 400000; ++i) {
+    const double size = std::uniform_real_distribution<>(-40.0, 9.0)(random);
+    const double x = i % 2 == 0 ? std::exp2(size) : 1.0 - std::exp2(size - 10.0);
+    const long double exact = logl(static_cast<long double>(x));
+    worst = std::max(worst, static_cast<double>(fabsl(law_logarithm(x) - exact) / ulp(std::fabs(law_logarithm(x)))));
+  }
+  EXPECT_LT(worst, std::numeric_limits<long double>::digits > 60 ? 1.0 : 1.5);
+  EXPECT_EQ(law_logarithm(1.0), 0.0);
+  EXPECT_EQ(law_logarithm(0.5), -std::log(2.0));
+  EXPECT_NEAR(law_logarithm(std::numeric_limits<double>::min()), std::log(std::numeric_limits<double>::min()), 1e-12);
 }
 
 // --- the same bits in all kernels -----------------------------------------------------------------------------------

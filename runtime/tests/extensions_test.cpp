@@ -135,7 +135,6 @@ TEST(Places, OfARowAreTheSlotsThatItActsOn) {
                                  {nowhere, nowhere, nowhere}};
   for (const effect_place& place : places) {
     extension_row row{};
-    row.effect = effect_by_name("friction_drift");
     row.place = place;
     std::vector<std::size_t> member(finger.handle->slots, 99);
     for (std::size_t k = 0; k < friction_members(finger, place); ++k) {

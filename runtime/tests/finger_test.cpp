@@ -398,6 +398,17 @@ void expect_refused(const Finger& finger, const std::vector<Damage>& damages) {
   EXPECT_EQ(restore(finger, good), TENDONFMU_OK);
 }
 
+TEST(Memory, LacksWhatTheFingerHasNot) {
+  const Finger finger;
+  const finger_state& s = finger.handle->remembered;
+  const finger_scratch& o = finger.handle->scratch;
+  const derived_numbers& d = finger.handle->derived;
+  for (const double* row : {s.bands, s.sensor, s.watch, s.element, s.tension, s.extension, o.limit, o.sensor,
+                            o.own_limit, o.tension, d.band_square, d.links.axis}) {
+    EXPECT_EQ(row, nullptr);
+  }
+}
+
 TEST(SavedState, WithANumberThatCannotBeIsRefused) {
   Finger finger(image_of(test_finger::detecting));
   finger.run(motion(), 0, 1900);
@@ -416,6 +427,8 @@ TEST(SavedState, WithANumberThatCannotBeIsRefused) {
                           {"negative absorption", s.scalar + STATE_ABSORBED, -1.0},
                           {"more absorbed before", s.scalar + STATE_ABSORBED_BEFORE, s.scalar[STATE_ABSORBED] + 1.0},
                           {"rest that begins after it ends", s.stuck_since, s.scalar[STATE_ABSORBED] + 1.0},
+                          {"unwell without sensor_fault", s.scalar + STATE_UNWELL, 1.0},
+                          {"scalar that is none", s.scalar + STATE_SCALARS - 1, 1.0},
                           {"third side", s.side, 2.0},
                           {"side without a tendon", s.side + tendons, 1.0},
                           {"jumps that overflow", s.jumped, 1e200}});

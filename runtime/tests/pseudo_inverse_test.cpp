@@ -50,8 +50,11 @@ Matrix transposed(const Matrix& a) {
 }
 
 Matrix inverse(const Matrix& a, std::size_t* rank = nullptr) {
-  Matrix b(a.columns, a.rows);
+  Matrix b(a.columns, a.rows), in_place(a.columns, a.rows);
+  in_place.a = a.a;
   const std::size_t found = pseudo_inverse(a.rows, a.columns, a.a.data(), b.a.data());
+  EXPECT_EQ(pseudo_inverse(a.rows, a.columns, in_place.a.data(), in_place.a.data()), found);
+  EXPECT_EQ(in_place.a, b.a);
   if (rank) {
     *rank = found;
   }

@@ -85,7 +85,11 @@ def convert(
     ] = None,
     map_: Annotated[
         Path | None,
-        typer.Option("--map", metavar="MAP.json", help="table, lerobot: name, unit and sign of each column"),
+        typer.Option(
+            "--map",
+            metavar="MAP.json",
+            help='name, unit and sign of each column; inspect: how a text is written, of its "log"',
+        ),
     ] = None,
     finger: Annotated[
         Path | None, typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write")
@@ -103,8 +107,8 @@ def convert(
     given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
     options = {name: value for name, value in given.items() if value is not None}
     if source == INSPECT:
-        _refuse_options(source, {**options, "map": map_, "finger": finger}, "-o")
-        report = _inspect(file, output, episodes)
+        _refuse_options(source, {**options, "finger": finger}, "-o or --map")
+        report = _inspect(file, output, map_, episodes)
     elif output is None:
         raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
     elif source == LEROBOT:
@@ -135,16 +139,17 @@ def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> N
             raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
 
 
-def _inspect(file: Path, output: Path | None, episodes: str | None) -> dict[str, Any]:
+def _inspect(file: Path, output: Path | None, map_file: Path | None, episodes: str | None) -> dict[str, Any]:
     """Print what is in a log, write the proposed map, and return both."""
     from tendonfmu.files import check_output, counted, write_text
-    from tendonfmu.recordings import LeRobotLog, inspect_log, inspection_document, propose
+    from tendonfmu.recordings import LeRobotLog, inspect_log, inspection_document, propose, read_log_format
 
     if output is not None:
         if output.suffix.lower() != ".json":
             raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
         check_output(output, file)
-    inspection = inspect_log(file, None if episodes is None else LeRobotLog(file, chosen=episodes))
+    log = None if episodes is None else LeRobotLog(file, chosen=episodes)
+    inspection = inspect_log(file, log, None if map_file is None else read_log_format(map_file))
     proposal = propose(inspection)
     _print_inspection(inspection, proposal)
     for note in (*inspection.notes, *proposal.notes):
@@ -157,7 +162,7 @@ def _inspect(file: Path, output: Path | None, episodes: str | None) -> dict[str,
 
 
 def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
-    from tendonfmu.recordings import clock_line, field_rows, proposal_rows
+    from tendonfmu.recordings import clock_line, field_rows, proposal_rows, unused_line
 
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in inspection.topics:
@@ -165,7 +170,7 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
         print_results([(topic.topic.name, headings, list(field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")
-    print_results([("proposed map", columns, list(proposal_rows(proposal)))], orders, "why")
+    print_results([("proposed map", columns, list(proposal_rows(proposal)))], [*orders, *unused_line(proposal)], "why")
 
 
 def _convert_table(

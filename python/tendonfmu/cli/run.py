@@ -17,7 +17,7 @@ from tendonfmu.options import BuildOptions, RunOptions
 @command(BuildOptions, reads=("file",))
 def build(
     file: Subject,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU to write")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FINGER.fmu", help="FMU, or C source, to write")],
     reference: Annotated[
         Path | None, typer.Option(metavar="REC", help="recording; the FMU carries its inputs and outputs for checks")
     ] = None,
@@ -28,12 +28,16 @@ def build(
 
     Needs no compiler. The same input gives the same bytes.
     """
-    from tendonfmu.fmu import fmu_report
+    from tendonfmu.fmu import c_array_report, fmu_report
     from tendonfmu.interface import build as build_fmu
+    from tendonfmu.model import read_finger
 
     build_fmu(file, output, reference=reference, **vars(options))
     say(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
-    print_json(lambda: fmu_report(file, output))
+    if options.c_array:
+        print_json(lambda: c_array_report(file, read_finger(file), output))
+    else:
+        print_json(lambda: fmu_report(file, output))
 
 
 @command(RunOptions, reads=("model", "recording"))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from .c_array import c_array_report, write_c_array
     from .fmpy_client import run_fmu
     from .model_variables import NOT_IN_XML, VariableTable, elements, group_sizes, read_table, units_of
     from .packaging import (

@@ -27,6 +27,7 @@ def build(
     binaries: str | os.PathLike[str] | None = None,
     fmi: int = 2,
     sample_at: str = "begin",
+    c_array: bool = False,
 ) -> Path:
     """Pack a co-simulation FMU, of FMI 2.0 or 3.0. Needs no compiler; the same input gives the same bytes.
 
@@ -35,7 +36,7 @@ def build(
     finger
         A finger, its description, or the file of it; or the file of a rig, for the FMU of the simulated finger.
     output
-        The FMU to write, with a name that ends in .fmu.
+        The FMU to write, with a name that ends in .fmu; with `c_array` a C source, .c or .h.
     reference
         A recording of the finger: the FMU then carries its inputs, the outputs over it, and the tolerance of a
         comparison, and its default experiment has the span and step of the recording. None: the FMU carries no
@@ -50,6 +51,8 @@ def build(
     sample_at
         Time of the sample that a step of the FMU takes of the inputs as they stand: its "begin", or its "end", for
         masters that hand over the inputs of a step's end. A rig has "begin" alone.
+    c_array
+        Write the finger as a C array for a microcontroller, in place of an FMU. It takes no other option.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def build(
     ------
     InputError
         The description, the recording or a parameter set is refused, binaries are missing, the output cannot be
-        written or does not end in .fmu, or `fmi` is 3 or `sample_at` "end" with a rig.
+        written or has another suffix, or `fmi` is 3 or `sample_at` "end" with a rig.
 
     Warns
     -----
@@ -76,10 +79,12 @@ def build(
         from tendonfmu.simulate import is_rig
 
         file = finger_file(finger)
-        if is_rig(file):
+        if is_rig(file) and not options.c_array:
             return _build_plant(file, target, folder, others, options, alone=reference is None and not sets)
         others.insert(0, file)
     check_output(target, *others)
+    if options.c_array:
+        return _write_c_array(finger, target, options, alone=reference is None and not sets and folder is None)
     _check_suffix(target)
     model = read_finger(finger)
     files: dict[str, bytes] = {}
@@ -106,6 +111,16 @@ def _build_plant(
         raise InputError(f"{rig}: a rig; expected a finger description with a reference or parameter sets")
     _check_suffix(target)
     return build_plant_fmu(rig, target, binaries=binaries)
+
+
+def _write_c_array(finger: FingerSource, output: Path, options: BuildOptions, *, alone: bool) -> Path:
+    from tendonfmu.fmu import write_c_array
+
+    if not alone or options.fmi != 2 or options.sample_at != "begin":
+        raise InputError("c_array: a C source has no FMU's options; expected none of them")
+    if output.suffix.lower() not in (".c", ".h"):
+        raise InputError(f"{output}: expected a name that ends in .c or .h")
+    return write_c_array(read_finger(finger), output)
 
 
 def _check_suffix(output: Path) -> None:

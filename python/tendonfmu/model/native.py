@@ -56,6 +56,11 @@ def image_from_json(text: str | bytes) -> bytes:
         return _native.image_from_json(text.encode() if isinstance(text, str) else text)
 
 
+def memory_size(image: bytes) -> int:
+    """Return the bytes of memory that a finger of an image needs on this machine."""
+    return _native.memory_size(image)
+
+
 def image_guid(image: bytes, salt: int) -> str:
     """Return an identifier of an image's content."""
     return _native.image_guid(image, salt)

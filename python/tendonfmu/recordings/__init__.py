@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .best_angles import BestAngles, best_angles, with_angles
     from .columns import GROUPS, element_of, right_spelling
     from .converters import convert_file
+    from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
     from .converters.lerobot_log import LeRobotLog
     from .converters.one_joint import describe_joint, describe_recorded_joint, description_text, joint_description
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
         inspection_document,
         proposal_rows,
         propose,
+        unused_line,
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles

@@ -18,8 +18,8 @@ _TRAPS = {
     ),
     "wrapped": (
         "error",
-        "jumps by {size:.0f} steps, and no sample is between",
-        "signed numbers stored as unsigned, or a counter that overflows",
+        "jumps by {size:.0f} steps",
+        "signed numbers stored as unsigned, an encoder of many turns, or a counter that overflows",
         'write into the map of columns, at this column: "wrap": {size:.0f} if its unit is a step',
     ),
     "filled": (

@@ -12,7 +12,8 @@ import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.model import Finger
-from tendonfmu.recordings.faults import tendon_angles, value_step
+from tendonfmu.recordings.counters import finest, wrap_of
+from tendonfmu.recordings.faults import tendon_angles
 from tendonfmu.recordings.kinematics import UNITS
 from tendonfmu.recordings.recording import Recording
 
@@ -21,11 +22,7 @@ AT_ZERO = 0.005  # of the largest value: the smallest
 RESTS = 0.1  # of the samples at exactly 0
 ALIKE = 1.0 / 3.0  # of the mean force in the other direction
 BOTH_WAYS = 0.25  # of a joint's range, that it travels in each direction
-GRID = 0.01  # of the smallest difference: others are as near to a multiple of it
-LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
-EMPTY = 0.1  # of the range: the widest part that no sample reaches
 MADE_UP = 0.5  # of the samples; more straight lines are signals that are made up
-SAME = 0.02  # relative, between the jumps and the word
 STRAIGHT, LONGEST_STRAIGHT = 1e-6, 0.1  # of the range, second differences of a line; s
 FEWEST = 8  # samples of a line
 FINEST = 0.05  # of the steps of a sensor: its resolution, or slow motion
@@ -56,8 +53,8 @@ def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
     groups = {name: recording.groups[name] for name in UNITS if name in recording.groups}
     for name, values in groups.items():
         for k, column in enumerate(values.T):
-            if (word := wrapped(column)) is not None:
-                yield Trap("wrapped", (f"{name}[{k + 1}]",), word)
+            if (word := wrap_of(column, name.endswith("position"))) is not None:
+                yield Trap("wrapped", (f"{name}[{k + 1}]",), word / (finest(column) or 1.0))
     yield from _filled(recording.time, groups)
     yield from _slow(recording.time, groups)
     yield from _switched(recording.time, groups)
@@ -80,31 +77,6 @@ def is_magnitude(force: Numbers, angle: Numbers) -> bool:
     # under a load that friction nearly balances one way, a force with its sign comes near 0 that way only
     pulls = [float(force[1:][way].mean()) for way in (step > 0.0, step < 0.0)]
     return rests or min(pulls) > ALIKE * max(pulls)
-
-
-def wrapped(column: Numbers) -> float | None:
-    """Return the number of steps by which a column jumps if it is that of a word of a computer, else None."""
-    levels, step = np.unique(column), np.diff(column)
-    if len(levels) < 3:
-        return None
-    widest = int(np.argmax(np.diff(levels)))
-    above = column > (levels[widest] + levels[widest + 1]) / 2.0
-    jumps = np.abs(step[np.diff(above)])
-    if levels[widest + 1] - levels[widest] < EMPTY * float(np.ptp(column)) or not len(jumps):
-        return None
-    finest = value_step(column) or _finest(step)
-    if not finest:
-        return None
-    count = float(np.median(jumps)) / finest
-    word = float(2.0 ** np.round(np.log2(count)))
-    return word if word >= LEAST_WORD and abs(count / word - 1.0) < SAME else None
-
-
-def _finest(step: Numbers) -> float:
-    """Return the smallest difference of a column with very many values if all are multiples of it, else 0."""
-    sizes = np.abs(step[step != 0.0])
-    multiples = sizes / sizes.min()
-    return float(sizes.min()) if np.abs(multiples - np.round(multiples)).max() < GRID else 0.0
 
 
 def _magnitudes(finger: Finger, recording: Recording) -> Iterator[Trap]:

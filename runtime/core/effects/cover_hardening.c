@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* T_j = stiffness·(q_j − rest)³: the cubic part of the plastic cover's spring, beside the linear T_jq of eq. (8). */
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
@@ -17,7 +15,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
                   const effect_direction* direction, double* slope) {
   (void)memory;
   const double bend = sample->angle[place.joint] - sample->rest_angle[place.joint];
-  slope[place.joint] += 3.0 * parameters[0] * bend * bend * along(direction->angle, place.joint);
+  slope[place.joint] += 3.0 * parameters[0] * bend * bend * direction->angle[place.joint];
 }
 
 const effect_type effect_cover_hardening = {

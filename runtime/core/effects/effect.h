@@ -64,7 +64,7 @@ typedef struct effect_sample {
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
 
-/* A direction in the space of what a torque depends on: for derivatives. NULL: 0. */
+/* A direction in the space of what a torque depends on: for derivatives. */
 typedef struct effect_direction {
   const double *angle, *velocity, *force; /* [n], [n], [m] */
 } effect_direction;
@@ -115,7 +115,7 @@ typedef struct effect_type {
    * torque() adds to torque [n], N·m; */
   void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                  double* torque);
-  /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample */
+  /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample. NULL: 0. */
   void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                 const effect_direction* direction, double* slope);
   /* Of friction: the slot with whose velocity number k of its memory has its sign. Where friction has a memory there,
@@ -137,9 +137,8 @@ typedef struct effect_type {
   void (*signal_pass)(effect_place place, const double* parameters, const double* memory, effect_signals* direction);
 } effect_type;
 
-/* Row by id or name; NULL when there is none. */
+/* Row by id; NULL when there is none. */
 const effect_type* effect_by_id(uint32_t id);
-const effect_type* effect_by_name(const char* name);
 
 /* Row by position 0.., NULL past the end. */
 const effect_type* effect_at(size_t position);

@@ -3,11 +3,6 @@
 
 #include "effect.h"
 
-/* component of a direction's row; 0 where there is none */
-static inline double along(const double* row, size_t i) {
-  return row ? row[i] : 0.0;
-}
-
 /* r_ij */
 static inline double arm_at(const effect_sample* sample, size_t joint, size_t tendon) {
   return sample->moment_arm[joint * sample->lanes + tendon];

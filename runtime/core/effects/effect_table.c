@@ -1,5 +1,3 @@
-#include <string.h>
-
 #include "effect_facts.h"
 
 const effect_type* effect_at(size_t position) {
@@ -9,15 +7,6 @@ const effect_type* effect_at(size_t position) {
 const effect_type* effect_by_id(uint32_t id) {
   for (size_t i = 0; effect_at(i); ++i) {
     if (all_effects[i]->id == id) {
-      return all_effects[i];
-    }
-  }
-  return NULL;
-}
-
-const effect_type* effect_by_name(const char* name) {
-  for (size_t i = 0; effect_at(i); ++i) {
-    if (strcmp(all_effects[i]->name, name) == 0) {
       return all_effects[i];
     }
   }

@@ -21,7 +21,7 @@ static void torque(effect_place place, const double* parameters, const effect_sa
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)memory;
-  add_to_joints(place, sample, parameters[0] * along(direction->force, place.tendon), slope);
+  add_to_joints(place, sample, parameters[0] * direction->force[place.tendon], slope);
 }
 
 const effect_type effect_force_gain = {

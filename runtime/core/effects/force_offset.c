@@ -14,19 +14,8 @@ static void torque(effect_place place, const double* parameters, const effect_sa
   }
 }
 
-static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                  const effect_direction* direction, double* slope) {
-  (void)place; /* constant */
-  (void)parameters;
-  (void)sample;
-  (void)memory;
-  (void)direction;
-  (void)slope;
-}
-
 const effect_type effect_force_offset = {
     FORCE_OFFSET_FACTS,
     .kind = EFFECT_TORQUE,
     .torque = torque,
-    .slope = slope,
 };

@@ -2,7 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
 #include "sine_cosine.h"
 
 /* T_j = w_j·(sine·sin θ + cosine·cos θ) for all j up to the joint l that turns the link, θ = Σ_{k<=l} w_k q_k: its
@@ -16,7 +15,7 @@ static double axis_cosine(const effect_sample* sample, size_t joint, size_t link
 static double turned(const effect_sample* sample, size_t link, const double* row) {
   double sum = 0.0;
   for (size_t k = 0; k <= link; ++k) {
-    sum += axis_cosine(sample, k, link) * along(row, k);
+    sum += axis_cosine(sample, k, link) * row[k];
   }
   return sum;
 }

@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* T_j = inertia·a, a the backward difference of the joint's velocity; 0 at the first sample. */
 
 enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
@@ -27,7 +25,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
                   const effect_direction* direction, double* slope) {
   (void)sample;
   if (memory[STEP] > 0.0) {
-    slope[place.joint] += parameters[0] * along(direction->velocity, place.joint) / memory[STEP];
+    slope[place.joint] += parameters[0] * direction->velocity[place.joint] / memory[STEP];
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
 #include "sine_cosine.h"
 
 /* What turns about a joint comes nearer to its axis as the next joint, whose axis is perpendicular, turns:
@@ -10,24 +9,16 @@
  * T_j = I·a_j + I'·q̇_{j+1}·q̇_j and T_{j+1} = −½·I'·q̇_j², with I' = dI/dq_{j+1} and a_j as in inertia.c. */
 
 enum { SINE, COSINE };
-enum {
-  VELOCITY,
-  ACCELERATION,
-  STEP,
-  INERTIA_MEMORY,
-  OWN = INERTIA_MEMORY,
-  NEXT = OWN + 2,
-  NUMBERS_REMEMBERED = NEXT + 2
-};
+enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* of inertia.c */
+enum { OWN = 0, NEXT = 2, NUMBERS = 4 };                   /* torques of both joints by SINE and COSINE */
 
-/* torques of both joints by SINE and COSINE */
-static void by_numbers(effect_place place, const effect_sample* sample, double* after) {
+static void by_numbers(effect_place place, const effect_sample* sample, double a, double* torques) {
   const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
-  const double a = after[ACCELERATION], v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  after[OWN + SINE] = at.sine * a + 2.0 * at.cosine * w * v;
-  after[OWN + COSINE] = at.cosine * a - 2.0 * at.sine * w * v;
-  after[NEXT + SINE] = -at.cosine * v * v;
-  after[NEXT + COSINE] = at.sine * v * v;
+  const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
+  torques[OWN + SINE] = at.sine * a + 2.0 * at.cosine * w * v;
+  torques[OWN + COSINE] = at.cosine * a - 2.0 * at.sine * w * v;
+  torques[NEXT + SINE] = -at.cosine * v * v;
+  torques[NEXT + COSINE] = at.sine * v * v;
 }
 
 /* Their derivative along a direction in which the acceleration a of the sample changes by a_slope. */
@@ -35,37 +26,37 @@ static void slope_by_numbers(effect_place place, const effect_sample* sample, do
                              const effect_direction* direction, double* after) {
   const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
   const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  const double v_slope = along(direction->velocity, place.joint), w_slope = along(direction->velocity, place.joint + 1);
-  const double turn = 2.0 * along(direction->angle, place.joint + 1), product = w_slope * v + w * v_slope;
+  const double v_slope = direction->velocity[place.joint], w_slope = direction->velocity[place.joint + 1];
+  const double turn = 2.0 * direction->angle[place.joint + 1], product = w_slope * v + w * v_slope;
   after[OWN + SINE] = at.sine * (a_slope - 2.0 * w * v * turn) + at.cosine * (a * turn + 2.0 * product);
   after[OWN + COSINE] = at.cosine * (a_slope - 2.0 * w * v * turn) - at.sine * (a * turn + 2.0 * product);
   after[NEXT + SINE] = at.sine * v * v * turn - 2.0 * at.cosine * v * v_slope;
   after[NEXT + COSINE] = at.cosine * v * v * turn + 2.0 * at.sine * v * v_slope;
 }
 
-static void add_torques(effect_place place, const double* parameters, const double* memory, double* torque) {
-  torque[place.joint] += parameters[SINE] * memory[OWN + SINE] + parameters[COSINE] * memory[OWN + COSINE];
-  torque[place.joint + 1] += parameters[SINE] * memory[NEXT + SINE] + parameters[COSINE] * memory[NEXT + COSINE];
+static void add_torques(effect_place place, const double* parameters, const double* by_number, double* torque) {
+  torque[place.joint] += parameters[SINE] * by_number[OWN + SINE] + parameters[COSINE] * by_number[OWN + COSINE];
+  torque[place.joint + 1] += parameters[SINE] * by_number[NEXT + SINE] + parameters[COSINE] * by_number[NEXT + COSINE];
 }
 
 static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
                     double* after) {
   effect_inertia.advance(place, parameters, sample, before, after);
-  by_numbers(place, sample, after);
 }
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                    double* torque) {
-  (void)sample;
-  add_torques(place, parameters, memory, torque);
+  double by_number[NUMBERS];
+  by_numbers(place, sample, memory[ACCELERATION], by_number);
+  add_torques(place, parameters, by_number, torque);
 }
 
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
-  double by_sample[NUMBERS_REMEMBERED];
-  const double a_slope = memory[STEP] > 0.0 ? along(direction->velocity, place.joint) / memory[STEP] : 0.0;
-  slope_by_numbers(place, sample, memory[ACCELERATION], a_slope, direction, by_sample);
-  add_torques(place, parameters, by_sample, slope);
+  double by_number[NUMBERS];
+  const double a_slope = memory[STEP] > 0.0 ? direction->velocity[place.joint] / memory[STEP] : 0.0;
+  slope_by_numbers(place, sample, memory[ACCELERATION], a_slope, direction, by_number);
+  add_torques(place, parameters, by_number, slope);
 }
 
 const effect_type effect_inertia_variation = {

@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* A spring between a joint and the next one, at rest where both covers are: T_j = c, T_{j+1} = −reaction·c with
  * c = stiffness·((q_j − rest_j) − (q_{j+1} − rest_{j+1})). With reaction 0 something else takes what the next joint
  * does not: a strap that ends before it, a hose that its motion stiffens. */
@@ -28,7 +26,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
   (void)sample;
   (void)memory;
   const size_t j = place.joint;
-  const double pull = parameters[STIFFNESS] * (along(direction->angle, j) - along(direction->angle, j + 1));
+  const double pull = parameters[STIFFNESS] * (direction->angle[j] - direction->angle[j + 1]);
   slope[j] += pull;
   slope[j + 1] -= parameters[REACTION] * pull;
 }

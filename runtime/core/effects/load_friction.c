@@ -31,7 +31,7 @@ static void torque(effect_place place, const double* parameters, const effect_sa
 
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
-  const double change = along(direction->force, place.tendon);
+  const double change = direction->force[place.tendon];
   slope[place.joint] += parameters[0] * memory[0] * (sample->force[place.tendon] < 0.0 ? -change : change);
 }
 

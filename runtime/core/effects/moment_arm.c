@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* The true moment arm is r_ij + correction: T_j = −correction·f0. Joint angles still come from the described arms. */
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
@@ -16,7 +14,7 @@ static void slope(effect_place place, const double* parameters, const effect_sam
                   const effect_direction* direction, double* slope) {
   (void)sample;
   (void)memory;
-  slope[place.joint] -= parameters[0] * along(direction->force, place.tendon);
+  slope[place.joint] -= parameters[0] * direction->force[place.tendon];
 }
 
 const effect_type effect_moment_arm = {

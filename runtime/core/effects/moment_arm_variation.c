@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* The true moment arm is r_ij + slope·q_j, as where a tendon lifts off its guide: T_j = −slope·q_j·f0. */
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
@@ -15,8 +13,8 @@ static void torque(effect_place place, const double* parameters, const effect_sa
 static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                   const effect_direction* direction, double* slope) {
   (void)memory;
-  const double by_angle = along(direction->angle, place.joint) * sample->force[place.tendon];
-  const double by_force = sample->angle[place.joint] * along(direction->force, place.tendon);
+  const double by_angle = direction->angle[place.joint] * sample->force[place.tendon];
+  const double by_force = sample->angle[place.joint] * direction->force[place.tendon];
   slope[place.joint] -= parameters[0] * (by_angle + by_force);
 }
 

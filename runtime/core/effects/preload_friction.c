@@ -61,18 +61,7 @@ static void torque(effect_place place, const double* parameters, const effect_sa
   add_lost(place, sample, memory, parameters[COULOMB], parameters[COULOMB] * parameters[BEYOND], torque);
 }
 
-static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                  const effect_direction* direction, double* slope) {
-  (void)place; /* constant but for its memory */
-  (void)parameters;
-  (void)sample;
-  (void)memory;
-  (void)direction;
-  (void)slope;
-}
-
 const effect_type effect_preload_friction = {
-    PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count,
-    .advance = advance,     .torque = torque,      .slope = slope,
+    PRELOAD_FRICTION_FACTS, .kind = EFFECT_TORQUE, .state_count = state_count, .advance = advance, .torque = torque,
     .slot = slot,           .size = size,
 };

@@ -2,7 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
 #include "sine_cosine.h"
 
 /* A pulley off its centre: with its angle p = turns·q_j the true moment arm is r_ij + sine·sin p + cosine·cos p, and
@@ -33,8 +32,8 @@ static void slope(effect_place place, const double* parameters, const effect_sam
   const sine_cosine at = pulley_at(place, parameters, sample);
   const double arm = parameters[SINE] * at.sine + parameters[COSINE] * at.cosine;
   const double arm_by_angle = parameters[TURNS] * arm_by_turn(parameters, at);
-  slope[place.joint] -= arm_by_angle * along(direction->angle, place.joint) * sample->force[place.tendon] +
-                        arm * along(direction->force, place.tendon);
+  slope[place.joint] -=
+      arm_by_angle * direction->angle[place.joint] * sample->force[place.tendon] + arm * direction->force[place.tendon];
 }
 
 const effect_type effect_pulley_eccentricity = {

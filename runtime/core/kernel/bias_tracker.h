@@ -5,8 +5,6 @@
 #include "extensions.h"
 #include "force_propagation.h"
 
-#include <math.h>
-
 /* Four slots at a transition. */
 typedef struct transition {
   quad_mask stops, starts;
@@ -71,10 +69,11 @@ COLD_STATIC void jump_tendons(tendonfmu_finger* f, size_t slot, double angle, qu
   if (quad_mask_bits(t.stops) | quad_mask_bits(t.starts)) {
     const slot_view* now = s->view + slot / 4;
     _Alignas(32) slot_view before;
-    slot_view_fill(f, slot, angle, t.negative_before, &before);
-    edge = bias_jump(&t, edges_magnitude(&before, quad_set(angle), threshold),
-                     edges_magnitude(now, quad_set(angle), threshold));
-    pulley = bias_jump(&t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold));
+    const size_t lane = view_lane(slot);
+    slot_view_fill(f, slot, QUAD_LANES, angle, t.negative_before, &before);
+    edge = bias_jump(&t, edges_magnitude(&before, lane, quad_set(angle), threshold),
+                     edges_magnitude(now, lane, quad_set(angle), threshold));
+    pulley = bias_jump(&t, laws_magnitude(before.other, lane, threshold), laws_magnitude(now->other, lane, threshold));
   }
   quad_store(s->edge_bias + slot, edge);
   quad_store(s->pulley_bias + slot, pulley);
@@ -82,26 +81,26 @@ COLD_STATIC void jump_tendons(tendonfmu_finger* f, size_t slot, double angle, qu
 
 COLD_STATIC void jump_joints(tendonfmu_finger* f, size_t joint, quad threshold) {
   const finger_scratch* s = &f->scratch;
-  const size_t slot = f->joints * f->tendon_lanes + joint;
+  const size_t slot = f->joints * f->tendon_lanes + joint, lane = view_lane(slot);
   const transition t = transition_at(f, slot);
   const slot_view* now = s->view + slot / 4;
   _Alignas(32) slot_view before;
-  slot_view_fill(f, slot, 0.0, t.negative_before, &before);
+  slot_view_fill(f, slot, QUAD_LANES, 0.0, t.negative_before, &before);
   quad_store(s->joint_bias + joint,
-             bias_jump(&t, laws_magnitude(before.below, threshold), laws_magnitude(now->below, threshold)));
+             bias_jump(&t, laws_magnitude(before.below, lane, threshold), laws_magnitude(now->below, lane, threshold)));
   quad_store(s->load_bias + joint,
-             bias_jump(&t, laws_magnitude(before.other, threshold), laws_magnitude(now->other, threshold)));
+             bias_jump(&t, laws_magnitude(before.other, lane, threshold), laws_magnitude(now->other, lane, threshold)));
 }
 
 /* Δb_j: eq. (10) with the b in place of the F, at the forces already propagated */
 COLD_STATIC void sum_bias_jumps(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, lanes = f->tendon_lanes;
-  quad step[MODEL_MAX_JOINTS];
+  quad_sums step[MODEL_MAX_JOINTS];
   for (size_t j = 0; j < n; ++j) {
-    step[j] = quad_set(0.0);
+    quad_sums_clear(&step[j]);
   }
-  for (size_t i = 0; i < lanes; i += 4) {
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     quad sum = quad_set(0.0);
     for (size_t j = 0; j < n; ++j) {
       const size_t at = j * lanes + i;
@@ -109,11 +108,11 @@ COLD_STATIC void sum_bias_jumps(tendonfmu_finger* f) {
       if (j + 1 < n) {
         sum = quad_add(sum, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley_bias + at + lanes)));
       }
-      step[j] = quad_add(step[j], quad_mul(quad_load(f->derived.moment_arm + at), sum));
+      quad_sums_add(&step[j], i, quad_mul(quad_load(f->derived.moment_arm + at), sum));
     }
   }
   for (size_t j = 0; j < n; ++j) {
-    s->bias_step[j] = quad_sum(step[j]) + (s->joint_bias[j] + s->load_bias[j] * s->load[j]);
+    s->bias_step[j] = quad_sum(&step[j]) + (s->joint_bias[j] + s->load_bias[j] * s->load[j]);
   }
 }
 
@@ -121,10 +120,10 @@ COLD_STATIC void sum_bias_jumps(tendonfmu_finger* f) {
 COLD_STATIC void bias_steps(tendonfmu_finger* f) {
   const finger_settings* settings = &f->derived.settings;
   const size_t lanes = f->tendon_lanes;
-  for (size_t slot = 0; slot < f->joints * lanes; slot += 4) {
+  for (size_t slot = 0; slot < f->joints * lanes; slot += QUAD_LANES) {
     jump_tendons(f, slot, angle_before(f->scratch.angle, slot / lanes), quad_set(settings->tendon_threshold));
   }
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     jump_joints(f, j, quad_set(settings->joint_threshold));
   }
   if (f->extensions.gripped) {
@@ -137,7 +136,7 @@ COLD_STATIC void bias_steps(tendonfmu_finger* f) {
 HOT_INLINE void remember_slots(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const quad now_time = quad_set(time), one = quad_set(1.0);
-  for (size_t slot = 0; slot < f->slots; slot += 4) {
+  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
     const quad_mask now = moved_before(f, slot); /* brought up to date already */
     const quad side = quad_with_sign(one, quad_load(f->scratch.velocity + slot));
     quad_store(s->side + slot, quad_select(now, side, quad_load(s->side + slot)));
@@ -150,19 +149,19 @@ COLD_STATIC void remember_transitions(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0);
   const double clock = f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] : time;
-  for (size_t slot = 0; slot < f->slots; slot += 4) {
+  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
     const quad_mask now = moving_now(f, slot), before = moved_before(f, slot);
     const quad_mask stops = quad_only_first(before, now), starts = quad_only_first(now, before);
-    quad_store(s->side_before + slot, quad_load(s->side + slot));
     quad_store(s->moving + slot, quad_keep(now, one));
-    quad_store(s->event + slot, quad_sub(quad_keep(stops, one), quad_keep(starts, one)));
+    const quad started = quad_sub(quad_load(s->side + slot), quad_set(2.0));
+    quad_store(s->event + slot, quad_select(starts, started, quad_keep(stops, one)));
     quad_store(s->stuck_since + slot, quad_select(stops, quad_set(clock), quad_load(s->stuck_since + slot)));
   }
 }
 
 HOT_INLINE void forget_transitions(tendonfmu_finger* f) {
   const quad zero = quad_set(0.0);
-  for (size_t slot = 0; slot < f->slots; slot += 4) {
+  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
     quad_store(f->remembered.event + slot, zero);
   }
 }
@@ -173,7 +172,7 @@ HOT_INLINE void restart_rest(tendonfmu_finger* f, double time) {
   if (f->derived.settings.forgets_by_absorption) {
     return;
   }
-  for (size_t slot = 0; slot < f->slots; slot += 4) {
+  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
     const quad since = quad_load(s->stuck_since + slot);
     quad_store(s->stuck_since + slot, quad_select(moved_before(f, slot), since, quad_set(time)));
   }
@@ -187,7 +186,7 @@ HOT_INLINE double noise_variance(const finger_settings* settings, double mean_fo
 
 /* Λ: what the filter absorbs */
 HOT_INLINE void count_absorbed(tendonfmu_finger* f, double left) {
-  const double absorbed = left > 0.0 ? -log(left) : 700.0;
+  const double absorbed = left > 0.0 ? -law_logarithm(left) : 700.0;
   f->remembered.scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
 }
 
@@ -202,7 +201,7 @@ HOT_INLINE quad kalman_gain(quad predicted, quad noise) {
 COLD_STATIC void predict_residual(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
     quad_store(f->scratch.residual_variance + j, quad_add(predicted, quad_set(noise)));
     if (!f->guide.learns) {
@@ -226,8 +225,8 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
   const finger_state* s = &f->remembered;
   const quad one = quad_set(1.0), noise_variance = quad_set(noise);
   const quad drift = quad_set(f->derived.settings.drift_variance * step);
-  _Alignas(32) double gains[4] = {0.0}; /* without what is unknown the same at all joints */
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  _Alignas(32) double gains[QUAD_LANES] = {0.0}; /* without what is unknown the same at all joints */
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad predicted = quad_add(quad_load(s->variance + j), drift);
     const quad gain = kalman_gain(predicted, noise_variance);
     const quad learned = kalman_gain(with_unknown(f, j, predicted), noise_variance);
@@ -236,7 +235,9 @@ HOT_INLINE void track_bias(tendonfmu_finger* f, double step, double noise) {
     quad_store(s->friction + j, quad_add(quad_load(s->friction + j), correction));
     quad_store(s->gain + j, learned);
     quad_store(s->variance + j, quad_mul(quad_sub(one, gain), predicted));
-    quad_store(gains, gain);
+    if (j == 0) {
+      quad_store(gains, gain);
+    }
   }
   if (f->derived.settings.forgets_by_absorption) {
     count_absorbed(f, 1.0 - gains[0]);

@@ -2,6 +2,8 @@
  * (docs/reference/semantics/detection.md). */
 #pragma once
 
+#include <math.h>
+
 #include "bias_tracker.h"
 #include "contact_bands.h"
 
@@ -23,7 +25,7 @@ HOT_INLINE quad residual_level(quad size, quad bound) {
 HOT_INLINE int exceed_thresholds(tendonfmu_finger* f, double mean_force) {
   const finger_state* s = &f->remembered;
   int any = 0;
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad bound = force_dependent(f->derived.contact_threshold, f->derived.contact_per_force, j, mean_force);
     const quad size = quad_abs(quad_load(s->residual + j));
     const quad_mask exceeds = quad_greater(size, bound);
@@ -84,7 +86,7 @@ HOT_INLINE int detect_contact(tendonfmu_finger* f, double mean_force, double tim
 /* the bias stays in contact */
 HOT_INLINE void hold_bias(tendonfmu_finger* f, double time) {
   restart_rest(f, time);
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(f->remembered.gain + j, quad_set(0.0));
   }
 }
@@ -92,7 +94,7 @@ HOT_INLINE void hold_bias(tendonfmu_finger* f, double time) {
 /* square of compensated_torque_std */
 HOT_INLINE void estimate_variance(tendonfmu_finger* f, double mean_force) {
   const finger_state* s = &f->remembered;
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad deviation = force_dependent(f->derived.deviation, f->derived.deviation_per_force, j, mean_force);
     quad_store(s->total_variance + j, quad_add(quad_load(s->variance + j), quad_mul(deviation, deviation)));
   }

@@ -37,8 +37,3 @@ HOT_INLINE quad exp_of_minus(quad x) {
   const quad e = quad_add(quad_set(1.0), quad_add(r, quad_mul(r2, q)));
   return quad_scale(e, shifted);
 }
-
-/* 1 − exp(−x) for x >= 0: the weight of a new value in an exponential mean */
-HOT_INLINE quad approach_share(quad x) {
-  return quad_sub(quad_set(1.0), exp_of_minus(x));
-}

@@ -20,21 +20,28 @@ HOT_INLINE int transition_bits(const tendonfmu_finger* f, size_t slot, quad_mask
   return quad_mask_bits(quad_differ(moving, moved_before(f, slot)));
 }
 
-/* four laws of a view, one a lane */
-HOT_INLINE quad laws_magnitude(const double rows[LAW_SIDE_NUMBERS][4], quad speed) {
-  const quad side[LAW_SIDE_NUMBERS] = {quad_load(rows[0]), quad_load(rows[1]), quad_load(rows[2]), quad_load(rows[3])};
+/* where a slot stands in its view */
+HOT_INLINE size_t view_lane(size_t slot) {
+  return QUAD_LANES == 4 ? 0 : slot % 4;
+}
+
+/* the laws of a view from a lane on, one a lane */
+HOT_INLINE quad laws_magnitude(const double rows[LAW_SIDE_NUMBERS][4], size_t lane, quad speed) {
+  const quad side[LAW_SIDE_NUMBERS] = {quad_load(rows[0] + lane), quad_load(rows[1] + lane), quad_load(rows[2] + lane),
+                                       quad_load(rows[3] + lane)};
   return law_magnitude(side, speed);
 }
 
 /* |F_B| at speed |v|: the values of the two neighbouring working points, interpolated linearly in the angle of the
  * joint before; constant outside the grid */
-HOT_INLINE quad edges_magnitude(const slot_view* view, quad angle, quad speed) {
-  const quad below = laws_magnitude(view->below, speed);
-  if (view->blends[0] == 0.0) {
+HOT_INLINE quad edges_magnitude(const slot_view* view, size_t lane, quad angle, quad speed) {
+  const quad below = laws_magnitude(view->below, lane, speed);
+  if (view->blends[lane] == 0.0) {
     return below;
   }
-  const quad above = laws_magnitude(view->above, speed);
-  const quad weight = quad_mul(quad_sub(angle, quad_load(view->begin)), quad_load(view->inverse_length));
+  const quad above = laws_magnitude(view->above, lane, speed);
+  const quad begin = quad_load(view->begin + lane), inverse_length = quad_load(view->inverse_length + lane);
+  const quad weight = quad_mul(quad_sub(angle, begin), inverse_length);
   return quad_add(below, quad_mul(weight, quad_sub(above, below)));
 }
 
@@ -51,14 +58,16 @@ HOT_INLINE double angle_before(const double* angle, size_t j) {
  * that sticks keeps its side, so that noise around zero velocity costs nothing */
 HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, size_t slot, quad velocity, quad_mask moving, double angle) {
   slot_view* view = f->scratch.view + slot / 4;
-  const int moves = quad_mask_bits(moving), known = (int)view->key[0];
+  const size_t lane = view_lane(slot);
+  const int moves = quad_mask_bits(moving), known = (int)view->key[lane];
   const int held = known < 0 || f->extensions.gripped; /* what slides may be on another side than it remembers */
   const int resting = held ? negative_bits(quad_load(f->remembered.side + slot)) : known;
   const int negative = (negative_bits(velocity) & moves) | (resting & ~moves);
   const quad q = quad_set(angle);
-  const quad_mask inside = quad_both(quad_at_least(q, quad_load(view->low)), quad_greater(quad_load(view->high), q));
-  if (negative != known || quad_mask_bits(inside) != 15) {
-    slot_view_fill(f, slot, angle, negative, view);
+  const quad_mask inside =
+      quad_both(quad_at_least(q, quad_load(view->low + lane)), quad_greater(quad_load(view->high + lane), q));
+  if (negative != known || quad_mask_bits(inside) != QUAD_ALL) {
+    slot_view_fill(f, slot, QUAD_LANES, angle, negative, view);
   }
   return view;
 }
@@ -110,11 +119,11 @@ HOT_INLINE int friction_of_tendons(tendonfmu_finger* f, size_t j, size_t at) {
     return 0;
   }
   const slot_view* view = view_at(f, at, v, moving, before);
-  const quad edge = edges_magnitude(view, quad_set(before), speed);
+  const quad edge = edges_magnitude(view, view_lane(at), quad_set(before), speed);
   quad_store(s->edge + at, acting_friction(f, at, moving, edge, v));
   keep_limit(f, s->edge_limit, at, edge);
   if (j > 0) { /* before the first joint there is no pulley */
-    const quad pulley = laws_magnitude(view->other, speed);
+    const quad pulley = laws_magnitude(view->other, view_lane(at), speed);
     quad_store(s->pulley + at, acting_friction(f, at, moving, pulley, v));
     keep_limit(f, s->pulley_limit, at, pulley);
   }
@@ -128,7 +137,8 @@ HOT_INLINE int friction_of_joints(tendonfmu_finger* f, size_t j) {
   const quad v = quad_load(s->velocity + at), speed = quad_abs(v);
   const quad_mask moving = moves_at(speed, f->derived.settings.joint_threshold);
   const slot_view* view = view_at(f, at, v, moving, 0.0);
-  const quad own = laws_magnitude(view->below, speed), load = laws_magnitude(view->other, speed);
+  const quad own = laws_magnitude(view->below, view_lane(at), speed);
+  const quad load = laws_magnitude(view->other, view_lane(at), speed);
   quad_store(s->joint_friction + j, acting_friction(f, at, moving, own, v));
   quad_store(s->load_friction + j, acting_friction(f, at, moving, load, v));
   keep_limit(f, s->edge_limit, at, own);
@@ -141,11 +151,11 @@ HOT_INLINE int friction_values(tendonfmu_finger* f) {
   const size_t lanes = f->tendon_lanes;
   int transitions = 0;
   for (size_t j = 0; j < f->joints; ++j) {
-    for (size_t at = j * lanes; at < (j + 1) * lanes; at += 4) {
+    for (size_t at = j * lanes; at < (j + 1) * lanes; at += QUAD_LANES) {
       transitions |= friction_of_tendons(f, j, at);
     }
   }
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     transitions |= friction_of_joints(f, j);
   }
   return transitions != 0;
@@ -183,7 +193,8 @@ HOT_INLINE quad loss_at(tendonfmu_finger* f, size_t slot, size_t row, const doub
 
 /* f_A and f_B along four tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
  * in eqs. (8) and (10), accumulated into tendon_friction [n] and load [n] */
-HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds, quad* tendon_friction, quad* load) {
+HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds, quad_sums* tendon_friction,
+                               quad_sums* load) {
   const finger_scratch* s = &f->scratch;
   const size_t lanes = f->tendon_lanes, last = (f->joints - 1) * lanes;
   const quad zero = quad_set(0.0);
@@ -196,17 +207,15 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds
     keep_tension(f, at, EDGES, force);
     const quad force_between = acting_force(force, kinds); /* f_Bj */
     lost = quad_add(lost, edge_loss);
-    quad_store(s->edge_loss + at, edge_loss);
     if (at < last) {
       const size_t behind = at + lanes;
       const quad pulley_loss = loss_at(f, behind, PULLEYS, s->pulley, force_between, force);
       force = without_slack(quad_sub(force, pulley_loss), kinds, &slack);
       keep_tension(f, behind, PULLEYS, force);
       lost = quad_add(lost, pulley_loss);
-      quad_store(s->pulley_loss + behind, pulley_loss);
     }
-    tendon_friction[j] = quad_add(tendon_friction[j], quad_mul(quad_load(f->derived.moment_arm + at), lost));
-    load[j] = quad_add(load[j], force_between);
+    quad_sums_add(&tendon_friction[j], i, quad_mul(quad_load(f->derived.moment_arm + at), lost));
+    quad_sums_add(&load[j], i, force_between);
     quad_store(s->force_at + at, force_at);
     quad_store(s->force_between + at, force_between);
   }
@@ -214,8 +223,8 @@ HOT_INLINE void propagate_four(tendonfmu_finger* f, size_t i, tendon_kinds kinds
 }
 
 /* the same of all tendons; without a bidirectional one among four, the usual case, there are fewer cases */
-HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad* tendon_friction, quad* load) {
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+HOT_INLINE void propagate_forces(tendonfmu_finger* f, quad_sums* tendon_friction, quad_sums* load) {
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
     const quad_mask bidirectional = quad_greater(quad_load(f->derived.bidirectional + i), quad_set(0.5));
     if (quad_mask_bits(bidirectional)) {
       propagate_four(f, i, (tendon_kinds){1, bidirectional}, tendon_friction, load);
@@ -246,17 +255,18 @@ HOT_INLINE quad own_friction(tendonfmu_finger* f, size_t j, quad sum) {
 HOT_INLINE void total_friction(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const derived_numbers* d = &f->derived;
-  quad tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];
+  quad_sums tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];
   for (size_t j = 0; j < f->joint_lanes; ++j) {
-    tendon_friction[j] = load[j] = quad_set(0.0);
+    quad_sums_clear(&tendon_friction[j]);
+    quad_sums_clear(&load[j]);
   }
   propagate_forces(f, tendon_friction, load);
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad bend = quad_sub(quad_load(s->angle + j), quad_load(d->cover_rest + j));
     const quad cover = quad_mul(quad_load(d->cover_stiffness + j), bend);
-    const quad sum = quad_sums(load + j), joint_friction = own_friction(f, j, sum);
+    const quad sum = quad_sum_rows(load + j), joint_friction = own_friction(f, j, sum);
     quad_store(s->load + j, sum);
-    const quad slips = quad_add(quad_sums(tendon_friction + j), joint_friction);
+    const quad slips = quad_add(quad_sum_rows(tendon_friction + j), joint_friction);
     if (f->derived.settings.has_bands) {
       quad_store(s->slip_torque + j, slips);
     }
@@ -269,24 +279,24 @@ HOT_INLINE void total_friction(tendonfmu_finger* f) {
 HOT_INLINE void friction_limits(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, lanes = f->tendon_lanes, joint_row = n * lanes;
-  quad total[MODEL_MAX_JOINTS];
+  quad_sums total[MODEL_MAX_JOINTS];
   for (size_t j = 0; j < n; ++j) {
-    total[j] = quad_set(0.0);
+    quad_sums_clear(&total[j]);
   }
-  for (size_t i = 0; i < lanes; i += 4) {
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     quad held = quad_set(0.0);
     for (size_t at = i, j = 0; j < n; at += lanes, ++j) {
       held = quad_add(held, quad_mul(quad_load(s->force_at + at), quad_load(s->edge_limit + at)));
       if (j + 1 < n) {
         held = quad_add(held, quad_mul(quad_load(s->force_between + at), quad_load(s->pulley_limit + at + lanes)));
       }
-      total[j] = quad_add(total[j], quad_mul(quad_abs(quad_load(f->derived.moment_arm + at)), held));
+      quad_sums_add(&total[j], i, quad_mul(quad_abs(quad_load(f->derived.moment_arm + at)), held));
     }
   }
   for (size_t j = 0; j < n; ++j) {
     const double own = f->memory.elements ? s->own_limit[j] : 0.0;
     const double limit =
-        quad_sum(total[j]) + (s->edge_limit[joint_row + j] + s->pulley_limit[joint_row + j] * s->load[j]);
+        quad_sum(&total[j]) + (s->edge_limit[joint_row + j] + s->pulley_limit[joint_row + j] * s->load[j]);
     s->limit[j] = limit + own;
   }
 }

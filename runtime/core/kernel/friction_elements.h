@@ -23,7 +23,7 @@ HOT_INLINE void turn_places(tendonfmu_finger* f, double step, int first) {
   const finger_scratch* s = &f->scratch;
   const int given = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
   const size_t joint_row = f->joints * f->tendon_lanes;
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad turned = quad_sub(quad_load(s->angle + j), angle_before_step(f, f->remembered.angle, j));
     const quad travel = given ? quad_mul(quad_load(s->velocity + joint_row + j), quad_set(step)) : turned;
     quad_store(s->travelled + joint_row + j, first ? quad_set(0.0) : travel);

@@ -7,6 +7,7 @@
 
 typedef __m256d quad;
 typedef __m256d quad_mask;
+typedef __m256d quad_sums;
 
 HOT_INLINE quad quad_load(const double* from) {
   return _mm256_load_pd(from);
@@ -14,25 +15,6 @@ HOT_INLINE quad quad_load(const double* from) {
 
 HOT_INLINE void quad_store(double* to, quad a) {
   _mm256_store_pd(to, a);
-}
-
-HOT_INLINE quad quad_of_halves(const double* low, const double* high) {
-  return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(low)), _mm_loadu_pd(high), 1);
-}
-
-HOT_INLINE void quad_load_pairs(const double* const from[4], quad* first, quad* second) {
-  const quad a = quad_of_halves(from[0], from[2]), b = quad_of_halves(from[1], from[3]);
-  *first = _mm256_unpacklo_pd(a, b);
-  *second = _mm256_unpackhi_pd(a, b);
-}
-
-HOT_INLINE void quad_store_lanes(double* const to[4], const quad row[4]) {
-  const quad even01 = _mm256_unpacklo_pd(row[0], row[1]), odd01 = _mm256_unpackhi_pd(row[0], row[1]);
-  const quad even23 = _mm256_unpacklo_pd(row[2], row[3]), odd23 = _mm256_unpackhi_pd(row[2], row[3]);
-  _mm256_storeu_pd(to[0], _mm256_permute2f128_pd(even01, even23, 0x20));
-  _mm256_storeu_pd(to[1], _mm256_permute2f128_pd(odd01, odd23, 0x20));
-  _mm256_storeu_pd(to[2], _mm256_permute2f128_pd(even01, even23, 0x31));
-  _mm256_storeu_pd(to[3], _mm256_permute2f128_pd(odd01, odd23, 0x31));
 }
 
 HOT_INLINE quad quad_set(double x) {
@@ -84,11 +66,8 @@ HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   return _mm256_blendv_pd(b, a, m);
 }
 
-HOT_INLINE quad quad_sqrt(quad a) {
-  return _mm256_sqrt_pd(a);
-}
-
-HOT_INLINE double quad_sum(quad a) {
+HOT_INLINE double quad_sum(const quad_sums* sums) {
+  const quad a = *sums;
   const __m128d s = _mm_add_pd(_mm256_castpd256_pd128(a), _mm256_extractf128_pd(a, 1));
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));
 }
@@ -98,7 +77,7 @@ HOT_INLINE quad quad_half_sums(quad a, quad b) {
   return _mm256_add_pd(_mm256_permute2f128_pd(a, b, 0x20), _mm256_permute2f128_pd(a, b, 0x31));
 }
 
-HOT_INLINE quad quad_sums(const quad row[4]) {
+HOT_INLINE quad quad_sum_rows(const quad_sums row[4]) {
   const quad even = quad_half_sums(row[0], row[2]), odd = quad_half_sums(row[1], row[3]);
   return _mm256_add_pd(_mm256_unpacklo_pd(even, odd), _mm256_unpackhi_pd(even, odd));
 }

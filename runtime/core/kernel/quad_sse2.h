@@ -9,6 +9,7 @@ typedef struct quad {
   __m128d low, high;
 } quad;
 typedef quad quad_mask;
+typedef quad quad_sums;
 
 #define QUAD_BOTH_HALVES(operation, a, b) ((quad){operation((a).low, (b).low), operation((a).high, (b).high)})
 
@@ -19,21 +20,6 @@ HOT_INLINE quad quad_load(const double* from) {
 HOT_INLINE void quad_store(double* to, quad a) {
   _mm_store_pd(to, a.low);
   _mm_store_pd(to + 2, a.high);
-}
-
-HOT_INLINE void quad_load_pairs(const double* const from[4], quad* first, quad* second) {
-  const quad a = {_mm_loadu_pd(from[0]), _mm_loadu_pd(from[2])}, b = {_mm_loadu_pd(from[1]), _mm_loadu_pd(from[3])};
-  *first = QUAD_BOTH_HALVES(_mm_unpacklo_pd, a, b);
-  *second = QUAD_BOTH_HALVES(_mm_unpackhi_pd, a, b);
-}
-
-HOT_INLINE void quad_store_lanes(double* const to[4], const quad row[4]) {
-  for (int k = 0; k < 4; k += 2) {
-    _mm_storeu_pd(to[0] + k, _mm_unpacklo_pd(row[k].low, row[k + 1].low));
-    _mm_storeu_pd(to[1] + k, _mm_unpackhi_pd(row[k].low, row[k + 1].low));
-    _mm_storeu_pd(to[2] + k, _mm_unpacklo_pd(row[k].high, row[k + 1].high));
-    _mm_storeu_pd(to[3] + k, _mm_unpackhi_pd(row[k].high, row[k + 1].high));
-  }
 }
 
 HOT_INLINE quad quad_set(double x) {
@@ -84,13 +70,8 @@ HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
   return QUAD_BOTH_HALVES(_mm_or_pd, first, second);
 }
 
-HOT_INLINE quad quad_sqrt(quad a) {
-  a.low = _mm_sqrt_pd(a.low);
-  a.high = _mm_sqrt_pd(a.high);
-  return a;
-}
-
-HOT_INLINE double quad_sum(quad a) {
+HOT_INLINE double quad_sum(const quad_sums* sums) {
+  const quad a = *sums;
   const __m128d s = _mm_add_pd(a.low, a.high);
   return _mm_cvtsd_f64(_mm_add_sd(s, _mm_unpackhi_pd(s, s)));
 }
@@ -100,7 +81,7 @@ HOT_INLINE __m128d quad_two_sums(quad a, quad b) {
   return _mm_add_pd(_mm_unpacklo_pd(s, t), _mm_unpackhi_pd(s, t));
 }
 
-HOT_INLINE quad quad_sums(const quad row[4]) {
+HOT_INLINE quad quad_sum_rows(const quad_sums row[4]) {
   return (quad){quad_two_sums(row[0], row[1]), quad_two_sums(row[2], row[3])};
 }
 

@@ -2,6 +2,8 @@
  * measured angles) have it (docs/reference/semantics/sensors.md). */
 #pragma once
 
+#include <math.h>
+
 #include "kinematics.h"
 #include "rows_in_use.h"
 
@@ -43,14 +45,14 @@ HOT_INLINE void find_joint_side(tendonfmu_finger* f, double* joint_side) {
   const int by_tendons = (int)f->remembered.scalar[STATE_SOURCE] == TENDONFMU_TENDON_POSITIONS;
   _Alignas(32) double spring_end[MODEL_MAX_TENDONS];
   double angle[MODEL_MAX_JOINTS];
-  for (size_t i = 0; i < lanes; i += 4) {
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     const quad stretch = quad_mul(quad_load(s->force + i), quad_load(f->derived.inverse_stiffness + i));
     quad_store(spring_end + i, quad_sub(quad_load(s->position + i), stretch));
   }
   for (size_t j = 0; j < n; ++j) {
     angle[j] = by_tendons ? tendon_sum(s->inverse_routing + j * lanes, spring_end, lanes) : s->angle[j];
   }
-  for (size_t i = 0; i < lanes; i += 4) {
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     quad all = quad_set(0.0);
     for (size_t j = 0; j < n; ++j) {
       all = quad_add(all, quad_mul(quad_load(f->derived.moment_arm + j * lanes + i), quad_set(angle[j])));
@@ -65,11 +67,12 @@ HOT_INLINE double count_unsound_rows(const tendonfmu_finger* f, const double* fa
   if ((int)f->remembered.scalar[STATE_SOURCE] != TENDONFMU_TENDON_POSITIONS) {
     return 0.0;
   }
-  quad sum = quad_set(0.0);
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
-    sum = quad_add(sum, unsound_rows(f, fault, i));
+  quad_sums sums;
+  quad_sums_clear(&sums);
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
+    quad_sums_add(&sums, i, unsound_rows(f, fault, i));
   }
-  return quad_sum(sum);
+  return quad_sum(&sums);
 }
 
 HOT_INLINE watched watch_tendons(tendonfmu_finger* f, size_t i, double unsound) {
@@ -220,7 +223,7 @@ COLD_STATIC int recover(tendonfmu_finger* f, const watched* w, size_t i, double 
   double* now = f->scratch.sensor;
   const int agree = quad_mask_bits(agrees_again(f, w, i)), well = quad_mask_bits(w->well);
   int any = 0;
-  for (size_t lane = 0; lane < 4; ++lane) {
+  for (size_t lane = 0; lane < QUAD_LANES; ++lane) {
     double* unsound = sensor_row(f, now, SENSOR_UNSOUND_AT) + i + lane;
     if (well >> lane & 1) {
       continue;
@@ -290,13 +293,13 @@ COLD_STATIC int is_unwell(const tendonfmu_finger* f) {
   return any;
 }
 
-/* tendons of bits [M/4]: their sensors begin to fail; returns whether there are any */
+/* tendons of bits [M/QUAD_LANES]: their sensors begin to fail; returns whether there are any */
 COLD_STATIC int begin_faults(tendonfmu_finger* f, const int* bits, const int* jumps, sensor_fault_kind kind,
                              double time) {
   int any = 0;
   for (size_t i = 0; i < f->tendons; ++i) {
-    if (bits[i / 4] >> i % 4 & 1) {
-      begin_fault(f, i, kind, kind == FORCE_FAILS && (jumps[i / 4] >> i % 4 & 1), time);
+    if (bits[i / QUAD_LANES] >> i % QUAD_LANES & 1) {
+      begin_fault(f, i, kind, kind == FORCE_FAILS && (jumps[i / QUAD_LANES] >> i % QUAD_LANES & 1), time);
       any = 1;
     }
   }
@@ -309,21 +312,22 @@ HOT_INLINE void watch_sensors(tendonfmu_finger* f, double time, double step) {
   double* now = f->scratch.sensor;
   const double unsound = count_unsound_rows(f, sensor_row(f, f->remembered.sensor, SENSOR_FAULT));
   const int unwell = f->remembered.scalar[STATE_UNWELL] != 0.0;
-  int jumps[MODEL_MAX_TENDONS / 4], forces[MODEL_MAX_TENDONS / 4], positions[MODEL_MAX_TENDONS / 4];
+  enum { MOST = MODEL_MAX_TENDONS / QUAD_LANES };
+  int jumps[MOST], forces[MOST], positions[MOST];
   int any_force = 0, any_position = 0, standing = 0, changed = 0;
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(f->scratch.angle_shift + j, quad_set(0.0));
     quad_store(f->scratch.watch + j, quad_set(0.0));
   }
   find_joint_side(f, sensor_row(f, now, SENSOR_JOINT_SIDE));
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
     const watched w = watch_tendons(f, i, unsound);
     copy_sensors(f, i, &w);
-    jumps[i / 4] = quad_mask_bits(force_jumps(f, &w));
-    forces[i / 4] = quad_mask_bits(force_stands(f, &w, i, time, step, &standing)) | jumps[i / 4];
-    positions[i / 4] = quad_mask_bits(position_stands(f, &w, i, time, step));
-    any_force |= forces[i / 4];
-    any_position |= positions[i / 4];
+    jumps[i / QUAD_LANES] = quad_mask_bits(force_jumps(f, &w));
+    forces[i / QUAD_LANES] = quad_mask_bits(force_stands(f, &w, i, time, step, &standing)) | jumps[i / QUAD_LANES];
+    positions[i / QUAD_LANES] = quad_mask_bits(position_stands(f, &w, i, time, step));
+    any_force |= forces[i / QUAD_LANES];
+    any_position |= positions[i / QUAD_LANES];
     if (unwell) {
       changed |= recover(f, &w, i, time, step);
     }
@@ -345,20 +349,21 @@ HOT_INLINE void watch_sensors(tendonfmu_finger* f, double time, double step) {
 
 /* 0 where w is so large that its spring's force would not be finite */
 HOT_INLINE int sensors_are_finite(const tendonfmu_finger* f) {
-  quad probe = quad_set(0.0);
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+  const quad zero = quad_set(0.0);
+  quad probe = zero;
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
     const quad w = quad_load(sensor_row(f, f->scratch.sensor, SENSOR_JOINT_SIDE) + i);
-    probe = quad_add(probe, quad_mul(quad_set(0.0), quad_mul(quad_set(1e30), w)));
+    probe = quad_add(probe, quad_mul(zero, quad_mul(quad_set(1e30), w)));
   }
-  return quad_sum(probe) == 0.0;
+  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == QUAD_ALL;
 }
 
 HOT_INLINE void remember_sensors(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
-  for (size_t i = 0; i < SENSOR_ROWS * f->tendon_lanes; i += 4) {
+  for (size_t i = 0; i < SENSOR_ROWS * f->tendon_lanes; i += QUAD_LANES) {
     quad_store(s->sensor + i, quad_load(f->scratch.sensor + i));
   }
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(s->watch + j, quad_load(f->scratch.watch + j));
   }
   s->scalar[STATE_UNWELL] = f->scratch.unwell ? 1.0 : 0.0;

@@ -4,7 +4,7 @@
 
 #include "bias_tracker.h"
 #include "contact_detector.h"
-#include "extension_signals.h"
+#include "extensions.h"
 #include "force_propagation.h"
 #include "kernel_choice.h"
 #include "kinematics.h"
@@ -16,11 +16,11 @@ HOT_INLINE int is_first(const tendonfmu_finger* f) {
 
 /* NaN is out of range */
 HOT_INLINE int row_in_range(const double* row, size_t lanes) {
-  int inside = 15;
-  for (size_t i = 0; i < lanes; i += 4) {
+  int inside = QUAD_ALL;
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     inside &= quad_mask_bits(quad_at_least(quad_set(LARGEST_INPUT), quad_abs(quad_load(row + i))));
   }
-  return inside == 15;
+  return inside == QUAD_ALL;
 }
 
 HOT_INLINE int uses_positions(const tendonfmu_finger* f) {
@@ -45,14 +45,14 @@ HOT_INLINE int inputs_in_range(const tendonfmu_finger* f) {
 /* x0 from the reading at which all joints are at 0 */
 HOT_INLINE void take_zeros(tendonfmu_finger* f) {
   double* position = f->scratch.position;
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
     quad_store(position + i, quad_sub(quad_load(position + i), quad_load(f->derived.tendon_zero + i)));
   }
 }
 
 /* x: the load that the motors drive, as if the joints stood */
 HOT_INLINE void motor_loads(tendonfmu_finger* f) {
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(f->scratch.motor_load + j, tendon_sums(f, f->derived.load_arm, f->scratch.position, j));
   }
 }
@@ -86,7 +86,7 @@ HOT_INLINE double find_kinematics(tendonfmu_finger* f, double time, double step)
 
 /* τ = Rᵀ f0 (eq. 3), with the measured forces */
 HOT_INLINE void measured_torques(tendonfmu_finger* f) {
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(f->scratch.torque + j, tendon_sums(f, f->derived.moment_arm, f->scratch.force, j));
   }
 }
@@ -103,22 +103,24 @@ HOT_INLINE double mean_tendon_force(const tendonfmu_finger* f) {
   if (f->derived.settings.watches_sensors && f->scratch.unwell) {
     return mean_sound_force(f);
   }
-  quad sum = quad_set(0.0);
-  for (size_t i = 0; i < f->tendon_lanes; i += 4) {
-    sum = quad_add(sum, quad_abs(quad_load(f->scratch.force + i)));
+  quad_sums sums;
+  quad_sums_clear(&sums);
+  for (size_t i = 0; i < f->tendon_lanes; i += QUAD_LANES) {
+    quad_sums_add(&sums, i, quad_abs(quad_load(f->scratch.force + i)));
   }
-  return quad_sum(sum) / (double)f->tendons;
+  return quad_sum(&sums) / (double)f->tendons;
 }
 
 /* 0 in all lanes unless anything that the extensions are about to remember is infinite or NaN */
 HOT_INLINE quad extension_probe(const tendonfmu_finger* f) {
-  const size_t count = f->shape.extension_memory, whole = count / 8 * 8;
+  enum { TWO = 2 * QUAD_LANES };
+  const size_t count = f->shape.extension_memory, whole = count / TWO * TWO;
   const quad zero = quad_set(0.0);
   quad even = zero, odd = zero;
   double rest = 0.0;
-  for (size_t k = 0; k < whole; k += 8) {
+  for (size_t k = 0; k < whole; k += TWO) {
     even = quad_add(even, quad_mul(zero, quad_load(f->scratch.extension + k)));
-    odd = quad_add(odd, quad_mul(zero, quad_load(f->scratch.extension + k + 4)));
+    odd = quad_add(odd, quad_mul(zero, quad_load(f->scratch.extension + k + QUAD_LANES)));
   }
   for (size_t k = whole; k < count; ++k) {
     rest += 0.0 * f->scratch.extension[k];
@@ -132,7 +134,7 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
   const double* joint_velocity = s->velocity + f->joints * f->tendon_lanes;
   const quad zero = quad_set(0.0);
   quad probe = extension_probe(f);
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad torques = quad_add(quad_abs(quad_load(s->torque + j)), quad_abs(quad_load(s->friction + j)));
     const quad biases = quad_add(quad_abs(quad_load(s->bias_step + j)), quad_abs(quad_load(f->remembered.bias + j)));
     quad sum = quad_add(torques, biases);
@@ -145,19 +147,19 @@ HOT_INLINE int all_finite(const tendonfmu_finger* f) {
     probe =
         quad_add(probe, quad_add(quad_mul(zero, quad_mul(quad_set(1e160), sum)), motion)); /* infinite above 1.8e148 */
   }
-  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == 15 &&
+  return quad_mask_bits(quad_at_least(zero, quad_abs(probe))) == QUAD_ALL &&
          (!f->derived.settings.watches_sensors || sensors_are_finite(f));
 }
 
 HOT_INLINE void copy_row(double* to, const double* from, size_t lanes) {
-  for (size_t i = 0; i < lanes; i += 4) {
+  for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     quad_store(to + i, quad_load(from + i));
   }
 }
 
 /* T_eff = b_eff + T with b_eff already stepped */
 HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(total + j, quad_add(quad_load(f->remembered.bias + j), quad_load(f->scratch.friction + j)));
   }
 }
@@ -165,7 +167,7 @@ HOT_INLINE void effective_friction(tendonfmu_finger* f, double* total) {
 HOT_INLINE void leave_residual(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   effective_friction(f, s->friction); /* scratch.friction remains T: the estimation reads it */
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(s->residual + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
 }
@@ -177,9 +179,6 @@ HOT_INLINE void remember_sample(tendonfmu_finger* f, double time, double velocit
     remember_transitions(f, time);
   } else {
     forget_transitions(f);
-  }
-  if (f->extensions.gripped) {
-    copy_row(s->side_before, s->side, f->slots); /* derivatives of what has a memory read it */
   }
   remember_slots(f, time);
   copy_row(s->angle, f->scratch.angle, f->joint_lanes);
@@ -249,7 +248,7 @@ HOT_INLINE double noise_of_step(const tendonfmu_finger* f, double step, double m
 
 HOT_INLINE void jump_bias(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(s->bias + j, quad_add(quad_load(s->bias + j), quad_load(f->scratch.bias_step + j)));
     if (f->derived.settings.has_bands) {
       quad_store(s->jumped + j, quad_add(quad_load(s->jumped + j), quad_load(f->scratch.bias_step + j)));
@@ -343,7 +342,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   if (transitions && !first) {
     bias_steps(f);
   } else {
-    for (size_t j = 0; j < f->joint_lanes; j += 4) {
+    for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
       quad_store(f->scratch.bias_step + j, quad_set(0.0));
     }
   }
@@ -359,7 +358,7 @@ static sample_result take_sample(tendonfmu_finger* f, double time) {
   } else {
     track_sample(f, time, step, mean_force);
   }
-  for (size_t j = 0; j < f->joint_lanes; j += 4) {
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     quad_store(s->compensated + j, quad_sub(quad_load(s->torque + j), quad_load(s->friction + j)));
   }
   estimate_variance(f, mean_force);

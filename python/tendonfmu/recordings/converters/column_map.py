@@ -1,7 +1,7 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
-Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first brings readings of a
-counter that starts again into its middle. Where `convert inspect` could not
+Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first takes the jumps out of
+readings of a counter that starts again. Where `convert inspect` could not
 decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
 `schema/map.schema.json` defines them for editors.
 """
@@ -12,7 +12,7 @@ import codecs
 import re
 import zoneinfo
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ FORMAT = "tendonfmu-map-1"
 LARGEST = 1e12  # of offsets and scales, as of the signals of a recording
 UNDECIDED = "?"  # written by `convert inspect`, refused by `convert table`
 SEPARATORS = (",", ";", "\t", "|", " ")
+GROUP_MARKS = (",", ".", " ", "'")  # between thousands
 
 TURNING = {
     "time": units.TIME,
@@ -48,7 +49,10 @@ SLIDING = {
 }
 REQUIRED = {"turning": ("time", "torque", "angle"), "sliding": ("time", "force", "position")}
 
-_COLUMN = re.compile(r"([a-z_]+)\[([1-9][0-9]?)\]")
+TURNING_QUANTITIES = (units.TIME, units.LENGTH, units.ANGLE)  # a force or torque makes no turns
+
+_PREFIX = r"(?P<prefix>(?:[A-Za-z][A-Za-z0-9_.-]*?[_.-])?)"  # of a finger of a hand
+_COLUMN = re.compile(rf"{_PREFIX}(?P<group>{'|'.join(units.OF_COLUMN)})(?:\[(?P<number>[1-9][0-9]?)\])?")
 
 
 @dataclass(frozen=True)
@@ -63,12 +67,14 @@ class MappedColumn:
     zone: str = "UTC"  # time zone of texts without one
     pattern: str = ""  # pattern of texts (`datetime.strptime`), or "": ISO 8601
     rate: float = 0.0  # rows a second of a log without a column of time, or 0
-    wrap: float = 0.0  # readings after which a counter starts again, or 0; those above half of it count as negative
+    wrap: float = 0.0  # readings after which a counter starts again, or 0
+    # whether its jumps are followed over many turns; otherwise readings above half of `wrap` count as negative
+    turns: bool = False
 
     def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
         """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
         # no unnecessary arithmetic: numbers in SI must not change by rounding
-        if self.wrap:
+        if self.wrap and not self.turns:
             readings = (readings + self.wrap / 2.0) % self.wrap - self.wrap / 2.0
         shifted = readings - self.offset if self.offset else readings
         return (shifted * self.factor if self.factor != 1.0 else shifted).astype(np.float64)
@@ -89,6 +95,7 @@ class LogFormat:
 
     separator: str | None = None  # of texts
     decimal: str | None = None
+    thousands: str | None = None
     skip: int | None = None
     header: bool | None = None
     units_row: bool | None = None
@@ -139,6 +146,18 @@ def read_map(path: Path) -> ColumnMap:
         raise InputError(f"{path}: {refused}") from None
 
 
+def read_log_format(path: Path) -> LogFormat:
+    """Read `log` alone of MAP.json, for `convert inspect`: rows without a number stay. Raise InputError."""
+    node = Node(read_json(path, "a map of columns"))
+    try:
+        node.member("format").choice(FORMAT)
+        undecided = ("missing", "disorder")
+        log = {key: value for key, value in (node.member("log").value or {}).items() if key not in undecided}
+        return replace(_read_log(Node(log, "log")), leave_out_missing=True)
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
 def _read(path: Path, node: Node) -> ColumnMap:
     node.keys(("format", "comment", "log", "columns", "joint", "resample"))
     node.member("format").choice(FORMAT)
@@ -153,15 +172,18 @@ def _read(path: Path, node: Node) -> ColumnMap:
 def _read_log(node: Node) -> LogFormat:
     if node.absent:
         return LogFormat()
-    node.keys(("separator", "decimal", "skip", "header", "units_row", "encoding", "missing", "disorder", "clocks"))
+    layout = ("separator", "decimal", "thousands", "skip", "header", "units_row", "encoding")
+    node.keys((*layout, "missing", "disorder", "clocks"))
     separator, decimal, skip = node.member("separator"), node.member("decimal"), node.member("skip")
+    thousands = node.member("thousands")
     encoding, missing, disorder = node.member("encoding"), node.member("missing"), node.member("disorder")
     for undecided, choices in ((missing, "refuse or leave out"), (disorder, "refuse or sort")):
         if undecided.value == UNDECIDED:
             undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
-    log = LogFormat(
+    return LogFormat(
         separator=None if separator.absent else separator.choice(*SEPARATORS),
         decimal=None if decimal.absent else decimal.choice(".", ","),
+        thousands=None if thousands.absent else thousands.choice(*GROUP_MARKS),
         skip=None if skip.absent else skip.integer(0, 10000),
         header=_flag(node.member("header")),
         units_row=_flag(node.member("units_row")),
@@ -170,9 +192,6 @@ def _read_log(node: Node) -> LogFormat:
         sort=not disorder.absent and disorder.choice("refuse", "sort") == "sort",
         clocks=_read_clocks(node.member("clocks")),
     )
-    if log.separator is not None and log.separator == log.decimal:
-        decimal.refuse("another character than the separator")
-    return log
 
 
 def _flag(node: Node) -> bool | None:
@@ -208,22 +227,27 @@ def _read_resampling(node: Node) -> Resampling | None:
 
 
 def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
-    """Read the long form: our columns by name. The reader of recordings checks their number."""
+    """Read the long form: our columns by name, those of a finger of a hand with its prefix (docs/reference/hand.md)."""
     names = node.keys(node.value if isinstance(node.value, dict) else ()).value
+    numbers: dict[str, dict[str, list[int]]] = {}  # by prefix and group
     for name in names:
         match = _COLUMN.fullmatch(name)
-        group = match[1] if match else name
-        if group not in units.OF_COLUMN or (match is None) != (group in ("time", LABEL)):
+        is_clock = match is not None and match["group"] == "time" and bool(match["prefix"])
+        if match is None or is_clock or (match["number"] is None) != (match["group"] in ("time", LABEL)):
             known = sorted(["time", *(f"{name}[1]" for name in GROUPS), LABEL])
             raise Refusal(f"{node.path}.{name}: unknown column; expected one of {', '.join(known)}")
-        yield name, _read_column(node.member(name), units.OF_COLUMN[group])
+        if match["number"]:
+            numbers.setdefault(match["prefix"], {}).setdefault(match["group"], []).append(int(match["number"]))
+        yield name, _read_column(node.member(name), units.OF_COLUMN[match["group"]])
     if "time" not in names:
         node.member("time").refuse("the log's column of time")
-    for group, (unit, needed) in GROUPS.items():
-        numbers = sorted(int(match[2]) for name in names if (match := _COLUMN.fullmatch(name)) and match[1] == group)
-        for i in range(1, max(numbers, default=1 if needed else 0) + 1):
-            if i not in numbers:
-                raise Refusal(f"{node.path}.{group}[{i}]: missing; expected the log's column of it, to be in {unit}")
+    for prefix, of_finger in (numbers or {"": {}}).items():
+        has_tendons = not prefix or any(group.startswith("tendon") for group in of_finger)  # a wrist may have none
+        for group, (unit, needed) in GROUPS.items():
+            for i in range(1, max(of_finger.get(group, []), default=1 if needed and has_tendons else 0) + 1):
+                if i not in of_finger.get(group, []):
+                    where = f"{node.path}.{prefix}{group}[{i}]"
+                    raise Refusal(f"{where}: missing; expected the log's column of it, to be in {unit}")
 
 
 def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
@@ -275,7 +299,8 @@ def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
     first = offset.value == "first"
     start = None if first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
     wrap = node.member("wrap").number(0.0, LARGEST, "the log's unit", 0.0)
-    return MappedColumn(node.path, column, sign * scale * _factor(unit, known, unit_names), start, wrap=wrap)
+    factor = sign * scale * _factor(unit, known, unit_names)
+    return MappedColumn(node.path, column, factor, start, wrap=wrap, turns=known in TURNING_QUANTITIES)
 
 
 def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:

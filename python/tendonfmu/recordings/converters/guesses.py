@@ -47,6 +47,7 @@ SI = {"angle": "rad", "angular speed": "rad/s", "torque": "N.m", "force": "N", "
 
 EPOCHS = {"epoch_s": 1.0, "epoch_ms": 1e3, "epoch_us": 1e6, "epoch_ns": 1e9}
 FROM_1990, TO_2100 = 631_152_000.0, 4_102_444_800.0  # s
+SLOWEST = 120.0  # s; of a date: a timer's µs of more than a quarter of an hour look like s since 1990
 # median step -> unit, for clocks that start anywhere; logs have some 10 to 10,000 samples per second
 STEPS = [(1e-5, 0.12, "s"), (0.5, 120.0, "ms"), (500.0, 120e3, "us"), (500e3, 120e6, "ns")]
 
@@ -75,7 +76,7 @@ def unit_of(name: str, unit: str, quantity: str, low: float, high: float, ros: b
 def unit_of_time(name: str, unit: str, first: float, step: float) -> Guess:
     """Return the unit of a clock, by its first reading and median step."""
     for stamp, per_second in EPOCHS.items():
-        if FROM_1990 <= first / per_second <= TO_2100:
+        if FROM_1990 <= first / per_second <= TO_2100 and step / per_second < SLOWEST:
             return Guess(
                 stamp, SURE if step > 0 else LIKELY, f"{first:.0f} is a date of our time in {stamp[6:]} since 1970"
             )
@@ -180,10 +181,11 @@ def order_of(of: str, by_number: bool, groups: Sequence[Sequence[str]]) -> Order
 BY_QUANTITY = {"force": "tendon_force", "length": "tendon_position", "angle": "joint_position", "torque": "torque"}
 BY_QUANTITY["angular speed"] = "joint_velocity"
 
-TENDON = {"tendon", "tendons", "cable", "spool", "motor", "motors", "actuator", "wire", "winch", "excursion", "x0"}
-MOTION = {"position", "pos", "length", "displacement", "stroke", "excursion", "travel", "spool", "x0", "x"}
-MOTION |= {"motor", "encoder"}
-FORCES = {"tension", "tensions", "force", "forces", "loadcell", "f", "f0", "load"}
+TENDON = {"tendon", "tendons", "cable", "spool", "motor", "motors", "actuator", "wire", "winch", "excursion"}
+TENDON |= {"flexor", "extensor", "flexors", "extensors"}
+MOTION = {"position", "pos", "length", "displacement", "stroke", "excursion", "travel", "spool", "x"}
+MOTION |= {"motor", "encoder", "count", "counts", "ticks"}
+FORCES = {"tension", "tensions", "force", "forces", "loadcell", "f", "load"}
 TORQUES = {"torque", "torques", "tau", "effort", "moment", "trq"}
 SPEEDS = {"velocity", "velocities", "vel", "speed", "qd", "dq", "omega", "rate"}
 JOINT = {"joint", "joints"}
@@ -194,6 +196,10 @@ CONTACT = {"contact", "touch", "label", "touching"}
 # words that say that a signal is not measured, or no signal of a finger
 OTHERS = {"desired", "des", "target", "command", "cmd", "setpoint", "goal", "temperature", "temp", "current", "voltage"}
 OTHERS |= {"action", "pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
+# parts of a message that say how it is built
+STRUCTURE = {"layout", "header", "seq", "dim", "data_offset", "stride", "size", "frame_index", "episode_index"}
+CLOCKS = (["time"], ["timestamp"], ["stamp"], ["date"], ["clock"], ["millis"], ["micros"])  # last word of a name
+VALUES = {"value", "values", "data"}  # names of arrays that say nothing
 KNOWN = TENDON | FORCES | TORQUES | SPEEDS | ANGLES | REFERENCE
 
 # what an element is by its own name -> what it is in an array of these
@@ -211,7 +217,20 @@ def field_groups(inspection: Inspection) -> tuple[dict[str, list[Member]], set[s
         for signal, group in zip(signals, _of_siblings(signals), strict=True):
             if group:
                 groups.setdefault(group, []).append((topic, signal))
+    for group, members in list(groups.items()):
+        # a constant is no signal; beside moving ones of the same name it may be a sensor that is not connected
+        moving = {_family(summary) for _, summary in members if summary.low < summary.high}
+        kept = [member for member in members if group == "contact" or _family(member[1]) in moving]
+        groups[group] = kept
+        if not kept:
+            del groups[group]
     return groups, _positions_of_tendons(groups)
+
+
+def _family(summary: FieldSummary) -> str:
+    """Return what the names of the elements of one array have in common."""
+    name = summary.field.name
+    return _array_of(name) or re.sub(r"\d+", "", _without_unit(name))
 
 
 def _of_siblings(fields: Sequence[FieldSummary]) -> list[str | None]:
@@ -234,8 +253,9 @@ def _positions_of_tendons(groups: dict[str, list[Member]]) -> set[str]:
         return set()
     fields = [summary.field for _, summary in angles]
     names = [field.name for field in fields]
+    are_alike = len(set(names)) == len({summary.field.name for _, summary in forces}) == 1
     are_joints = any(stated(field.name, field.unit) or set(words_of(field.name)) & OF_JOINTS_ONLY for field in fields)
-    if are_joints or matched([summary.field.name for _, summary in forces], names) is None:
+    if are_joints or not (are_alike or matched([summary.field.name for _, summary in forces], names)):
         return set()
     groups["tendon_position"] = groups.pop("joint_position")
     return set(names)
@@ -251,19 +271,23 @@ def words_of(name: str) -> list[str]:
     """Return the words of a name in lower case: `TendonForce_2` is tendon, force."""
     plain = name if _array_of(name) else re.sub(r"[\[(].*?[\])]", " ", name)
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
-    return [word.lower() for word in re.findall(r"[A-Za-z]+0?(?![A-Za-z])|[A-Za-z]+", apart)]
+    return [word.lower() for word in re.findall(r"[A-Za-z]+", apart)]
 
 
 def _group_of(summary: FieldSummary) -> str | None:
     """Return what a field likely is: a group of columns, "torque", or None."""
-    if summary.field.kind != NUMBER or summary.count == summary.missing:
+    if words_of(summary.field.name)[-1:] in CLOCKS:
+        return None
+    parts = set(re.split(r"[./]", summary.field.name.lower()))
+    if summary.field.kind != NUMBER or summary.count == summary.missing or parts & STRUCTURE:
         return None
     array = _array_of(summary.field.name)
     context = set(words_of(array))
     if array and not context & (OTHERS | CONTACT):
         if context & TORQUES and not context & REFERENCE:
             return "tendon_force" if set(words_of(summary.field.name)) & TENDON else "torque"
-        group = _by_words(context, summary) if context & (TENDON | FORCES | REFERENCE) else None
+        says_little = array.rpartition(".")[2].lower() in VALUES
+        group = _by_words(context, summary) if context & (TENDON | FORCES | REFERENCE) and not says_little else None
         if group is not None:
             return group
     return _by_words(set(words_of(summary.field.name)), summary)

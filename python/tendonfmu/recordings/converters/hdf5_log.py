@@ -1,4 +1,4 @@
-"""How HDF5 files are read, and what they have in common with MATLAB files: arrays with names.
+"""How HDF5 files are read, and what they have in common with those of MATLAB and numpy: arrays with names.
 
 Arrays of one struct or group are a topic. A row is an element along the longer side of an array; the columns of a
 matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, and fields
@@ -158,12 +158,24 @@ def open_hdf5(file: Path, settings: LogFormat) -> ArraysLog:
     def add(name: str, node: Any) -> None:
         if isinstance(node, require_extra("h5py", str(file)).Dataset):
             arrays.extend(_arrays(f"/{name}", node))
+        elif "block0_items" in node:
+            arrays.extend(_of_pandas(f"/{name}/", node))
 
     try:
         h5.visititems(add)
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise damaged(file, error) from None
     return ArraysLog(file, arrays, [])
+
+
+def open_numpy(file: Path, settings: LogFormat) -> ArraysLog:
+    """Open a file of numpy. Raise InputError."""
+    try:
+        content = np.load(file, allow_pickle=False)
+        values = {"values": content} if file.suffix.lower() == ".npy" else {name: content[name] for name in content}
+    except Exception as error:  # of zip, numpy's header, or an array of objects
+        raise InputError(f"{file}: not a whole file of numpy arrays ({error}); save it again by np.savez") from None
+    return ArraysLog(file, [part for name, array in values.items() for part in _arrays(name, array)], [])
 
 
 def open_file(file: Path) -> Any:
@@ -186,17 +198,34 @@ def damaged(file: Path, error: Exception) -> InputError:
 
 def _arrays(name: str, dataset: Any) -> Iterator[Array]:
     unit = _unit(dataset)
+    if "block0_items" in getattr(dataset, "parent", ()):  # of pandas, see `_of_pandas`
+        return
     if dataset.shape is None or len(dataset.shape) == 0:
         return
     if not dataset.dtype.names:
         # signals may lie in rows: time runs along the longer side
         by_columns = len(dataset.shape) == 2 and dataset.shape[0] < dataset.shape[1]
-        yield Array.of(name[: name.rindex("/") + 1], name, dataset, by_columns, unit)
+        yield Array.of(name[: name.rfind("/") + 1], name, dataset, by_columns, unit)
         return
     for part in dataset.dtype.names:
         inner = dataset.dtype[part]
         shape = (*dataset.shape, *inner.shape)
         yield Array(f"{name}.", f"{name}.{part}", shape, inner.base, partial(_read_part, dataset, part), unit)
+
+
+def _of_pandas(group: str, node: Any) -> Iterator[Array]:
+    """Yield the columns of a DataFrame, which pandas stores by blocks of one type, with their names beside them."""
+    if node["axis1"].dtype.kind in "iuf":
+        yield Array.of(group, f"{group}index", node["axis1"], False)
+    for block in (name.removesuffix("_items") for name in node if name.endswith("_items")):
+        for k, label in enumerate(node[f"{block}_items"][()]):
+            name = label.decode("utf-8", "replace") if isinstance(label, bytes) else str(label)
+            values = node[f"{block}_values"]
+            yield Array(group, f"{group}{name}", values.shape[:1], values.dtype, partial(_read_column, values, k))
+
+
+def _read_column(values: Any, column: int, start: int, stop: int) -> Any:
+    return values[start:stop, column]
 
 
 def _read_part(dataset: Any, part: str, start: int, stop: int) -> Any:
@@ -205,7 +234,7 @@ def _read_part(dataset: Any, part: str, start: int, stop: int) -> Any:
 
 def _unit(dataset: Any) -> str:
     for key in ("units", "unit", "Units", "Unit"):
-        value = dataset.attrs.get(key)
+        value = getattr(dataset, "attrs", {}).get(key)
         if isinstance(value, bytes):
             return value.decode("utf-8", "replace")
         if isinstance(value, str):

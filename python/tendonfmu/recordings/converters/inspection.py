@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,13 +25,16 @@ from tendonfmu.recordings.converters.log import (
     Topic,
     open_log,
 )
-from tendonfmu.recordings.converters.stamps import nanoseconds
+from tendonfmu.recordings.converters.stamps import nanoseconds, pattern_of
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
-from tendonfmu.recordings.traps import wrapped
+from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps
 CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
+EFFORT = re.compile("force|tension|load|torque|effort|current|tau|amp")  # what jumps by sticking, not by turning
+SAMPLE = 2000  # values of a field that are kept
+TOGETHER = 0.5  # correlation with a signal from which a field may be one
 DRIFT = 3e-6, 1e-3  # of two clocks; less is rounding, and more is no second clock
 
 
@@ -46,7 +50,8 @@ class FieldSummary:
     high: float = -np.inf
     example: str = ""  # first text
     only_flags: bool = True  # whether all numbers are 0 or 1
-    wrap: float | None = None  # steps after which it starts again (`traps.wrapped`), of the first block
+    wrap: float | None = None  # readings after which it starts again (`counters.wrap_of`)
+    sample: NDArray[np.float64] | None = None  # up to `SAMPLE` values of the first block, equally far apart
     rising: bool = True  # whether each number is above the one before, and the first and last of them
     first: float = np.nan
     last: float = -np.inf
@@ -58,15 +63,29 @@ class FieldSummary:
             self.missing += int(values.null_count)
             self.example = self.example or next((str(text) for text in values[:100] if text.is_valid), "")
             return
+        if self.sample is None:
+            self.sample = values[:: max(len(values) // SAMPLE, 1)].astype(np.float64)
         finite = values[np.isfinite(values)]
         self.missing += len(values) - len(finite)
         if len(finite):
             if self.count == len(values):
-                self.wrap, self.first = wrapped(finite.astype(np.float64)), float(finite[0])
+                self.first = float(finite[0])
+            self.wrap = self.wrap or wrap_of(finite.astype(np.float64), not EFFORT.search(self.field.name.lower()))
             self.rising = self.rising and bool((np.diff(finite) > 0).all()) and float(finite[0]) > self.last
             self.last = float(finite[-1])
             self.low, self.high = min(self.low, float(finite.min())), max(self.high, float(finite.max()))
             self.only_flags = self.only_flags and bool(np.isin(finite, (0, 1)).all())
+
+    def moves_with(self, other: FieldSummary) -> float:
+        """Return the correlation with another field of the topic; 0 if one of them stands still."""
+        if self.sample is None or other.sample is None or len(self.sample) != len(other.sample):
+            return 0.0
+        both = np.isfinite(self.sample) & np.isfinite(other.sample)
+        if not both.any():
+            return 0.0
+        mine, its = (values[both] - values[both].mean() for values in (self.sample, other.sample))
+        size = float(np.sqrt((mine**2).sum() * (its**2).sum()))
+        return float((mine * its).sum()) / size if size > 0.0 else 0.0
 
 
 @dataclass
@@ -75,6 +94,7 @@ class ClockSummary:
 
     name: str  # the field
     stamp: str = ""  # kind of a point in time that the field holds without doubt, or ""
+    pattern: str = ""  # of its texts, where they are not of ISO 8601
     first: float = 0.0  # first and last time
     last: float = 0.0
     step: float = 0.0  # median step, of the first block
@@ -84,6 +104,7 @@ class ClockSummary:
     backwards: int = 0
     rows: int = 0  # number of times
     whole: bool = True
+    wrap: float | None = None  # readings after which a timer starts again
     _end: Any = None
 
     def add(self, values: NDArray[Any]) -> None:
@@ -97,6 +118,10 @@ class ClockSummary:
             values = np.concatenate([[self._end], values])
             self.rows -= 1
         self._end, self.last, self.rows = values[-1], float(values[-1]), self.rows + len(values)
+        self.wrap = self.wrap or (None if self.stamp else overflow(values))
+        if self.wrap:
+            values = unwrapped(values, self.wrap, values[0])
+            self._end, self.last = values[-1], float(values[-1])
         steps = np.diff(values)
         if not len(steps):
             return
@@ -137,9 +162,9 @@ class Inspection:
     messages: bool = False  # whether the log holds messages, whose units are those of ROS unless stated
 
 
-def inspect_log(file: Path, log: Log | None = None) -> Inspection:
-    """Read a log and summarise it. log: the log, if it is open."""
-    log = log or open_log(file, LogFormat())
+def inspect_log(file: Path, log: Log | None = None, settings: LogFormat | None = None) -> Inspection:
+    """Read a log and summarise it. log: the log, if it is open. settings: what is known of its format."""
+    log = log or open_log(file, settings or LogFormat(leave_out_missing=True))
     topics = {topic.name: _empty_summary(topic) for topic in log.topics}
     wanted = {name: [part.key for part in topic.fields if part.field.kind != OTHER] for name, topic in topics.items()}
     texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]
@@ -152,13 +177,20 @@ def inspect_log(file: Path, log: Log | None = None) -> Inspection:
 def _traps(topic: TopicSummary) -> Iterator[str]:
     """Yield what is wrong with fields by themselves: words that start again, and clocks that run apart."""
     clock = topic.clock
+    counters: dict[float, list[str]] = {}
+    for summary in topic.fields:
+        if summary.wrap and not (clock and summary.field.name == clock.name):
+            counters.setdefault(summary.wrap, []).append(summary.field.name)
+    for wrap, names in counters.items():
+        yield (
+            f"{', '.join(names)}: jumps by {wrap:.6g}: signed numbers stored as unsigned, an encoder of many turns, or "
+            f'a counter that overflows; "wrap": {wrap:.6g} in the map takes the jumps out; of an encoder, the first '
+            "reading is taken within half a turn of the offset"
+        )
     for summary in topic.fields:
         name = summary.field.name
-        if summary.wrap:
-            yield (
-                f"{name}: jumps by {summary.wrap:.0f} steps, and no value is between: signed numbers stored as "
-                f'unsigned, or a counter that overflows; "wrap": {summary.wrap:.0f} in the map if its unit is a step'
-            )
+        if clock is not None and name == clock.name and clock.wrap:
+            yield f'{name}: a timer that overflows at {clock.wrap:.16g}; "wrap" in the map makes its times go on'
         is_second = clock is not None and name != clock.name and summary.rising and summary.count == clock.rows
         if clock is None or not is_second or clock.last <= clock.first:
             continue
@@ -182,11 +214,15 @@ def _empty_summary(topic: Topic) -> TopicSummary:
     return TopicSummary(topic, fields, ClockSummary(clock, "datetime" if is_moment else ""))
 
 
-def _clock_by_values(topic: TopicSummary, block: dict[str, Any]) -> ClockSummary | None:
-    """Return the field that rises at every row by nearly the same step; None if not one alone does."""
+def _clock_by_values(log: Log, topic: TopicSummary, block: dict[str, Any]) -> ClockSummary | None:
+    """Return the field of times as text, or that alone rises at every row by nearly the same step, or None."""
     found = []
     for summary in topic.fields:
         values = block.get(summary.key)
+        if summary.field.kind == TEXT and values is not None:
+            clock = ClockSummary(summary.key)
+            if _as_times(log, clock, values) is not None:
+                return clock
         if summary.field.kind != NUMBER or not isinstance(values, np.ndarray) or len(values) < FEWEST_TIMES:
             continue
         step = np.diff(values.astype(np.float64))
@@ -200,7 +236,7 @@ def _clock_by_values(topic: TopicSummary, block: dict[str, Any]) -> ClockSummary
 
 def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
     if topic.clock is None and not any(summary.count for summary in topic.fields):
-        topic.clock = _clock_by_values(topic, block)
+        topic.clock = _clock_by_values(log, topic, block)
     for summary in topic.fields:
         values = block.get(summary.key)
         if values is None:
@@ -209,18 +245,27 @@ def _add(log: Log, topic: TopicSummary, block: dict[str, Any]) -> None:
         if topic.clock is None or summary.key != topic.clock.name:
             continue
         if summary.field.kind == TEXT and (topic.clock.stamp or not topic.clock.rows):
-            values = _as_times(log, summary.field.name, values)
+            values = _as_times(log, topic.clock, values)
             topic.clock.stamp = "datetime" if values is not None else ""
         if isinstance(values, np.ndarray):
             topic.clock.add(values)
 
 
-def _as_times(log: Log, name: str, texts: Any) -> NDArray[np.int64] | None:
-    """Return texts as ns since 1970, or None if they are no times."""
-    try:
-        return nanoseconds(log.file, MappedColumn("time", name, 1e-9, None, "datetime"), texts)
-    except InputError:
-        return None
+def _as_times(log: Log, clock: ClockSummary, texts: Any) -> NDArray[np.int64] | None:
+    """Return texts as ns since 1970, or None if they are no times. Sets the pattern that fits them."""
+    for has_pattern in (bool(clock.pattern), True):
+        if has_pattern and not clock.pattern:
+            known = texts.drop_null()
+            clock.pattern = pattern_of([str(text) for text in (*known[:100], *known[-1:])]) if len(known) else ""
+            if not clock.pattern:
+                return None
+        try:
+            column = MappedColumn("time", clock.name, 1e-9, None, "datetime", pattern=clock.pattern)
+            return nanoseconds(log.file, column, texts)
+        except InputError:
+            continue
+    clock.pattern = ""
+    return None
 
 
 def _settings(log: Log) -> dict[str, Any]:
@@ -232,10 +277,12 @@ def _settings(log: Log) -> dict[str, Any]:
     settings: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
     if log.encoding not in ("utf-8", "utf-8-sig"):
         settings["encoding"] = log.encoding
+    if layout.thousands:
+        settings["thousands"] = layout.thousands
     if layout.skip:
         settings["skip"] = layout.skip
     if not layout.header:
         settings["header"] = False
-    if layout.units:
+    if layout.has_units_row:
         settings["units_row"] = True
     return settings

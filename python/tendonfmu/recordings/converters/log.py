@@ -15,21 +15,31 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 import numpy as np
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.recordings.converters.column_map import LogFormat
 
-TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log", ".lvm")
 # suffix: module and name of what opens it
 FORMATS = {
     **dict.fromkeys(TEXTS, ("text_log", "TextLog")),
     ".parquet": ("parquet_log", "ParquetLog"),
     ".mat": ("matlab_log", "open_matlab"),
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
+    **dict.fromkeys((".feather", ".arrow", ".jsonl", ".ndjson"), ("parquet_log", "TableLog")),
+    **dict.fromkeys((".npz", ".npy"), ("hdf5_log", "open_numpy")),
     ".mcap": ("mcap_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
+}
+# formats that another program turns into one of these
+ELSEWHERE = {
+    ".bag": "a bag of ROS 1 becomes one of ROS 2 by `rosbags-convert --src LOG.bag --dst LOG`",
+    ".tdms": "TDMS becomes CSV or HDF5 by the Python package npTDMS, or in LabVIEW",
+    ".xlsx": "save the sheet as CSV",
+    ".pkl": "write it by DataFrame.to_parquet",
 }
 FOLDER = ("ros2_bag_log", "open_bag")
 DATASET, INFO = ("lerobot_log", "LeRobotLog"), "meta/info.json"  # a folder with this file is a LeRobot dataset
@@ -40,7 +50,22 @@ Block = dict[str, Any]
 
 ROWS = 1 << 18  # of a block
 NUMBER, TIME, TEXT, OTHER = "number", "time", "text", "other"  # kinds of fields
-TIME_NAMES = ("time", "t", "stamp", "timestamp", "time_s", "time_ms", "header.stamp", "@log_time")
+DATE_TIME = "date and time"  # type of a field that is made of two columns
+TIME_NAMES: tuple[str, ...] = (
+    "time",
+    "t",
+    "stamp",
+    "timestamp",
+    "time_s",
+    "time_ms",
+    "x_value",
+    "datetime",
+    "date_time",
+    "date/time",
+    "date time",
+    "header.stamp",
+)
+TIME_NAMES += ("@log_time",)
 NUMBERED = "#"  # before the number of a column whose name is not unique
 NANOSECONDS = 10**9
 # ends of the names of both columns, which begin alike
@@ -83,6 +108,8 @@ class Topic:
 def _rank(field: Field, prefix: str) -> int | None:
     """Return how likely a field is a clock, 0 most likely, or None."""
     name = field.name.lower()
+    if field.type == DATE_TIME:
+        return 0
     # without a unit: "Time [s]", "t_ms"
     plain = re.sub(r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", name.removeprefix(prefix.lower()))
     if plain in TIME_NAMES:
@@ -114,9 +141,10 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     known = ", ".join(FORMATS)
     if not file.is_dir():
         if suffix not in (TEXTS if is_gzip else FORMATS):
+            advice = f"; {ELSEWHERE[suffix]}" if suffix in ELSEWHERE else ""
             raise InputError(
                 f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or the folder of a bag "
-                "or dataset"
+                f"or dataset{advice}"
             )
         if not file.is_file():
             raise InputError(f"{file}: no such file; expected a log, {known}")
@@ -179,11 +207,12 @@ def as_numbers(values: Any) -> Any:
 
 
 class SplitStamps:
-    """A log with each time of its tables that stands in two columns as a field `sec+nanosec`, in ns since 1970."""
+    """A log with each time of two columns as one field: `sec+nanosec` in ns since 1970, `Date+Time` a text."""
 
     def __init__(self, log: Log) -> None:
         self.log, self.file, self.open_ended = log, log.file, log.open_ended
         self._parts: dict[str, tuple[str, str]] = {}  # names of both columns, by that of the field
+        self._texts: dict[str, tuple[str, str]] = {}  # of those, a date and a time of day
         self.topics = [self._with_stamps(topic) for topic in log.topics]
 
     @property
@@ -199,10 +228,17 @@ class SplitStamps:
                 other = name.removesuffix(whole) + rest
                 if name.endswith(whole) and name != other and names.count(name) == names.count(other) == 1:
                     found[f"{name}+{rest}"] = (name, other)
-        self._parts |= found
-        parts = {part for pair in found.values() for part in pair}
+        texts = {field.name.lower(): field.name for field in topic.fields if field.kind == TEXT}
+        for name in texts:
+            other = re.sub("date(?!.*date)", "time", name)
+            if name != other and other in texts:
+                self._texts[f"{texts[name]}+{texts[other]}"] = (texts[name], texts[other])
+        dates = {name: pair for name, pair in self._texts.items() if pair[0] in names}
+        self._parts |= found | dates
+        parts = {part for pair in (found | dates).values() for part in pair}
         fields = [replace(field, kind=OTHER if field.name in parts else field.kind) for field in topic.fields]
-        return replace(topic, fields=(*fields, *(Field(name, TIME) for name in found)))
+        joined = [*(Field(name, TIME) for name in found), *(Field(name, TEXT, DATE_TIME) for name in dates)]
+        return replace(topic, fields=(*fields, *joined))
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read fields, as every log does."""
@@ -211,12 +247,15 @@ class SplitStamps:
             for topic, names in wanted.items()
         }
         row = dict.fromkeys(wanted, 0)
-        for topic, block in self.log.blocks(asked, [name for name in texts if name not in self._parts]):
+        of_texts = [part for name in texts for part in self._texts.get(name, () if name in self._parts else (name,))]
+        for topic, block in self.log.blocks(asked, of_texts):
             joined = {name: self._stamps(name, block, row[topic]) for name in wanted[topic] if name in self._parts}
             row[topic] += len(next(iter(block.values()), ()))
             yield topic, block | joined
 
-    def _stamps(self, name: str, block: Block, row: int) -> NDArray[np.int64]:
+    def _stamps(self, name: str, block: Block, row: int) -> Any:
+        if name in self._texts:
+            return pc.binary_join_element_wise(*(block[part] for part in self._texts[name]), " ")
         whole, rest = (self._whole(part, block[part], row) for part in self._parts[name])
         return whole * NANOSECONDS + rest
 

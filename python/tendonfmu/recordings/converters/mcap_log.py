@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import struct
-import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted, require_extra
@@ -17,11 +18,9 @@ from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.messages import Decoder, MessageLog, Received, Ros2Types
 
 MAGIC = b"\x89MCAP0\r\n"
-SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
-HEAD = struct.Struct("<BQ")  # opcode, length
-CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, uncompressed size, checksum, length of compression's name
+CHUNK_CODE, CHUNK = 0x06, struct.Struct("<BQQQQII")  # code, length, times, size, checksum, length of a name
+RECORDS = ("Schema", "Channel", "Message")
 LARGEST = 1 << 32  # bytes of a record
-PIECE = 1 << 16  # bytes
 
 
 class McapLog(MessageLog):
@@ -79,89 +78,45 @@ class McapRecords:
     def __init__(self, file: Path) -> None:
         self.file = file
         self.cut = ""  # why the file ends early
-        self._records = require_extra("mcap.records", str(file))
-        self._stream = require_extra("mcap.data_stream", str(file)).ReadDataStream
 
     def __iter__(self) -> Iterator[Any]:
         """Yield records of the package mcap: Schema, Channel and Message."""
+        stream = require_extra("mcap.stream_reader", str(self.file))
+        errors = require_extra("mcap.exceptions", str(self.file))
         with open(self.file, "rb") as raw:
             if raw.read(len(MAGIC)) != MAGIC:
                 raise InputError(f"{self.file}: not an MCAP file; expected one that begins with its mark")
-            yield from self._in(raw, at_top=True)
-
-    def _in(self, raw: BinaryIO, at_top: bool) -> Iterator[Any]:
-        """Yield the records of a file, or of a chunk."""
-        while head := raw.read(HEAD.size):
-            if len(head) < HEAD.size:
-                break
-            opcode, length = HEAD.unpack(head)
-            if opcode == DATA_END:
-                return
-            if length > LARGEST:
-                self.cut = f"a record of {length} bytes at byte {raw.tell() - HEAD.size}: the file is damaged there"
-                return
-            content = raw.read(length)
-            if len(content) < length:
+            reader = stream.StreamReader(raw, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST)
+            at = raw.tell()
+            try:
+                for record in reader.records:
+                    at = raw.tell()
+                    kind = type(record).__name__
+                    if kind == "DataEnd":
+                        return
+                    if kind == "Chunk":
+                        yield from stream.breakup_chunk(record, validate_crc=True)
+                    elif kind in RECORDS:
+                        yield record
+            except errors.UnsupportedCompressionError as error:
+                raise InputError(f"{self.file}: {error}; expected compression by zstd, lz4 or none") from None
+            except errors.EndOfFile:
                 self.cut = "the file is cut off"
-                if opcode == CHUNK:
-                    yield from self._begin_of_chunk(content)
-                return
-            if opcode == CHUNK:
-                yield from self._chunk(content)
-                if self.cut:
-                    return
-            elif opcode in (SCHEMA, CHANNEL, MESSAGE):
-                yield self._read(opcode, content)
-        if at_top:
-            self.cut = self.cut or "the file is cut off"
-
-    def _read(self, opcode: int, content: bytes) -> Any:
-        stream = self._stream(io.BytesIO(content))
-        if opcode == SCHEMA:
-            return self._records.Schema.read(stream)
-        if opcode == CHANNEL:
-            return self._records.Channel.read(stream)
-        return self._records.Message.read(stream, len(content))
-
-    def _chunk(self, content: bytes) -> Iterator[Any]:
-        size, checksum, compression, data = _chunk_parts(content)
-        plain = self._decompressed(compression, data)
-        if len(plain) < size or (checksum and zlib.crc32(plain) != checksum):
-            self.cut = "a block is damaged"
-            return
-        yield from self._in(io.BytesIO(plain), at_top=False)
-
-    def _begin_of_chunk(self, content: bytes) -> Iterator[Any]:
-        """Yield the whole messages of a chunk that is cut off: its compression is a stream."""
-        try:
-            _, _, compression, data = _chunk_parts(content)
-        except (struct.error, UnicodeDecodeError):
-            return
-        yield from self._in(io.BytesIO(self._decompressed(compression, data)), at_top=False)
-
-    def _decompressed(self, compression: str, data: bytes) -> bytes:
-        """Return as much as the data give."""
-        if compression not in ("", "zstd", "lz4"):
-            raise InputError(f"{self.file}: compression {compression!r} is not known; expected zstd, lz4 or none")
-        if not compression:
-            return data
-        module = require_extra("zstandard" if compression == "zstd" else "lz4.frame", str(self.file))
-        stream = module.ZstdDecompressor().decompressobj() if compression == "zstd" else module.LZ4FrameDecompressor()
-        damage: type[Exception] = module.ZstdError if compression == "zstd" else RuntimeError
-        plain = b""
-        try:
-            # in small pieces: of a damaged piece nothing comes back
-            for at in range(0, len(data), PIECE):
-                if getattr(stream, "eof", False):
-                    break
-                plain += stream.decompress(data[at : at + PIECE])
-        except damage:
-            pass
-        return plain
+                raw.seek(at)
+                with suppress(Exception):  # of what is left of the last chunk, all errors mean its end
+                    for record in stream.StreamReader(_begin_of_chunk(raw.read()), skip_magic=True).records:
+                        if type(record).__name__ in RECORDS:
+                            yield record
+            except Exception as error:  # of zstd, lz4, checksums and records
+                self.cut = f"a block is damaged ({error})"
 
 
-def _chunk_parts(content: bytes) -> tuple[int, int, str, bytes]:
-    """Return uncompressed size, checksum, compression and data of a chunk."""
-    _, _, size, checksum, length = CHUNK_HEAD.unpack_from(content)
-    at = CHUNK_HEAD.size + length
-    return size, checksum, content[CHUNK_HEAD.size : at].decode(), content[at + 8 :]
+def _begin_of_chunk(record: bytes) -> io.BytesIO:
+    """Return the records in a chunk that is cut off: its compression is a stream."""
+    opcode, _, _, _, _, _, length = CHUNK.unpack_from(record)
+    compression, data = record[CHUNK.size :][:length], record[CHUNK.size + length + 8 :]
+    if compression:
+        module = importlib.import_module("zstandard" if compression == b"zstd" else "lz4.frame")
+        stream = module.ZstdDecompressor().decompressobj() if compression == b"zstd" else module.LZ4FrameDecompressor()
+        data = stream.decompress(data)
+    return io.BytesIO(data if opcode == CHUNK_CODE else b"")

@@ -5,6 +5,7 @@
 | `/imu.linear_acceleration.x` | a field of a field |
 | `/hand/tendons.effort[3]` | the third element of an array; indices start at 1 |
 | `/joint_states.position[knuckle]` | the element of that name: the message lists names, as many as elements |
+| `/states.interface_values[knuckle].values[effort]` | the same, where each element has names of its own |
 | `/joint_states.header.stamp` | a time, in ns |
 | `/joint_states.@log_time`, `@publish_time` | when the message was recorded, sent; in ns |
 """
@@ -14,6 +15,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -28,9 +30,9 @@ from tendonfmu.files import are, counted, require_extra
 from tendonfmu.recordings.converters.log import LONGEST, NUMBER, OTHER, TEXT, TIME, Block, Field, Topic
 
 LOG_TIME, PUBLISH_TIME = "@log_time", "@publish_time"
-NAME_LISTS = ("name", "names", "joint_names", "joint_name")
+NAME_LISTS = ("name", "names", "joint_names", "joint_name", "interface_names", "labels")
 ROWS = 1 << 16  # messages of a block
-SAMPLES = 5  # messages of each topic whose fields are listed
+SAMPLES = 5  # messages of each topic whose fields are listed, and of each further length: arrays may be empty first
 NANOSECONDS = 10**9
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[([^\[\]]+)\]")
@@ -113,11 +115,13 @@ class MessageLog(ABC):
 def _topics_of(messages: Iterator[Received]) -> list[Topic]:
     """Return the topics in alphabetical order, with the fields of their first messages."""
     fields_of: dict[str, dict[str, Field]] = {}
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
+    lengths: Counter[tuple[str, int]] = Counter()
     for received in messages:
-        topic = received.topic
-        counts[topic] = counts.get(topic, 0) + 1
-        if counts[topic] > SAMPLES:
+        topic, length = received.topic, len(received.data)
+        counts[topic] += 1
+        lengths[topic, length] += 1
+        if lengths[topic, length] > SAMPLES:
             continue
         try:
             content = received.content()
@@ -196,7 +200,7 @@ def _leaves(value: Any, path: str = "", names: Sequence[str] = ()) -> Iterator[t
         has_names = len(names) == len(value) and len(set(names)) == len(names)
         for k, inner in enumerate(value):
             if not isinstance(inner, str):
-                yield from _leaves(inner, f"{path}[{names[k] if has_names else k + 1}]", names)
+                yield from _leaves(inner, f"{path}[{names[k] if has_names else k + 1}]")
 
 
 def _names_of(parts: Mapping[str, Any]) -> list[str]:
@@ -229,7 +233,7 @@ def _getter(path: str) -> Callable[[Any], Any]:
                 place = int(element) - 1 if element.isdigit() else (names.index(element) if element in names else -1)
                 if place < 0 or not hasattr(value, "__len__") or place >= len(value):
                     return None
-                value = value[place]
+                value, names = value[place], []
         return _plain(value)
 
     return get

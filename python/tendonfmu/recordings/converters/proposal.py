@@ -33,11 +33,18 @@ from tendonfmu.recordings.converters.guesses import (
     words_of,
 )
 from tendonfmu.recordings.converters.guesses import UNDECIDED as NOT_SURE
-from tendonfmu.recordings.converters.inspection import ClockSummary, FieldSummary, Inspection, TopicSummary
+from tendonfmu.recordings.converters.inspection import (
+    TOGETHER,
+    ClockSummary,
+    FieldSummary,
+    Inspection,
+    TopicSummary,
+)
 from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
 NO_SIGN = 0.02  # of the largest torque: the smallest of a magnitude
+WORDS = (2.0**8, 2.0**16, 2.0**32)  # after which signed numbers stored as unsigned start again
 LONGEST_NAME = 40  # characters in a table
 QUANTITY = {
     "tendon_force": "force",
@@ -58,6 +65,8 @@ class Line:
     unit: str  # its unit, or "?"
     sure: str  # SURE, LIKELY, GUESS or UNDECIDED
     why: str  # in words
+    wrap: float | None = None  # readings after which it starts again
+    pattern: str = ""  # of texts of times that are not of ISO 8601
 
 
 @dataclass
@@ -67,6 +76,7 @@ class Proposal:
     document: dict[str, Any]  # the map, as in the JSON file
     lines: list[Line] = field(default_factory=list)  # its lines
     unused: list[str] = field(default_factory=list)  # names of fields that it does not use
+    moving: dict[str, str] = field(default_factory=dict)  # of those that may be signals, why
     orders: list[Order] = field(default_factory=list)  # how tendons and joints are numbered, where there are several
     undecided: list[str] = field(default_factory=list)  # keys of the map that are "?"
     notes: list[str] = field(default_factory=list)  # what is wrong with fields beside each other
@@ -92,14 +102,30 @@ def propose(inspection: Inspection) -> Proposal:
         if not groups.get("joint_position"):
             lines += _perhaps_angles(inspection, {line.source for line in lines}, len(slots.get("tendon_force", [])))
         lines += _contact(groups.get("contact", []))
-    used = {line.source for line in lines}
-    names = [summary.field.name for topic in inspection.topics for summary in topic.fields]
     log = _log_settings(inspection, lines)
     undecided = [f"log.{key}" for key, value in log.items() if value == UNDECIDED]
     undecided += [line.column for line in lines if UNDECIDED in (line.source, line.unit)]
     document = _document(inspection, log, lines, orders, is_one_joint)
-    unused = [name for name in names if name not in used]
-    return Proposal(document, lines, unused, orders, undecided, list(_magnitudes(groups)))
+    unused, moving = _unused(inspection, lines)
+    return Proposal(document, lines, unused, moving, orders, undecided, list(_magnitudes(groups)))
+
+
+def _unused(inspection: Inspection, lines: Sequence[Line]) -> tuple[list[str], dict[str, str]]:
+    """Return the names of the fields that no line uses, and of those that move with a signal which, and how much."""
+    columns = {line.source: line.column for line in lines if line.column != "time"}
+    used = {line.source for line in lines}
+    unused, moving = [], {}
+    for topic in inspection.topics:
+        signals = [(columns[_source(part)], part) for part in topic.fields if _source(part) in columns]
+        for part in topic.fields:
+            if _source(part) in used:
+                continue
+            unused.append(part.field.name)
+            fits = {column: part.moves_with(signal) for column, signal in signals if part.field.kind == NUMBER}
+            best = max(fits, key=lambda column: abs(fits[column]), default="")
+            if best and abs(fits[best]) > TOGETHER and not part.rising:
+                moving[part.field.name] = f"moves with {best}, correlation {fits[best]:.2f}"
+    return unused, moving
 
 
 def _magnitudes(groups: Mapping[str, Sequence[Member]]) -> Iterator[str]:
@@ -246,6 +272,9 @@ def _joint(inspection: Inspection, groups: dict[str, list[Member]]) -> list[Line
 def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary, is_short: bool) -> Line:
     """Return the line of a field. is_short: its group has fewer fields than the finger has tendons."""
     name, source = summary.field.name, _source(summary)
+    if summary.low == summary.high and group != "contact":
+        why = f"constant at {summary.low:.6g}: a sensor that is not connected? State the unit, or remove this"
+        return Line(column, source, UNDECIDED, NOT_SURE, why)
     statement = units.stated(name, summary.field.unit)
     if re.search(rf"(^|[./]){re.escape(column)}$", name) and not summary.field.unit:
         return Line(column, source, SI[QUANTITY[group]], SURE, "the name of a recording's column, in SI")
@@ -260,7 +289,8 @@ def _line(inspection: Inspection, column: str, group: str, summary: FieldSummary
     if summary.missing:
         values = f"{summary.missing} of {counted(summary.count, 'value')} {are(summary.missing)} missing"
         why += f'; {values}: see "missing" in "log"'
-    return Line(column, source, guess.unit, sure, why)
+    wrap = summary.wrap if QUANTITY[group] in ("length", "angle") or (summary.wrap or 0.0) in WORDS else None
+    return Line(column, source, guess.unit, sure, why, wrap)
 
 
 def _time(inspection: Inspection, beside: Member | None) -> Line:
@@ -268,9 +298,11 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     with_clock = (topic for topic in inspection.topics if topic.clock)
     topic = beside[0] if beside else next(with_clock, inspection.topics[0])
     clock = topic.clock
-    if clock is None:
-        return _undecided("time", "no field looks like a time")
-    summary = next(summary for summary in topic.fields if summary.field.name == clock.name)
+    named = next((summary for summary in topic.fields if clock and summary.field.name == clock.name), None)
+    if clock is None or named is None or named.count == named.missing:
+        advice = 'no field looks like a time; for rows equally far apart write {"rate": HZ} in its place'
+        return _undecided("time", advice)
+    summary = named
     faults = ""
     if clock.backwards or clock.repeated:
         faults = (
@@ -280,7 +312,7 @@ def _time(inspection: Inspection, beside: Member | None) -> Line:
     guess = Guess(clock.stamp, SURE, "its values are points in time")
     if not clock.stamp:
         guess = unit_of_time(clock.name, summary.field.unit, clock.first, clock.step)
-    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}")
+    return Line("time", _source(summary), guess.unit, guess.sure, f"{guess.why}{faults}", clock.wrap, clock.pattern)
 
 
 def _source(summary: FieldSummary) -> str | int:
@@ -303,8 +335,10 @@ def _log_settings(inspection: Inspection, lines: Sequence[Line]) -> dict[str, An
 def _document(
     inspection: Inspection, log: dict[str, Any], lines: Sequence[Line], orders: Sequence[Order], is_one_joint: bool
 ) -> dict[str, Any]:
-    columns = {
-        line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"} for line in lines
+    columns: dict[str, dict[str, Any]] = {
+        line.column: {"column": line.source, "unit": line.unit, "comment": f"{line.sure}: {line.why}"}
+        | {key: value for key, value in (("wrap", line.wrap), ("pattern", line.pattern)) if value}
+        for line in lines
     }
     document: dict[str, Any] = {"format": FORMAT}
     if orders:
@@ -331,6 +365,7 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
         "orders": [{**asdict(order), "line": order.line()} for order in proposal.orders],
         "undecided": proposal.undecided,
         "unused": proposal.unused,
+        "moving": proposal.moving,
         "map": proposal.document,
         "notes": [*inspection.notes, *proposal.notes],
     }
@@ -418,6 +453,14 @@ def proposal_rows(proposal: Proposal) -> Iterator[list[str]]:
     """Yield the cells of each line of the map: our column, the log's, unit, how sure, why."""
     for line in proposal.lines:
         yield [line.column, _short(str(line.source)), line.unit, line.sure, line.why]
+
+
+def unused_line(proposal: Proposal) -> Iterator[str]:
+    """Yield a sentence about the fields that no line uses, with "?" where they may be signals."""
+    if proposal.unused:
+        listed = (f"{name}{' ?' if name in proposal.moving else ''}" for name in proposal.unused)
+        yield f"not used: {', '.join(listed)}"
+    yield from (f"? {name}: {why}" for name, why in proposal.moving.items())
 
 
 def _short(name: str) -> str:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import re
 import zoneinfo
+from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,25 @@ from tendonfmu.recordings.converters.units import STAMPS
 
 NANOSECONDS = 10**9
 LATEST = 2**62  # ns; the year 2116
+DAY = 86400 * NANOSECONDS
+DATES: tuple[str, ...] = (
+    "%Y-%m-%d",
+    "%Y/%m/%d",
+    "%Y.%m.%d",
+    "%d.%m.%Y",
+    "%d/%m/%Y",
+    "%m/%d/%Y",
+    "%d-%m-%Y",
+    "%m-%d-%Y",
+    "%d.%m.%y",
+)
+DATES += ("%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%Y%m%d", "0 days")
+PATTERNS = [
+    f"{date}{hour}"
+    for date in ("", *(f"{date} " for date in DATES), *(f"{date}T" for date in DATES))
+    for hour in ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%M:%S.%f")
+]
+FRACTION = re.compile(r"(.*?\d:\d\d(?::\d\d)?)(?:[.,:](\d+))?(\D*)")  # of a second, which may be left out
 ZONED = r"(Z|[+-]\d{2}:?(\d{2})?)\s*$"
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 
@@ -30,6 +51,8 @@ def nanoseconds(file: Path, column: MappedColumn, readings: Any, row: int = 0) -
     if not isinstance(readings, pa.Array | pa.ChunkedArray):
         return _of_numbers(file, column, np.asarray(readings), row)
     texts = pc.utf8_trim_whitespace(readings)
+    if column.stamp == "datetime":
+        texts = pc.replace_substring_regex(texts, r"(:\d\d),(\d)", r"\1.\2")
     try:
         stamps = _at_once(column, texts)
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
@@ -38,6 +61,23 @@ def nanoseconds(file: Path, column: MappedColumn, readings: Any, row: int = 0) -
         return stamps
     read = _by_digits if column.stamp != "datetime" else _by_pattern if column.pattern else _by_iso
     return np.array([read(file, column, text or "", row + k) for k, text in enumerate(texts.to_pylist())], np.int64)
+
+
+def pattern_of(texts: Sequence[str]) -> str:
+    """Return the pattern of `PATTERNS` that fits all texts; of several the one by which they lie closest; or ""."""
+    spans = {}
+    for pattern in PATTERNS:
+        try:
+            times = [_moment(text.strip(), pattern, "UTC") for text in texts]
+        except ValueError:
+            continue
+        spans[pattern] = max(times) - min(times)
+    return min(spans, key=lambda pattern: spans[pattern], default="")
+
+
+def of_day_alone(column: MappedColumn) -> bool:
+    """Return whether a column's texts are times of day, which start again at midnight."""
+    return bool(column.pattern) and not re.search("%[djxcU]", column.pattern)
 
 
 def _refused(file: Path, column: MappedColumn, row: int, reading: Any, expected: str) -> InputError:
@@ -113,11 +153,21 @@ def _by_iso(file: Path, column: MappedColumn, text: str, row: int) -> int:
 
 def _by_pattern(file: Path, column: MappedColumn, text: str, row: int) -> int:
     try:
-        moment = datetime.datetime.strptime(text, column.pattern)
+        return _moment(text, column.pattern, column.zone)
     except ValueError:
         expected = f"a time like {column.pattern}, the pattern at {column.path}"
         raise _refused(file, column, row, text, expected) from None
+
+
+def _moment(text: str, pattern: str, zone: str) -> int:
+    """Return the ns since 1970 of a text; its fraction of a second may have any number of digits, or none."""
+    parts = FRACTION.fullmatch(text)
+    beyond = 0
+    if parts and pattern.count("%f") == 1:
+        text, pattern = parts[1] + parts[3], re.sub(r"[.,:]%f", "", pattern)
+        beyond = int((parts[2] or "").ljust(9, "0")[:9])
+    moment = datetime.datetime.strptime(text, pattern)
     if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=zoneinfo.ZoneInfo(column.zone))
+        moment = moment.replace(tzinfo=zoneinfo.ZoneInfo(zone))
     since = moment - EPOCH
-    return (since.days * 86400 + since.seconds) * NANOSECONDS + since.microseconds * 1000
+    return (since.days * 86400 + since.seconds) * NANOSECONDS + since.microseconds * 1000 + beyond

@@ -22,7 +22,8 @@ from tendonfmu.recordings.converters import units
 from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, MappedColumn, Resampling, read_map
 from tendonfmu.recordings.converters.log import TIME_NAMES, Log, Topic, find_field, open_log
 from tendonfmu.recordings.converters.one_joint import joint_columns
-from tendonfmu.recordings.converters.stamps import nanoseconds
+from tendonfmu.recordings.converters.stamps import DAY, nanoseconds, of_day_alone
+from tendonfmu.recordings.counters import overflow, unwrapped
 from tendonfmu.recordings.recording import LABEL
 
 GAP = 10.0  # median steps; a longer one is a gap unless the map says otherwise
@@ -38,6 +39,7 @@ LARGEST = {
 }
 # Smallest span that is believed to be motion; a smaller one is likely in too large a unit.
 SMALLEST = {"tendon_position": 1e-5, "joint_position": 1e-3}
+FASTEST_TURN = 0.25  # of a counter's turn: a larger step may be one in the other direction
 STEPS = (2e-6, 2.0)  # s; usual time from sample to sample
 
 Columns = dict[str, Numbers]  # of a recording, [N] each, in SI
@@ -60,6 +62,7 @@ class Conversion:
         self.notes: list[str] = []
         self.velocity_cutoff = 0.0
         self._topics: dict[str, Topic] = {}
+        self._readers_used: list[TopicRows] = []
         self._names: dict[str, dict[str, str]] = {}  # by topic and key of the map, the field
         self._is_counted = self.map.columns["time"].rate > 0.0
         for key, column in self.map.columns.items():
@@ -119,6 +122,7 @@ class Conversion:
                 self.notes += notes
                 yield made
         self.notes += ranges.notes()
+        self.notes += (note for reader in self._readers_used for note in reader.notes())
         if not count:
             raise InputError(f"{self.log.file}: no samples; expected at least one row of numbers")
 
@@ -128,6 +132,7 @@ class Conversion:
             keys = ["time", *names] if self._is_counted else names
             columns = {key: self._clocks[topic] if key == "time" else self.map.columns[key] for key in keys}
             readers[topic] = TopicRows(self.log.file, columns, names, self.map.log.leave_out_missing)
+        self._readers_used = list(readers.values())
         return readers
 
     def _rows(self, readers: Mapping[str, TopicRows]) -> Iterator[tuple[str, Rows]]:
@@ -163,7 +168,7 @@ class Conversion:
         for topic, reader in readers.items():
             ordered[topic] = Rows.joined(parts[topic])
             if self.map.log.sort:
-                ordered[topic] = _sorted(self.log.file, ordered[topic], self.notes)
+                ordered[topic] = _sorted(self.log.file, ordered[topic], self._clocks[topic], self.notes)
             else:
                 reader.check_time(ordered[topic])
         start = ordered[self._main].readings["time"][0]
@@ -210,6 +215,9 @@ class TopicRows:
         self._file, self._columns, self._names = file, columns, names
         self._leave_out_missing = leave_out_missing
         self._last: Any = None  # time
+        self._midnight: tuple[int, int] | None = None  # last time of day, and how often it has started again
+        self._turned: dict[str, float] = {}  # last reading of each counter of many turns, without its jumps
+        self._fastest: dict[str, float] = {}  # and its largest step
 
     def _refused(self, key: str, row: int, reading: str, expected: str) -> InputError:
         return InputError(
@@ -235,6 +243,15 @@ class TopicRows:
         if not is_sound.all():
             self.left_out += int(np.count_nonzero(~is_sound))
             rows = rows.only(is_sound)
+        if of_day_alone(self._columns["time"]) and len(rows.numbers):
+            time = rows.readings["time"]
+            before = time[0] if self._midnight is None else self._midnight[0]
+            days = np.cumsum(np.diff(time, prepend=before) < -DAY // 2) + (self._midnight or (0, 0))[1]
+            self._midnight = time[-1], days[-1]
+            rows = Rows({**rows.readings, "time": time + DAY * days}, rows.numbers)
+        if self._columns["time"].wrap and len(rows.numbers):
+            time = rows.readings["time"]
+            rows = Rows({**rows.readings, "time": self._followed("time", time, float(time[0]))}, rows.numbers)
         if len(rows.numbers) and not self.first:
             self.first = {key: values[0] for key, values in rows.readings.items()}
         return rows
@@ -256,6 +273,26 @@ class TopicRows:
             raise self._refused(key, row + at + 1, repr(reading), f"numbers{advice}")
         return values
 
+    def _followed(self, key: str, values: NDArray[Any], start: float) -> Numbers:
+        """Return readings [N] of a counter without its jumps, from block to block."""
+        if not len(values):
+            return values.astype(np.float64)
+        last, wrap = self._turned.get(key), self._columns[key].wrap
+        turned = unwrapped(values, wrap, start if last is None else last)
+        step = float(np.abs(np.diff(turned, prepend=turned[0] if last is None else last)).max())
+        self._fastest[key], self._turned[key] = max(self._fastest.get(key, 0.0), step), float(turned[-1])
+        return turned
+
+    def notes(self) -> Iterator[str]:
+        """Yield a sentence for each counter that may have turned too far between two rows."""
+        for key, step in self._fastest.items():
+            column = self._columns[key]
+            if step > FASTEST_TURN * column.wrap:
+                yield (
+                    f"{self._file}: warning: {column.path}: moves by up to {step:.4g} of the {column.wrap:g} readings "
+                    "of a turn from row to row; turns may be lost"
+                )
+
     def check_time(self, rows: Rows) -> None:
         """Check that time increases, from block to block too. Raise InputError."""
         time = rows.readings["time"]
@@ -264,13 +301,12 @@ class TopicRows:
         late = np.flatnonzero(~(np.diff(time) > 0))
         if late.size:
             k = int(late[0]) + 1
-            what = "the same time" if time[k] == time[k - 1] else "time goes back"
             raise self._refused(
                 "time",
                 rows.numbers[k - (len(time) - len(rows.numbers))],
-                f"{what}, {time[k].item()!r} after {time[k - 1].item()!r}",
-                "increasing times. Divide the log there; or, if rows are only shuffled or repeated, set "
-                '"disorder": "sort" in "log" of the map',
+                f"{'the same time' if time[k] == time[k - 1] else 'time goes back'}, {time[k].item()!r} after "
+                f"{time[k - 1].item()!r}",
+                _advice(overflow(time), self._columns["time"]),
             )
         if len(time):
             self._last = time[-1]
@@ -282,17 +318,38 @@ class TopicRows:
             column = self._columns[key]
             if column.offset is None:
                 column = dataclasses.replace(column, offset=first[key].item())
+            if column.turns and column.wrap and key != "time":
+                # the first reading is taken within half a turn of the zero
+                values = self._followed(key, values, float(column.offset or 0.0))
             columns[key] = column.values(values)
-        is_label = np.isin(columns.get(LABEL, np.empty(0)), (0.0, 1.0))
-        if not is_label.all():
-            k = int(np.argmin(is_label))
-            raise self._refused(LABEL, rows.numbers[k], f"{columns[LABEL][k]:g}", "0 or 1")
+        for key in filter(_is_label, columns):
+            is_label = np.isin(columns[key], (0.0, 1.0))
+            if not is_label.all():
+                k = int(np.argmin(is_label))
+                raise self._refused(key, rows.numbers[k], f"{columns[key][k]:g}", "0 or 1")
         return columns
 
 
-def _sorted(file: Path, rows: Rows, notes: list[str]) -> Rows:
-    """Return rows by time, without those with the time of another."""
+def _is_label(key: str) -> bool:
+    """Return whether a column is the label of a finger, alone or in a hand."""
+    return key == LABEL or key.endswith((f"_{LABEL}", f".{LABEL}", f"-{LABEL}"))
+
+
+def _advice(word: float | None, column: MappedColumn) -> str:
+    """Return what to do about a time that does not increase. word: readings after which it starts again."""
+    if word is not None and not column.stamp:
+        return f'increasing times; the timer overflows: write "wrap": {repr(word).removesuffix(".0")} at {column.path}'
+    return (
+        "increasing times. Divide the log there; or, if rows are only shuffled or repeated, set "
+        '"disorder": "sort" in "log" of the map'
+    )
+
+
+def _sorted(file: Path, rows: Rows, column: MappedColumn, notes: list[str]) -> Rows:
+    """Return rows by time, without those with the time of another. A timer that overflows is refused."""
     time = rows.readings["time"]
+    if (word := overflow(time)) is not None and not column.stamp:
+        raise InputError(f"{file}: column {column.source}: time goes back; expected {_advice(word, column)}")
     order = np.argsort(time, kind="stable")
     moved = int(np.count_nonzero(np.diff(time) < 0))
     again = np.flatnonzero(np.diff(time[order]) == 0) + 1
@@ -327,7 +384,7 @@ def on_one_clock(file: Path, topics: Mapping[str, Columns], main: str, rule: Res
                 continue
             if name == main and rule.rate is None:
                 joined[key] = values[np.isin(clock, time)]
-            elif key == LABEL:  # labels are not interpolated: each sample has the last one before it
+            elif _is_label(key):  # labels are not interpolated: each sample has the last one before it
                 joined[key] = values[np.clip(np.searchsorted(clock, time, side="right") - 1, 0, len(clock) - 1)]
             else:
                 joined[key] = np.interp(time, clock, values)
@@ -410,6 +467,7 @@ class _Ranges:
             doubts.append(("time", f"{self._step:.3g} s from sample to sample"))
         for key, (low, high) in self._ranges.items() if self._map.joint is None else ():
             group = key.split("[")[0]
+            group = next((name for name in LARGEST if group.endswith(name)), group)  # of a finger of a hand
             what = ""
             if max(abs(low), abs(high)) > LARGEST.get(group, np.inf):
                 what = "more than a finger has"

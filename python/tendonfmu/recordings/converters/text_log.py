@@ -9,14 +9,14 @@ names.
 from __future__ import annotations
 
 import codecs
-import csv
 import io
 import math
 import re
 import zlib
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import replace
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,35 +26,31 @@ from pyarrow import csv as arrow_csv
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
-from tendonfmu.recordings.converters.column_map import SEPARATORS, LogFormat
+from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import LONGEST, NUMBER, TEXT, Block, Field, Topic
-from tendonfmu.recordings.converters.units import quantity
+from tendonfmu.recordings.converters.text_layout import (
+    COMMENTS,
+    MISSING,
+    fields_of,
+    find_layout,
+    is_comment,
+    is_missing,
+    number_of,
+    stamp_separator,
+    with_column_of_stamps,
+)
+from tendonfmu.recordings.converters.units import stated
 
 CHUNK = 4 << 20  # bytes of text at once
 HEAD = 1 << 18  # bytes by which the encoding is found
-SAMPLE = 200  # lines by which the layout is found
-COMMENTS = ("#", "%", "//")
-FLAGS = {"true": 1.0, "false": 0.0}
-MISSING = ("", "nan", "na", "n/a", "null", "none", "#n/a", "-nan")  # texts of no number, in lower case
+SAMPLE = 1000  # lines by which the layout is found
+MOST_FAULTY = 0.1  # of the rows of a block: more are another layout
+CLOCK = re.compile(r"(?<![a-z])(time|t|timestamp|x_value|zeit)(?![a-z])")  # in the name of a time
+FOOTER = 20  # lines below the last row that are left out
 
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
-_DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\d{1,2}:\d{2}.*")
 _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
-# --- layout -----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a text log is written."""
-
-    separator: str  # A space stands for any number of them
-    decimal: str  # "." or ","
-    start: int  # number of lines before the first row
-    names: list[str]  # of the columns; "1", "2", ... if the log has none
-    units: list[str]  # of the columns, if the log has a row of them; otherwise empty
-    skip: int  # number of lines before the line of names
-    header: bool  # whether there is a line of names
+# --- encoding and lists -----------------------------------------------------------------------------------------------
 
 
 def _find_encoding(file: Path, begin: bytes, wanted: str | None) -> tuple[str, str]:
@@ -76,132 +72,6 @@ def _find_encoding(file: Path, begin: bytes, wanted: str | None) -> tuple[str, s
     return "utf-8", ""
 
 
-def _find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
-    """Return how a log is written."""
-    given = log.skip or 0
-    content = [(k, line) for k, line in enumerate(lines) if k >= given and line.strip()]
-    if not content:
-        raise InputError(f"{file}: no line after the {given} that the map skips; expected a line of names")
-    plain = [(k, line) for k, line in content if not _is_comment(line)] or content
-    separator = log.separator or _separator([line for _, line in plain], log.decimal)
-    decimal = log.decimal or _decimal([line for _, line in plain], separator)
-    at = _names_at(content, plain, separator, decimal, log)
-    if at is None:
-        start, line = plain[0]
-        count = len(_fields_of(line, separator))
-        return Layout(separator, decimal, start, [str(i) for i in range(1, count + 1)], [], given, False)
-    number, line = content[at]
-    names = _fields_of(_uncommented(line), separator)
-    below = [(k, _fields_of(line, separator)) for k, line in content[at + 1 :] if not _is_comment(line)]
-    units: list[str] = []
-    if below and _is_units(below[0][1], len(names), decimal, log):
-        units = [unit.strip(" []()") for unit in below.pop(0)[1]]
-    return Layout(separator, decimal, below[0][0] if below else len(lines), names, units, number, True)
-
-
-def _fields_of(line: str, separator: str) -> list[str]:
-    if separator == " ":
-        return line.split()
-    fields = line.split(separator) if '"' not in line else next(csv.reader([line], delimiter=separator))
-    return [field.strip() for field in fields]
-
-
-def _is_number(text: str, decimal: str) -> bool:
-    """Return whether a text is a number, a flag, a date, or stands for a missing number."""
-    plain = text.strip()
-    if not _NUMBER.fullmatch(plain):
-        return plain.lower() in FLAGS or plain.lower() in MISSING or bool(_DATE.fullmatch(plain))
-    return "." not in plain if decimal == "," else "," not in plain
-
-
-def _is_float(text: str, decimal: str) -> bool:
-    plain = text.strip().lower()
-    if plain in FLAGS:
-        return True
-    try:
-        float(plain.replace(decimal, "."))
-    except ValueError:
-        return False
-    return "_" not in plain
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith(COMMENTS)
-
-
-def _uncommented(line: str) -> str:
-    stripped = line.strip()
-    mark = next((mark for mark in COMMENTS if stripped.startswith(mark)), "")
-    return stripped.removeprefix(mark).strip() if mark else line
-
-
-def _separator(lines: list[str], decimal: str | None) -> str:
-    """Return the separator by which most lines have the same number of fields, and most of them numbers."""
-    best, best_score = " ", (0.0, 0)
-    for separator in SEPARATORS:
-        if separator == decimal:
-            continue
-        rows = [_fields_of(line, separator) for line in lines]
-        counts = Counter(map(len, rows))
-        width, most = max(counts.items(), key=lambda item: (item[1], item[0]))
-        if width < 2:
-            continue
-        cells = [cell for row in [row for row in rows if len(row) == width][-50:] for cell in row]
-        decimals = (decimal,) if decimal else ((".", ",") if separator != "," else (".",))
-        numbers = max(sum(_is_number(cell, mark) for cell in cells) for mark in decimals) / len(cells)
-        # a space counts only if no other separates: dates and names have spaces too
-        score = (most / len(lines) - (0.5 if separator == " " else 0.0) + numbers, width)
-        if score > best_score:
-            best, best_score = separator, score
-    return best
-
-
-def _decimal(lines: list[str], separator: str) -> str:
-    if separator == ",":
-        return "."
-    cells = [cell for line in lines[-50:] for cell in _fields_of(line, separator)]
-    commas, points = (sum(_is_number(cell, mark) and mark in cell for cell in cells) for mark in ",.")
-    return "," if commas > points else "."
-
-
-def _names_at(
-    content: list[tuple[int, str]], plain: list[tuple[int, str]], separator: str, decimal: str, log: LogFormat
-) -> int | None:
-    """Return the index in `content` of the line of names, or None."""
-    if log.header is False:
-        return None
-    if log.skip is not None:
-        return 0 if log.header or not _is_row(_fields_of(content[0][1], separator), decimal) else None
-    rows = [(k, _fields_of(line, separator)) for k, line in plain]
-    width = Counter(len(row) for _, row in rows[-50:]).most_common(1)[0][0]
-    first = next((k for k, row in rows if len(row) == width and _is_row(row, decimal)), None)
-    # the last line before the first row that has a name for each column; a comment may hold the names
-    before = [line for k, line in content if first is None or k < first]
-    for at, line in reversed(list(enumerate(before))):
-        is_wide = len(_fields_of(_uncommented(line), separator)) == width
-        if is_wide and not _is_units(_fields_of(line, separator), width, decimal, log):
-            return at
-    return 0 if log.header or (before and not _is_comment(content[0][1])) else None
-
-
-def _is_row(fields: list[str], decimal: str) -> bool:
-    """Return whether fields are those of a row: at least one is a number, and no name is beside an empty field."""
-    return any(
-        field.strip() and field.strip().lower() not in MISSING and _is_number(field, decimal) for field in fields
-    )
-
-
-def _is_units(fields: list[str], width: int, decimal: str, log: LogFormat) -> bool:
-    """Return whether fields are a row of units: brackets, names of units, or nothing."""
-    if log.units_row is not None:
-        return log.units_row
-    filled = [field for field in fields if field.strip()]
-    if len(fields) != width or not filled or _is_row(fields, decimal):
-        return False
-    known = [re.fullmatch(r"[\[(].*[\])]|-", field) or quantity(field) for field in filled]
-    return sum(map(bool, known)) * 2 > len(filled)
-
-
 def _length_of_lists(cells: Sequence[str]) -> int:
     """Return how many numbers each cell holds as a list, [1.0, 2.0]; 0 if they are no such lists."""
     if not cells or not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
@@ -216,6 +86,21 @@ def _numbers_of_lists(cells: Sequence[str | None]) -> Any:
         return np.array([cell.strip(" []").split(",") for cell in cells if cell is not None], dtype=np.float64)
     except ValueError:
         return None
+
+
+def _pairs(fields: list[Field]) -> list[Topic]:
+    """Return a topic for each channel if they come as pairs of a time and a value, otherwise one of all fields."""
+    times, values = fields[::2], fields[1::2]
+    are_clocks = all(CLOCK.search(field.name.lower()) for field in times)
+    if len(values) < 2 or len(times) != len(values) or not are_clocks or any(CLOCK.search(f.name) for f in values):
+        return [Topic("", tuple(fields))]
+    topics, names = [], [value.name for value in values]
+    for k, (time, value) in enumerate(zip(times, values, strict=True), start=1):
+        name = value.name if names.count(value.name) == 1 else f"{value.name}[{k}]"
+        unit = (stated(time.name, time.unit) or (time.unit,))[0]
+        fields = [replace(time, name=f"{name}.time", unit=unit), replace(value, name=name)]
+        topics.append(Topic(name, tuple(fields), prefix=f"{name}."))
+    return topics
 
 
 # --- the log ----------------------------------------------------------------------------------------------------------
@@ -238,18 +123,24 @@ class TextLog:
         self.encoding, note = _find_encoding(file, begin[:HEAD], settings.encoding)
         self._hints = [note] if note else []
         head = [line for text in self._texts(begin_only=True) for line in text.split("\n")[:-1]]
-        self.layout = _find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
+        self._stamps = stamp_separator(head)  # between the times of a terminal and its lines
+        if self._stamps:
+            head = [with_column_of_stamps(line, self._stamps) for line in head]
+        self.layout = find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
+        self._is_lenient = settings.leave_out_missing
         lines = [line for line in head[self.layout.start :] if line.strip()]
         self._places: list[tuple[int, int | None]] = []  # of each field: its column, and which number of a list there
-        self.topics = [Topic("", tuple(self._fields(lines[:SAMPLE])))]
+        self.topics = _pairs(list(self._fields(lines[:SAMPLE])))
 
     def _fields(self, lines: list[str]) -> Iterator[Field]:
         """Yield the columns, with their kinds by the first lines; one with lists of numbers has a field for each."""
         layout = self.layout
-        rows = [row for row in (_fields_of(line, layout.separator) for line in lines) if len(row) == len(layout.names)]
+        rows = [row for row in (fields_of(line, layout.separator) for line in lines) if len(row) == layout.width]
         for k, name in enumerate(layout.names):
-            cells = [row[k] for row in rows if row[k].strip().lower() not in MISSING]
-            is_text = cells and not any(_is_float(cell, layout.decimal) for cell in cells)
+            cells = [row[k] for row in rows if not is_missing(row[k])]
+            if not cells and rows and name in ("", "Comment"):
+                continue  # of rows that end in a separator, and of LabVIEW
+            is_text = cells and not any(number_of(cell, layout.decimal, layout.thousands) for cell in cells)
             unit = layout.units[k] if layout.units else ""
             for number in range(_length_of_lists(cells)):
                 self._places.append((k, number))
@@ -314,7 +205,11 @@ class TextLog:
                 yield whole + line_end
             if begin_only and whole.count("\n") > SAMPLE:
                 return
-        if rest.strip() and begin_only:
+        with suppress(UnicodeDecodeError):  # of a character that is cut off
+            rest += decoder.decode(b"", True)  # a line end that may have been the first half of one
+        if rest.endswith("\n"):
+            yield rest
+        elif rest.strip() and begin_only:
             # the only line of a file may be without its end
             yield rest + "\n"
         elif rest.strip():
@@ -335,23 +230,55 @@ class TextLog:
 
     def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
         """Read columns; see `log.Log`."""
-        places = {name: self._places[self.topics[0].place(name)] for name in wanted.get("", ())}
+        fields = [field.name for topic in self.topics for field in topic.fields]
+        places = {
+            name: self._places[self.topics[0].place(name) if len(self.topics) == 1 else fields.index(name)]
+            for names in wanted.values()
+            for name in names
+        }
         row, skip = 0, self.layout.start
-        for text in self._texts():
+        self._odd: dict[str, list[str]] = {}  # rows that are no rows, by what is done about them
+        for text, following in pairwise(chain(self._texts(), [None])):
+            if text is None:
+                break
             if skip:
                 lines = text.split("\n")
                 skip, text = max(0, skip - len(lines) + 1), "\n".join(lines[skip:])
             if any(mark in text for mark in COMMENTS):
-                text = "\n".join(line for line in text.split("\n") if not _is_comment(line))
+                text = "\n".join(line for line in text.split("\n") if not is_comment(line))
             if not text.strip():
                 continue
+            if self._stamps:
+                text = with_column_of_stamps(text, self._stamps)
             block = self._parse_fast(text, places, texts)
             if block is None:
                 lines = [line for line in text.split("\n") if line.strip()]
-                block = self._parse_by_field(lines, places, texts, row)
+                block = self._parse_by_field(lines, places, texts, row, following is None)
             row += len(next(iter(block.values()))) if block else 0
+            yield from self._by_topic(wanted, block)
+        self.notes = [
+            *self._hints,
+            *(f"{self.file}: {counted(len(odd), 'line')} {what}: {odd[0][:60]!r}" for what, odd in self._odd.items()),
+            *(f"{note}; {counted(row, 'row')} {are(row)} kept" for note in self._tail_notes),
+        ]
+
+    def _by_topic(self, wanted: Mapping[str, Sequence[str]], block: Block) -> Iterator[tuple[str, Block]]:
+        if len(self.topics) == 1:
             yield "", block
-        self.notes = [*self._hints, *(f"{note}; {counted(row, 'row')} {are(row)} kept" for note in self._tail_notes)]
+            return
+        for topic in self.topics:
+            if part := {name: block[name] for name in wanted.get(topic.name, ())}:
+                # the shorter of the channels end before the last row
+                clock = part.get(topic.fields[0].name, np.zeros(len(next(iter(part.values())))))
+                is_number = isinstance(clock, np.ndarray)
+                there = np.isfinite(clock) if is_number else np.array([bool(text) for text in clock.to_pylist()])
+                yield (
+                    topic.name,
+                    {
+                        name: values[there] if isinstance(values, np.ndarray) else values.filter(pa.array(there))
+                        for name, values in part.items()
+                    },
+                )
 
     def _parse_fast(
         self, text: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]
@@ -362,7 +289,7 @@ class TextLog:
             separator = "\t"
             text = "\n".join("\t".join(line.split()) for line in text.split("\n"))
         data = text.encode()
-        keys = [str(k) for k in range(len(self.layout.names))]
+        keys = [str(k) for k in range(self.layout.width)]
         types = {
             keys[place]: pa.float64() if number is None and name not in texts else pa.string()
             for name, (place, number) in places.items()
@@ -396,41 +323,71 @@ class TextLog:
         return block
 
     def _parse_by_field(
-        self, lines: list[str], places: Mapping[str, tuple[int, int | None]], texts: Sequence[str], row: int
+        self,
+        lines: list[str],
+        places: Mapping[str, tuple[int, int | None]],
+        texts: Sequence[str],
+        row: int,
+        is_last: bool,
     ) -> Block:
-        """Return the same, and refuse the first invalid field by name."""
-        layout = self.layout
-        columns: dict[str, list[Any]] = {name: [] for name in places}
-        for k, line in enumerate(lines, start=row + 1):
-            fields = _fields_of(line, layout.separator)
-            if len(fields) != len(layout.names):
-                raise InputError(
-                    f"{self.file}: row {k}: {counted(len(fields), 'field')} between {layout.separator!r}; expected "
-                    f"{len(layout.names)}, as in the first line"
-                )
-            for name, (place, number) in places.items():
-                cell = fields[place]
-                if number is not None:
-                    numbers = cell.strip("[]").split(",")
-                    if number >= len(numbers):
-                        raise InputError(
-                            f"{self.file}: column {layout.names[place]}, row {k}: {counted(len(numbers), 'number')}; "
-                            f"expected as many as in the first row"
-                        )
-                    cell = numbers[number]
-                columns[name].append(cell if name in texts else self._number(layout.names[place], k, cell))
+        """Return the same. A row without all its numbers is refused by name, or taken as missing where the map says so.
+
+        Names that are repeated, and lines below the last row, are left out.
+        """
+        parsed = [self._cells(line, places, texts) for line in lines]
+        if is_last:
+            footer = next((k for k, cells in enumerate(reversed(parsed)) if not isinstance(cells, str)), 0)
+            if 0 < footer <= FOOTER and footer < len(lines):
+                self._odd.setdefault("below the last row, left out", []).extend(lines[-footer:])
+                parsed, lines = parsed[:-footer], lines[:-footer]
+        kept: list[list[Any]] = []
+        faulty = 0
+        for line, cells in zip(lines, parsed, strict=True):
+            if not isinstance(cells, str):
+                kept.append(cells)
+                continue
+            if fields_of(line, self.layout.separator)[: len(self.layout.names)] == self.layout.names:
+                self._odd.setdefault("with the names again, left out", []).append(line)
+                continue
+            faulty += 1
+            if not self._is_lenient or faulty > max(MOST_FAULTY * len(lines), 1.0):
+                place, _, problem = cells.partition("\0")
+                where = f"{place}row {row + len(kept) + 1}"
+                raise InputError(f"{self.file}: {where}: {problem}")
+            self._odd.setdefault("without all numbers, taken as missing", []).append(line)
+            kept.append([None if name in texts else math.nan for name in places])
+        columns = zip(*kept, strict=True) if kept else ([] for _ in places)
         return {
             name: pa.array(cells, pa.string()) if name in texts else np.array(cells, dtype=np.float64)
-            for name, cells in columns.items()
+            for name, cells in zip(places, columns, strict=True)
         }
 
-    def _number(self, name: str, row: int, text: str) -> float:
-        plain = text.strip().lower()
-        if plain in FLAGS:
-            return FLAGS[plain]
-        if plain in MISSING:
-            return math.nan
-        # a point in a number with a decimal comma separates thousands; this is refused, not guessed
-        if _is_number(plain, self.layout.decimal) and _is_float(plain, self.layout.decimal):
-            return float(plain.replace(self.layout.decimal, "."))
-        raise InputError(f"{self.file}: column {name}, row {row}: {text!r}; expected a finite number")
+    def _cells(self, line: str, places: Mapping[str, tuple[int, int | None]], texts: Sequence[str]) -> list[Any] | str:
+        """Return the wanted cells of a line, or what is wrong with it: column, NUL and problem."""
+        layout, fields = self.layout, fields_of(line, self.layout.separator)
+        if len(fields) == layout.width + 1 and not fields[-1]:
+            fields.pop()  # some rows end in a separator
+        if len(fields) != layout.width:
+            return (
+                f"\0{counted(len(fields), 'field')} between {layout.separator!r}; expected {layout.width}, as in the "
+                'first line, or "missing": "leave out" in "log" of the map'
+            )
+        cells: list[Any] = []
+        for name, (place, number) in places.items():
+            cell = fields[place]
+            if number is not None:
+                numbers = cell.strip("[]").split(",")
+                if number >= len(numbers):
+                    found = counted(len(numbers), "number")
+                    return f"column {layout.names[place]}, \0{found}; expected as many as in the first row"
+                cell = numbers[number]
+            if name in texts:
+                cells.append(cell)
+                continue
+            value = number_of(cell, layout.decimal, layout.thousands)
+            unit = layout.units[place] if place < len(layout.units) else ""
+            if value is None or (value[1] and value[1] != unit):
+                wanted = f"a number in {unit or 'no unit of its own'}" if value else "a finite number"
+                return f"column {layout.names[place]}, \0{cell!r}; expected {wanted}"
+            cells.append(value[0])
+        return cells

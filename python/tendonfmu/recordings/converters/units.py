@@ -52,8 +52,8 @@ OF_COLUMN = {
 # name in the tables: what loggers and engineers write
 _SPELLINGS = {
     "s": "sec secs second seconds [s]",
-    "ms": "msec millisecond milliseconds",
-    "us": "usec µs μs microseconds",
+    "ms": "msec millis millisecond milliseconds",
+    "us": "usec micros microsecond µs μs microseconds",
     "ns": "nsec nanoseconds",
     "min": "minutes",
     "N": "newton newtons Newton",
@@ -121,6 +121,8 @@ def stated(name: str, unit: str) -> tuple[str, str, str] | None:
     for text in re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", name):
         if known := quantity(text):
             return (*known, f"the name says [{text}]")
+    if (whole := quantity(name.lower())) and whole[1] == "time" and len(name) > 3:
+        return (*whole, f"the name is {name}")
     for text in reversed(re.split(r"[_ /]|(?<=[a-z])\.(?=[a-z])", name)[1:]):
         known = quantity(text)
         # single letters and words such as "in" and "min" mean many things; N and s at the end of a name do not
