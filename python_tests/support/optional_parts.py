@@ -81,7 +81,6 @@ PARTS = {
     "psm data": _file("the surgical arm PSM", DATA / "psm", RECORDINGS),
     "wire data": _file("the manipulator pulled by wires", DATA / "wire", RECORDINGS),
     "so101 data": _file("the servo arm SO-101", DATA / "so101", RECORDINGS),
-    "cases": _file("logs as people have them", DATA.parent / "cases", RECORDINGS),
     "foreign data": _file("recordings of foreign fingers", DATA.parent / "foreign", RECORDINGS),
     "cases": _file("logs of public reports", DATA.parent / "cases", RECORDINGS),
     "browser": _program("pages in a browser", "Debian: chromium", *BROWSERS),

@@ -165,7 +165,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
 
 
 def without_rests(recording: FitRecording, finger: Finger, is_batch: bool) -> FitRecording:
-    """Let nothing learn from samples at rest, but for a filter whose bias does. Where it is constant, begin in motion."""
+    """Let nothing learn from samples at rest, but for a filter whose bias does. If it is constant, begin in motion."""
     is_constant = bias_is_constant(finger.data)
     rests, parts = left_at_rest(finger.data, recording.model.joint_speed), recording.parts
     train, held_out = recording.train & ~rests, recording.held_out & ~rests
