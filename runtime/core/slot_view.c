@@ -34,12 +34,12 @@ static int fill_tendon_lane(const tendonfmu_finger* f, size_t joint, size_t tend
   const size_t slot = joint * f->tendon_lanes + tendon;
   const size_t passed = slot_segment(f, joint, tendon, angle), points = f->shape.most_points[joint];
   const size_t record = d->edge_record[slot] + passed;
-  const double* point = d->edge_angle + d->edge_angle_row[joint] + tendon;
+  const size_t first = d->edge_angle_row[joint] + tendon, lanes = f->tendon_lanes;
   put_side(view->below, lane, d->edge_law + record * LAW_NUMBERS, negative);
   put_side(view->above, lane, d->edge_law + (record + 1) * LAW_NUMBERS, negative);
   put_side(view->other, lane, d->pulley_law + slot * LAW_NUMBERS, negative);
-  view->low[lane] = passed > 0 ? point[(passed - 1) * f->tendon_lanes] : -INFINITY;
-  view->high[lane] = passed < points ? point[passed * f->tendon_lanes] : INFINITY;
+  view->low[lane] = passed > 0 ? d->edge_angle[first + (passed - 1) * lanes] : -INFINITY;
+  view->high[lane] = passed < points ? d->edge_angle[first + passed * lanes] : INFINITY;
   view->begin[lane] = d->edge_segment[2 * record];
   view->inverse_length[lane] = d->edge_segment[2 * record + 1];
   return view->inverse_length[lane] != 0.0;
