@@ -62,7 +62,8 @@ inline std::string every_key() {
 // The same, with sensors that are watched.
 inline std::string watched_sensors() {
   std::string text = every_key();
-  put(text, name, R"("sensor_fault": {"jump_margin": 0.5, "spring_margin": 0.5, "longest_stand": 0.2, "recovery_time": 0.05},)");
+  put(text, name,
+      R"("sensor_fault": {"jump_margin": 0.5, "spring_margin": 0.5, "longest_stand": 0.2, "recovery_time": 0.05},)");
   return text;
 }
 
