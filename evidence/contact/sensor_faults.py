@@ -1,7 +1,7 @@
 """Is a failing sensor reported as a fault, and not as contact; and is no sound sensor reported?
 
-Fingers in MuJoCo as `tendonfmu calibrate` made them, with the keys of `sensor_fault` learned from one of its recordings
-of free motion. Faults are put into the other one, and into recordings with pushes.
+Fingers in MuJoCo as `tendonfmu calibrate` delivers them. Faults are put into recordings with pushes, which it has not
+learned from.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from evidence.cases import run_cases
 from evidence.part import Figures
 from evidence.table import Row
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.detect.sensor_faults import learn_sensors
 from tendonfmu.model.native import run_recording
 from tendonfmu.recordings import read_recording
 
@@ -31,7 +29,6 @@ SLOT, EARLIEST, LATEST, LASTS = 8.0, 1.0, 2.5, 3.0  # s
 JUMP = (2.0, 10.0)  # N
 LEAST_WRONG = 1.0  # N; a reading that is nowhere wrong by more needs no report
 AROUND = 0.5  # s around contact of the sound recording that is not counted, and after a fault that is
-SETTLING = 2.0  # s
 
 
 def arrays_of(folder: Path, number: int, kind: str) -> list[Arrays]:
@@ -41,16 +38,6 @@ def arrays_of(folder: Path, number: int, kind: str) -> list[Arrays]:
     recordings = [read_recording(pushed_fingers.place(folder, number, kind, p)) for p in pushed_fingers.PRETENSIONS]
     names = ("tendon_force", "tendon_position")
     return [{"time": one.time, **{name: one.groups[name] for name in names}} for one in recordings]
-
-
-def learned(data: Mapping[str, Any], recordings: Sequence[Arrays]) -> dict[str, Any]:
-    """The description with the keys of `sensor_fault` as `tune` learns them from these recordings."""
-    parts = []
-    for arrays in recordings:
-        settled = arrays["time"] - arrays["time"][0] >= SETTLING
-        force = np.abs(arrays["tendon_force"]).mean(axis=1)
-        parts.append(FreePart("training", arrays, force, settled, np.gradient(arrays["time"])))
-    return {**data, "sensor_fault": learn_sensors(data, parts).keys}
 
 
 def with_faults(arrays: Arrays, stiffness: Numbers, seed: Sequence[int]) -> tuple[Arrays, list[Row]]:
@@ -103,19 +90,17 @@ def judged(data: Mapping[str, Any], arrays: Arrays, seed: Sequence[int]) -> Iter
 
 
 def finger_case(folder: Path, number: int) -> Row:
-    """Faults put into a finger's recordings, and those that are reported in the sound ones."""
+    """Faults put into a finger's recordings with pushes, and those that are reported in the sound ones."""
     from evidence.contact import calibrated
 
-    tuned = tf.read_finger(calibrated(folder, number) / "finger.json").data
-    data = learned(tuned, arrays_of(folder, number, "more"))
+    data = tf.read_finger(calibrated(folder, number) / "finger.json").data
     faults: list[Row] = []
     begins, hours = 0, 0.0
-    for m, motion in enumerate(("free", "push")):
-        for k, arrays in enumerate(arrays_of(folder, number, motion)):
-            faults += [{"finger": number, "motion": motion} | row for row in judged(data, arrays, [number, m, k])]
-            flags = run_recording(data, arrays)["sensor_fault"].astype(int)
-            begins += int((np.diff(flags, axis=0, prepend=0) > 0).sum())
-            hours += float(arrays["time"][-1] - arrays["time"][0]) / 3600.0
+    for k, arrays in enumerate(arrays_of(folder, number, "push")):
+        faults += [{"finger": number} | row for row in judged(data, arrays, [number, 1, k])]
+        flags = run_recording(data, arrays)["sensor_fault"].astype(int)
+        begins += int((np.diff(flags, axis=0, prepend=0) > 0).sum())
+        hours += float(arrays["time"][-1] - arrays["time"][0]) / 3600.0
     return {"faults": faults, "sound_faults": begins, "hours": hours}
 
 
@@ -125,7 +110,7 @@ def judged_faults(folder: Path, workers: int) -> Figures:
     wrong = [row for row in faults if row["wrong"]]
     return {
         "share": 100.0 * sum(map(_is_right, wrong)) / len(wrong),
-        "lines": table.by(faults, ["finger", "motion"], _cells),
+        "lines": table.by(faults, ["finger"], _cells),
         "sound_faults": sum(row["sound_faults"] for row in rows),
         "sound_hours": sum(row["hours"] for row in rows),
     }
@@ -142,5 +127,5 @@ def _cells(rows: Sequence[Row]) -> list[str]:
     return [str(len(rows)), str(len(wrong)), str(sum(map(_is_right, wrong))), *counts, delay]
 
 
-HEAD = ["finger", "motion", "faults", "wrong by ≥ 1 N", "reported, no contact", "as contact", "at another tendon"]
-fault_table = table.of_cells("sensor_faults.lines", [*HEAD, "as contact without the key", "median delay, ms"], 2)
+HEAD = ["finger", "faults", "wrong by ≥ 1 N", "reported, no contact", "as contact", "at another tendon"]
+fault_table = table.of_cells("sensor_faults.lines", [*HEAD, "as contact without the key", "median delay, ms"], 1)

@@ -157,7 +157,7 @@ TEST(TakeParameters, OfAnotherFingerAreRefused) {
   EXPECT_EQ(finger.saved(), before);
 }
 
-// As docs/guide/in_your_loop.md has it: one spare finger goes to and fro between two threads.
+// As docs/guide/in_your_loop.md has it: two threads exchange one spare finger.
 TEST(TakeParameters, ThatAnotherThreadPreparesArriveWhole) {
   const Motion motion(2000);
   const Finger finger(image_of(test_finger::extended)), spare(image_of(test_finger::extended));
