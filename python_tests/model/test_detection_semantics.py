@@ -220,6 +220,20 @@ def test_the_first_motion_begins_anew(runner: Runner) -> None:
     assert contact_of(again)[801:830].count(1) > 25 and not any(contact_of(again)[:800])
 
 
+@pytest.mark.parametrize(("way", "found"), [(0.08, False), (0.2, True)])
+def test_far_from_the_start_friction_is_known(runner: Runner, way: float, found: bool) -> None:
+    """0.02 of 0.1 N·m have turned over: W hides a push of 0.015 N·m, unless the joint has moved 0.1 rad."""
+    joint = {"name": "j", "friction": {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 1}}
+    memory = {"effect": "presliding", "joint": 1, "displacement": 5.0 * way}
+    time = np.arange(1000) * 0.01
+    angle = way * np.clip(time - 1.0, 0.0, 1.0)
+    force = 10.0 + (0.1 * angle / (5.0 * way) + 0.015 * (time > 8.0)) / ARM
+    samples = at_times(time, force, np.gradient(angle, time), angle)
+    out = runner(finger([FREE], [joint], contact=bands([0.01] * 4), extensions=[memory]), samples, 3)
+    assert contact_of(out)[801:830].count(1) > 20 if found else not any(contact_of(out))
+    assert not any(contact_of(out)[:800])
+
+
 def test_what_returns_to_the_old_level_is_no_contact(runner: Runner) -> None:
     """Up over a second, which is slow for the band of 20 ms, and down at once: no contact. On at once: contact."""
     ramp = np.linspace(0.0, 0.05, 100)

@@ -103,6 +103,15 @@ def test_a_force_that_stands_while_its_spring_is_stretched(runner: Runner) -> No
     assert not out["contact"].any()
 
 
+def test_a_force_may_not_stand_for_longer_than_it_ever_does(runner: Runner) -> None:
+    """At rest from sample 4 on, where its spring says the same: later than half a second is the fifth sample after."""
+    still = {name: np.concatenate([each[:5], np.repeat(each[4:5], 9, axis=0)]) for name, each in moving(14).items()}
+    still["time"] = np.arange(14) * DT
+    assert not any(faults(runner(pair(), still, 1)))
+    out = runner(pair({"longest_stand": 0.5}), still, 1)
+    assert faults(out) == [0] * 9 + [1] * 5 and not out["contact"].any()
+
+
 def test_a_position_that_stands_while_the_joint_turns(runner: Runner) -> None:
     """From sample 4 on: 0.3 N of stretch and 0.1 N of turning a sample are missing, 0.5 + 0.01 + share allowed."""
     recording = moving(14)
