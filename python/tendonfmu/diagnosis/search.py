@@ -36,6 +36,7 @@ from tendonfmu.tasks import Phases, Step
 
 MOST_CAUSES = 8
 LARGE = 0.1  # of the rms: the memory was fitted to what lacked such a cause
+LEAST_KEPT = 0.5  # of the torque's power: sensors that are a little off leave more of it
 MOST_FITTED = 3  # effects that columns cannot distinguish
 NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
 
@@ -119,7 +120,10 @@ class ExtensionSearch(CauseSearch):
         model = refitted(model, base.samples, base.settings, rough=True)
         if not base.least.shows_all(cause.effect, cause.terms, model.data):
             return Trial(cause, None, np.array([np.inf]))
-        return Trial(cause, model, base.look(model, ()).selection.base / self._kept_torque(model))
+        kept = self._kept_torque(model)
+        if kept < LEAST_KEPT:
+            return Trial(cause, None, np.array([np.inf]))
+        return Trial(cause, model, base.look(model, ()).selection.base / kept)
 
     def _kept_torque(self, model: FittedModel) -> float:
         """Return which part of the torque's power corrections of sensors leave: less of it lowers any error."""
@@ -136,9 +140,11 @@ class ExtensionSearch(CauseSearch):
             return False
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
-        self.model = model = self._settled(refitted(model, self.base.samples, self.base.settings), gain)
+        refined = refitted(model, self.base.samples, self.base.settings)
+        # the longer fit may shrink the torque, too
+        self.model = self._settled(refined if self._kept_torque(refined) >= LEAST_KEPT else model, gain)
         self.view = self.view.lean  # frees memory for the next one
-        self.view = self.base.look(model)
+        self.view = self.base.look(self.model)
         return True
 
     def _settled(self, model: FittedModel, gain: float) -> FittedModel:
@@ -148,7 +154,7 @@ class ExtensionSearch(CauseSearch):
             return model
         described = finger_from_data(model.data, base.settings.path)
         other, memory = remembering(described, base.nominal, base.samples, base.settings)
-        if other.cost >= model.cost:
+        if other.cost >= model.cost or self._kept_torque(other) < LEAST_KEPT:
             return model
         self.causes = [cause for cause in self.causes if cause.effect not in MEMORY]
         self.causes += [_of_start(terms) for terms in memory]
