@@ -240,5 +240,23 @@ def test_a_fit_is_taken_where_the_error_falls_beyond_chance(
     rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)), lean=None)  # type: ignore[assignment]
     rounds.base = SimpleNamespace(samples=None, settings=None, look=lambda model: rounds.view)  # type: ignore[assignment]
     monkeypatch.setattr(search_module, "refitted", lambda model, samples, settings: model)
+    monkeypatch.setattr(rounds, "_kept_torque", lambda model: 1.0, raising=False)
     assert rounds._take(Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
     assert len(rounds.causes) == int(taken)
+
+
+@pytest.mark.parametrize(("kept", "longer"), [(0.9, True), (1e-12, False)])
+def test_a_longer_fit_that_takes_the_torque_away_is_not_kept(
+    kept: float, longer: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rounds, before, rough, fine = (
+        ExtensionSearch.__new__(ExtensionSearch),
+        *(FittedModel({}, {}, {}, k) for k in range(3)),
+    )
+    rounds.causes, rounds.model, rounds._least_gain = [], before, 0.03
+    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)), lean=None)  # type: ignore[assignment]
+    rounds.base = SimpleNamespace(samples=None, settings=None, look=lambda model: rounds.view)  # type: ignore[assignment]
+    monkeypatch.setattr(search_module, "refitted", lambda model, samples, settings: fine)
+    monkeypatch.setattr(rounds, "_kept_torque", lambda model: kept if model is fine else 1.0, raising=False)
+    assert rounds._take(Trial(named("calibration", Place(1), 1e-9), rough, np.full(20, 0.5)))
+    assert rounds.model is (fine if longer else rough)
