@@ -16,7 +16,8 @@ from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.hypotheses import hypotheses
-from tendonfmu.diagnosis.search import Trial, beside_calibration, corrected_arms
+from tendonfmu.diagnosis.samples import as_described, corrected_arms
+from tendonfmu.diagnosis.search import Trial, beside_calibration
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.view import View
 
@@ -87,6 +88,21 @@ def test_corrections_of_forces_and_arms_together_may_take_the_torque_away() -> N
     of_arms = [{"effect": "moment_arm", "joint": 1, "tendon": i, "correction": -0.7 * ARM} for i in TENDONS]
     assert corrected_arms({**FINGER, "extensions": of_forces}) == pytest.approx(np.array([[0.7 * ARM, 0.0]] * 4))
     assert corrected_arms({**FINGER, "extensions": of_forces + of_arms}) == pytest.approx(np.zeros((4, 2)))
+
+
+def test_what_is_left_is_told_at_the_described_arms() -> None:
+    """Forces off by 0.1 N are as wrong at half the torque, and so are columns."""
+    data = {"tendons": [{"moment_arms": arms} for arms in ([ARM, 0.0], [-ARM, ARM], [0.0, -ARM])]}
+    force = np.random.default_rng(1).normal(0.0, 0.1, (5, 3))
+    halved = {**data, "extensions": [{"effect": "force_gain", "tendon": i, "correction": -0.5} for i in (1, 2, 3)]}
+    assert as_described(force @ corrected_arms(data), data) == pytest.approx(force @ corrected_arms(data))
+    left = force @ corrected_arms(halved)
+    assert as_described(left, halved) == pytest.approx(2.0 * left)
+    columns = np.stack([left, 3.0 * left], axis=2)
+    assert as_described(columns, halved) == pytest.approx(2.0 * columns)
+    one = {**data, "extensions": [{"effect": "moment_arm", "joint": 1, "tendon": 1, "correction": 0.5 * ARM}]}
+    spread = np.linalg.pinv(corrected_arms(one))
+    assert as_described(left, one) == pytest.approx(left @ spread @ corrected_arms(data))
 
 
 def test_a_sound_bench_has_none_and_a_refused_one_is_not_tried_again() -> None:

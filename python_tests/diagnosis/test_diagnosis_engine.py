@@ -24,10 +24,9 @@ from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel
 from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
-from tendonfmu.diagnosis.samples import Samples, predicted_forces
+from tendonfmu.diagnosis.samples import Samples, as_described, corrected_arms, predicted_forces
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
 from tendonfmu.model.description import Finger
-from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
@@ -89,18 +88,36 @@ def sound() -> FitRecording:
 # --- forces as the model predicts them --------------------------------------------------------------------------------
 
 
-def test_predicted_forces_lack_exactly_the_unexplained_torque(hidden: FitRecording) -> None:
-    predicted, samples = predicted_forces(finger(), [hidden])[0], Samples.of(finger(), [hidden])
-    arms = moment_arms(finger())
+def shrunk(share: float) -> dict[str, Any]:
+    """The finger with so much of its torque, and of its friction."""
+    data = finger()
+    data["extensions"] = [{"effect": "force_gain", "tendon": i, "correction": share - 1.0} for i in range(1, 5)]
+    edges = [law for tendon in data["tendons"] for law in tendon["edge_friction"] if law]
+    for law in [*edges, *(joint["friction"] for joint in data["joints"])]:
+        law.update({key: value if key == "stribeck_velocity" else share * value for key, value in law.items()})
+    return data
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_predicted_forces_lack_exactly_the_unexplained_torque(share: float, hidden: FitRecording) -> None:
+    data = shrunk(share)
+    predicted, samples = predicted_forces(data, [hidden])[0], Samples.of(data, [hidden])
+    arms = corrected_arms(data)
     taken = (hidden.recording.groups["tendon_force"] - predicted.recording.groups["tendon_force"]) @ arms
-    blocks, left = samples.grid.means([taken])[samples.used], samples.drift.without(samples.left(finger()))
+    blocks, left = samples.grid.means([taken])[samples.used], samples.drift.without(samples.left(data))
     assert np.abs(blocks - blocks.mean(axis=0) - left).max() < 0.05 * left.std()
     stretch = (hidden.recording.groups["tendon_position"] - predicted.recording.groups["tendon_position"]) * STIFFNESS
     force = hidden.recording.groups["tendon_force"] - predicted.recording.groups["tendon_force"]
     assert np.allclose(stretch, force, atol=1e-9), "angles stay as they were measured"
     # with them a model leaves as much as with the measured ones
-    at = samples.at_predicted_forces(finger())
-    assert (at.drift.without(at.left(finger())) - left).std() < 0.2 * left.std()
+    at = samples.at_predicted_forces(data)
+    assert (at.drift.without(at.left(data)) - left).std() < 0.2 * left.std()
+
+
+def test_less_torque_leaves_no_less(hidden: FitRecording) -> None:
+    samples = Samples.of(finger(), [hidden])
+    whole, half = (as_described(samples.residual(shrunk(share)), shrunk(share)) for share in (1.0, 0.5))
+    assert half == pytest.approx(whole, abs=1e-9)
 
 
 @pytest.mark.parametrize("delay", [0.02, -0.015])
@@ -240,23 +257,5 @@ def test_a_fit_is_taken_where_the_error_falls_beyond_chance(
     rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)), lean=None)  # type: ignore[assignment]
     rounds.base = SimpleNamespace(samples=None, settings=None, look=lambda model: rounds.view)  # type: ignore[assignment]
     monkeypatch.setattr(search_module, "refitted", lambda model, samples, settings: model)
-    monkeypatch.setattr(rounds, "_kept_torque", lambda model: 1.0, raising=False)
     assert rounds._take(Trial(named("gravity", Place(1), 1e-9), model, error)) is taken
     assert len(rounds.causes) == int(taken)
-
-
-@pytest.mark.parametrize(("kept", "longer"), [(0.9, True), (1e-12, False)])
-def test_a_longer_fit_that_takes_the_torque_away_is_not_kept(
-    kept: float, longer: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rounds, before, rough, fine = (
-        ExtensionSearch.__new__(ExtensionSearch),
-        *(FittedModel({}, {}, {}, k) for k in range(3)),
-    )
-    rounds.causes, rounds.model, rounds._least_gain = [], before, 0.03
-    rounds.view = SimpleNamespace(selection=SimpleNamespace(base=np.ones(20)), lean=None)  # type: ignore[assignment]
-    rounds.base = SimpleNamespace(samples=None, settings=None, look=lambda model: rounds.view)  # type: ignore[assignment]
-    monkeypatch.setattr(search_module, "refitted", lambda model, samples, settings: fine)
-    monkeypatch.setattr(rounds, "_kept_torque", lambda model: kept if model is fine else 1.0, raising=False)
-    assert rounds._take(Trial(named("calibration", Place(1), 1e-9), rough, np.full(20, 0.5)))
-    assert rounds.model is (fine if longer else rough)

@@ -48,7 +48,11 @@ class Base:
 
     def look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
         """Return what a model that was fitted to the samples lacks."""
-        return look(model.data, self.samples, self.least, candidates, model)
+        return look(model.data, self.samples, self.least, candidates, model).as_described
+
+    def left_unseen(self, model: FittedModel) -> Numbers:
+        """Return Σ e² of a model on unseen stretches, (N·m)² [K]."""
+        return self.look(model, ()).selection.base
 
     def without(self, out: Flags) -> Base:
         """Return the base fitted without some blocks [B]."""

@@ -24,7 +24,7 @@ from tendonfmu.diagnosis.pictures import Compared
 from tendonfmu.diagnosis.remainder import measure_remainder, unexplained_of
 from tendonfmu.diagnosis.remainder_map import remainder_map
 from tendonfmu.diagnosis.result import Diagnosis, Event, Invisible, Unexplained
-from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.samples import Samples, as_described
 from tendonfmu.diagnosis.search import Search, search
 from tendonfmu.diagnosis.selection import invisible_effects
 from tendonfmu.diagnosis.sizes import size_of
@@ -115,7 +115,7 @@ class _Result:
 
     def _left(self, data: Mapping[str, Any]) -> Numbers:
         """Return the residual of a model over all recordings that were estimated from, bias removed, N·m [B, n]."""
-        return self._searched.base.samples.residual(data)
+        return as_described(self._searched.base.samples.residual(data), data)
 
     def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
         cause, before = verified.causes[k], self._left(verified.without[k].data)

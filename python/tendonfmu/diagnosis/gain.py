@@ -15,7 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.result import ModelErrors
-from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.samples import Samples, as_described
 from tendonfmu.errors import InputError
 from tendonfmu.model import without_friction
 from tendonfmu.recordings import FitRecording, rms
@@ -95,7 +95,7 @@ class _Judged:
         """Return what a description leaves [B, n], N·m."""
         key = json.dumps(data)
         if key not in self._left:
-            self._left[key] = self._samples.residual(data)
+            self._left[key] = as_described(self._samples.residual(data), data)
         return self._left[key]
 
     def rms(self, data: Data) -> tuple[float, ...]:

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.diagnosis.series import Series, exact_model, make_series
 from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
-from tendonfmu.model import moment_arms
+from tendonfmu.model import extension_rows, moment_arms
 from tendonfmu.recordings import FitRecording, Grid
 from tendonfmu.statistics import Splines
 
@@ -91,7 +91,7 @@ class Samples:
 
     def at_predicted_forces(self, data: Data) -> Samples:
         """Return the samples with the forces that a description predicts."""
-        predicted, arms = predicted_forces(data, self.recordings), moment_arms(data)
+        predicted, arms = predicted_forces(data, self.recordings), corrected_arms(data)
         both = zip(self.recordings, predicted, strict=True)
         forces = [one.recording.groups["tendon_force"] - other.recording.groups["tendon_force"] for one, other in both]
         samples = self.of_recordings(data, predicted)
@@ -99,13 +99,40 @@ class Samples:
         return samples
 
 
+# --- sensors that a description corrects ---------------------------------------------------------------------------
+
+
+def corrected_arms(data: Data) -> Numbers:
+    """Return the moment arms with the corrections of a description's forces and arms, [m, n] (m)."""
+    arms = moment_arms(data)
+    corrected: Numbers = arms.copy()
+    for row in extension_rows(data):
+        tendon = slice(None) if row.get("tendon") is None else row["tendon"] - 1
+        if row["effect"] == "force_gain":
+            corrected[tendon] += row["correction"] * arms[tendon]
+        elif row["effect"] == "moment_arm":
+            corrected[tendon, row["joint"] - 1] += row["correction"]
+    return corrected
+
+
+def as_described(torque: Array, data: Data) -> Array:
+    """Return a torque that is left [B, n], or columns of it [B, n, c], at the moment arms without corrections.
+
+    Corrections that shrink the torque shrink what any model leaves. The forces that are off by it stay the same.
+    """
+    arms, corrected = moment_arms(data), corrected_arms(data)
+    if (corrected == arms).all():
+        return torque
+    turn = (np.linalg.pinv(corrected) @ arms).astype(torque.dtype)
+    return np.asarray(torque @ turn if torque.ndim == 2 else turn.T @ torque)
+
+
 # --- forces that a model predicts ------------------------------------------------------------------------------------
 
 
 def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> list[FitRecording]:
     """Return the recordings with predicted forces, and with tendon positions that keep the joint angles as measured."""
-    arms = moment_arms(data)
-    spread = np.linalg.pinv(arms)
+    spread = np.linalg.pinv(corrected_arms(data))
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     moved = []

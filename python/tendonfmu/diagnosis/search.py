@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
@@ -31,12 +31,11 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.view import View
-from tendonfmu.model import extension_rows, finger_from_data, moment_arms
+from tendonfmu.model import finger_from_data
 from tendonfmu.tasks import Phases, Step
 
 MOST_CAUSES = 8
 LARGE = 0.1  # of the rms: the memory was fitted to what lacked such a cause
-LEAST_KEPT = 0.5  # of the torque's power: sensors that are a little off leave more of it
 MOST_FITTED = 3  # effects that columns cannot distinguish
 NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
 
@@ -120,17 +119,7 @@ class ExtensionSearch(CauseSearch):
         model = refitted(model, base.samples, base.settings, rough=True)
         if not base.least.shows_all(cause.effect, cause.terms, model.data):
             return Trial(cause, None, np.array([np.inf]))
-        kept = self._kept_torque(model)
-        if kept < LEAST_KEPT:
-            return Trial(cause, None, np.array([np.inf]))
-        return Trial(cause, model, base.look(model, ()).selection.base / kept)
-
-    def _kept_torque(self, model: FittedModel) -> float:
-        """Return which part of the torque's power corrections of sensors leave: less of it lowers any error."""
-        samples = self.base.samples
-        force = samples.drift.without(samples.grid.forces(samples.recordings))
-        now, before = (float(np.sum((force @ corrected_arms(each.data)) ** 2)) for each in (model, self.model))
-        return float(np.clip(now / before, 1e-12, 1.0)) if before > 0.0 else 1.0
+        return Trial(cause, model, base.left_unseen(model))
 
     def _take(self, trial: Trial) -> bool:
         """Keep a further cause if it lowers the error on unseen stretches materially and certainly."""
@@ -140,9 +129,7 @@ class ExtensionSearch(CauseSearch):
             return False
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
-        refined = refitted(model, self.base.samples, self.base.settings)
-        # the longer fit may shrink the torque, too
-        self.model = self._settled(refined if self._kept_torque(refined) >= LEAST_KEPT else model, gain)
+        self.model = self._settled(refitted(model, self.base.samples, self.base.settings), gain)
         self.view = self.view.lean  # frees memory for the next one
         self.view = self.base.look(self.model)
         return True
@@ -154,7 +141,7 @@ class ExtensionSearch(CauseSearch):
             return model
         described = finger_from_data(model.data, base.settings.path)
         other, memory = remembering(described, base.nominal, base.samples, base.settings)
-        if other.cost >= model.cost or self._kept_torque(other) < LEAST_KEPT:
+        if base.left_unseen(other).sum() >= base.left_unseen(model).sum():
             return model
         self.causes = [cause for cause in self.causes if cause.effect not in MEMORY]
         self.causes += [_of_start(terms) for terms in memory]
@@ -170,19 +157,6 @@ class ExtensionSearch(CauseSearch):
                 named = self._named(cause, selection)
                 small += [named] if named.p_value < SIGNIFICANCE else []
         return small
-
-
-def corrected_arms(data: Data) -> Numbers:
-    """Return the moment arms with the corrections of a description's forces and arms, [m, n] (m)."""
-    arms = moment_arms(data)
-    corrected: Numbers = arms.copy()
-    for row in extension_rows(data):
-        tendon = slice(None) if row.get("tendon") is None else row["tendon"] - 1
-        if row["effect"] == "force_gain":
-            corrected[tendon] += row["correction"] * arms[tendon]
-        elif row["effect"] == "moment_arm":
-            corrected[tendon, row["joint"] - 1] += row["correction"]
-    return corrected
 
 
 def beside_calibration(trial: Trial, together: Cause | None) -> Trial:

@@ -17,7 +17,7 @@ from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
 from tendonfmu.diagnosis.extension_fit import FittedModel, number_columns
 from tendonfmu.diagnosis.hypotheses import hypotheses
 from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.samples import Samples, as_described
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.series import Series
 from tendonfmu.model import moment_arms
@@ -40,6 +40,13 @@ class View:
     @cached_property
     def folds(self) -> Folds:
         return make_folds(self.series)
+
+    @property
+    def as_described(self) -> View:
+        """The view with all torque at the moment arms without corrections, so that views can be compared."""
+        series = replace(self.series, target=as_described(self.series.target, self.data))
+        columns = replace(self.columns, values=as_described(self.columns.values, self.data))
+        return replace(self, series=series, nominal=as_described(self.nominal, self.data), columns=columns)
 
     @property
     def lean(self) -> View:
