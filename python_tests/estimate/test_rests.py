@@ -18,6 +18,7 @@ from command import Call
 from map_cases import TURNING, edited
 from optional_parts import DATA, needs
 from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.interface.diagnosing import diagnose
 from tendonfmu.recordings import convert_table, describe_joint, joint_description
 from tendonfmu.recordings.prepared import left_at_rest
 
@@ -123,6 +124,15 @@ def test_a_finger_with_tendons_and_a_learning_bias(bias: dict[str, Any], share: 
     }
     found = numbers(FrictionFit(finger, kinematics=3, threads=1).fit(table))
     assert (found["coulomb"], found["viscous"]) == pytest.approx((servo.COULOMB, servo.VISCOUS), rel=0.05)
+
+
+def test_diagnose_learns_nothing_from_a_motor_that_holds(tmp_path: Path) -> None:
+    """Kept, rests look like friction that builds up gradually and then decays."""
+    log, columns = written(tmp_path, servo.servo_log(17, duration=40.0))
+    converted = convert_table(log, columns)
+    result = diagnose(describe_joint(converted), pd.DataFrame(converted.columns), kinematics=3)
+    assert result.causes == () and result.verdict == "adequate"
+    assert result.found.nominal.test_rms[0] == pytest.approx(0.02, rel=0.2)
 
 
 def test_check_and_fit_name_the_share_at_rest(call: Call, tmp_path: Path) -> None:

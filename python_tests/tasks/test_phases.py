@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tendonfmu.cli.console import PRINTED, PhaseDisplay
+from tendonfmu.cli.console import PRINTED, Bar
 from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}
@@ -62,29 +62,43 @@ def test_a_phase_may_be_skipped_and_fail(clock: Clock) -> None:
 # --- shown ------------------------------------------------------------------------------------------------------------
 
 
-def walk(display: PhaseDisplay, clock: Clock) -> None:
-    phases = Phases(SHARES, display, clock)
-    with display:
+def walk(bar: Bar, clock: Clock) -> None:
+    phases = Phases(SHARES, bar.phase, clock)
+    with bar:
         with phases.start("reading"):
             clock.now += 2.0
         with phases.start("fitting", total=60) as step:
             for done in range(1, 61):
                 clock.now += 0.5
                 step(done)
-        display.note("writing the files")
+        bar("writing the files")
 
 
-@pytest.mark.parametrize(("wanted", "shown"), [(None, False), (False, False), (True, True)])
+FIRST = ["phase 1 of 3: reading", "phase 2 of 3: fitting"]
+LATER = [f"phase 2 of 3: fitting, {done} of 60, about {left} s left" for done, left in ((16, 30), (36, 25), (56, 15))]
+EACH = [f"phase 2 of 3: fitting, {done} of 60, about {left} s left" for done, left in ((20, 30), (40, 20), (60, 15))]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "lines"),
+    [(None, LATER), (False, []), (True, [*FIRST, *EACH, "writing the files"])],
+    ids=["by default", "never", "each"],
+)
 def test_lines_where_there_is_no_terminal(
-    capfd: pytest.CaptureFixture[str], clock: Clock, wanted: bool | None, shown: bool
+    capfd: pytest.CaptureFixture[str], clock: Clock, wanted: bool | None, lines: list[str]
 ) -> None:
-    walk(PhaseDisplay(wanted), clock)
+    walk(Bar(wanted, clock), clock)
     out, err = capfd.readouterr()
-    assert out == ""
-    if not shown:
-        assert err == ""
-        return
-    lines = err.splitlines()
-    assert lines[0] == "phase 1 of 3: reading" and lines[1] == "phase 2 of 3: fitting"
-    assert lines[2] == "phase 2 of 3: fitting, 20 of 60, about 30 s left"
-    assert lines[-1] == "writing the files" and len(lines) == 6
+    assert (out, err.splitlines()) == ("", lines)
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_long_loop_says_how_far_it_is(capfd: pytest.CaptureFixture[str], clock: Clock, quiet: bool) -> None:
+    PRINTED.quiet = quiet
+    with Bar(None, clock) as bar:
+        for done in range(1, 13):
+            clock.now += 5.0
+            bar("recordings", done, 12)
+    expected = [f"recordings, {done} of 12, about {5 * (12 - done)} s left" for done in range(2, 12, 2)]
+    expected += ["recordings, 12 of 12"]
+    assert capfd.readouterr().err.splitlines() == ([] if quiet else expected)

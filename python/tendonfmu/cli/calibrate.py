@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeAtPretensions, Progress, command
-from tendonfmu.cli.console import INTERRUPTED, PhaseDisplay, fail, print_json, print_results, say, say_files
+from tendonfmu.cli.console import INTERRUPTED, Bar, fail, print_json, print_results, say, say_files
 from tendonfmu.cli.hand import show_outcome
 from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions
@@ -73,7 +73,7 @@ def calibrate(
         raise InputError("--scheduler: given with a finger; expected a hand, whose fingers it computes")
     check_folder(output, [finger, *recordings, *tests, *labelled, *([] if previous is None else [previous])])
     try:
-        with PhaseDisplay(progress) as display:
+        with Bar(progress) as bar:
             calibration = run(
                 finger,
                 recordings,
@@ -82,9 +82,9 @@ def calibrate(
                 pushes=labelled,
                 previous=previous,
                 options=options,
-                progress=display,
+                progress=bar.phase,
             )
-            display.note("writing the files")
+            bar("writing the files")
             written = write_calibration(calibration, output)
     except KeyboardInterrupt as stopped:
         if not stopped.args:  # while nothing was computed yet

@@ -19,15 +19,17 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
+from time import perf_counter
 from typing import IO, TYPE_CHECKING, Any, Literal, NoReturn
 
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from rich.progress import Progress
 
+    from tendonfmu.estimate import FitProgress
     from tendonfmu.tasks import PhaseState
 
 # exit status of every command; 0 is done, 129 and 143 are ended by SIGHUP and SIGTERM
@@ -208,132 +210,78 @@ def name_of(output: Path) -> str:
 # --- progress ---------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _bar(wanted: bool | None) -> Iterator[Progress]:
-    """Show a bar on standard error; by default (None) on a terminal only."""
-    from rich.console import Console
-    from rich.progress import TimeRemainingColumn
+class Bar:
+    """What is being done, on standard error: a bar on a terminal, elsewhere a line every 10 s.
 
-    wanted = False if PRINTED.quiet else wanted
-    console = Console(stderr=True, force_terminal=wanted or None)
-    with _progress(console, console.is_terminal if wanted is None else wanted, TimeRemainingColumn()) as bar:
-        yield bar
+    wanted: True says each new step at once, too; False says nothing.
+    """
 
+    EVERY = 10.0  # s
+    PATIENCE = 3.0  # s; the remaining time is not estimated before
 
-def _progress(console: Any, shown: bool, left: Any) -> Progress:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
-    return Progress(*columns, console=console, disable=not shown, transient=True)
-
-
-@contextmanager
-def progress_bar(words: str, wanted: bool | None, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """Give a callback that shows the number of steps done, and of all steps where `total` is not known before."""
-    with _bar(wanted) as bar:
-        task = bar.add_task(words, total=total)
-
-        def show(done: int, total: int | None = None) -> None:
-            bar.update(task, completed=done, total=total)
-
-        yield show
-
-
-@contextmanager
-def phase_bar(wanted: bool | None) -> Iterator[Callable[[str, int, int | None], None]]:
-    """Give a callback that shows a computation of several phases: phase in words, steps done, total or None."""
-    with _bar(wanted) as bar:
-        task, now = bar.add_task("reading", total=None), ""
-
-        def show(phase: str, done: int, total: int | None) -> None:
-            nonlocal now, task
-            if phase != now:  # rich cannot unset the total of a task, so each phase gets a new one
-                bar.remove_task(task)
-                task, now = bar.add_task(phase, total=total), phase
-            bar.update(task, completed=done, total=total)
-
-        yield show
-
-
-@contextmanager
-def fit_bar(wanted: bool | None) -> Iterator[Callable[[Any], None]]:
-    """Give a callback that shows the phase, cost and samples per second of a fit."""
-    with _bar(wanted) as bar:
-        task, phase = bar.add_task("reading", total=None), ""
-
-        def show(state: Any) -> None:
-            nonlocal phase
-            if state.phase != phase:
-                bar.reset(task, total=state.total)
-                phase = state.phase
-            speed = bar.tasks[0].speed
-            rate = f", {speed:,.0f} samples/s" if speed else ""
-            cost = f", cost {state.cost:.6g}" if state.cost == state.cost else ""
-            bar.update(task, completed=state.done, total=state.total, description=f"{phase}{cost}{rate}")
-
-        yield show
-
-
-class PhaseDisplay:
-    """Progress of a computation of several phases, on standard error; call it with a `tendonfmu.tasks.PhaseState`."""
-
-    EVERY = 10.0  # s between two lines where standard error is no terminal
-
-    def __init__(self, wanted: bool | None = None) -> None:
+    def __init__(self, wanted: bool | None = None, clock: Callable[[], float] = perf_counter) -> None:
         from rich.console import Console
-        from rich.progress import TextColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-        wanted = False if PRINTED.quiet else wanted
         console = Console(stderr=True)
-        self._on_terminal = console.is_terminal
-        self._shown = console.is_terminal if wanted is None else wanted
-        self._bar = _progress(console, self._shown and self._on_terminal, TextColumn("{task.fields[left]}"))
+        self._lines = not PRINTED.quiet and wanted is not False and not console.is_terminal
+        self._at_once, self._clock = wanted is True, clock
+        is_bar = not PRINTED.quiet and wanted is not False and console.is_terminal
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[left]}"),
+        )
+        self._bar = Progress(*columns, console=console, disable=not is_bar, transient=True)
         self._task: Any = None
-        self._phase: tuple[int, int] | None = None
-        self._said = 0.0  # s, time of the last printed line
+        self._words = ""
+        self._begun = self._said = clock()
 
-    def __enter__(self) -> PhaseDisplay:
+    def __enter__(self) -> Bar:
         self._bar.start()
         return self
 
     def __exit__(self, *error: object) -> None:
         self._bar.stop()
 
-    def __call__(self, state: PhaseState) -> None:
-        is_new = (state.number, state.count) != self._phase
-        self._phase = (state.number, state.count)
-        head = f"phase {state.number} of {state.count}: {state.words}"
-        if not self._shown:
-            return
-        if self._on_terminal:
-            self._show(head, state, is_new)
-        elif is_new or state.seconds - self._said >= self.EVERY:
-            self._said = state.seconds
-            count = "" if state.done == 0 or state.total is None else f"{state.done} of {state.total}"
-            say(", ".join(part for part in (head, count, time_left(state.left_s)) if part))
-
-    def note(self, words: str) -> None:
-        """Show that a short step follows the last phase."""
-        self._phase = None
-        if self._shown and self._on_terminal:
-            self._replace(words, None, "")
-        elif self._shown:
-            say(words)
-
-    def refresh(self) -> None:
-        """Draw the bar now instead of at its next refresh."""
-        self._bar.refresh()
-
-    def _show(self, head: str, state: PhaseState, is_new: bool) -> None:
-        left = time_left(state.left_s)
+    def __call__(self, words: str, done: int = 0, total: int | None = None, left: str | None = None) -> None:
+        """Show what is being done, how many steps of it, and what is left, by default the time."""
+        now, is_new = self._clock(), words != self._words
         if is_new:
-            self._replace(head, state.total, left)
-        self._bar.update(self._task, completed=state.done, total=state.total, left=left)
+            self._begun = now if self._words else self._begun
+            self._words = words
+        if left is None:
+            passed = now - self._begun
+            known = total is not None and 0 < done < total and passed > self.PATIENCE
+            left = time_left(passed / done * (total - done)) if known and total is not None else ""
+        if self._lines:
+            if now - self._said >= self.EVERY or (is_new and self._at_once):
+                self._said = now
+                count = "" if done == 0 or total is None else f"{done} of {total}"
+                say(", ".join(part for part in (words, count, left) if part))
+            return
+        if is_new:
+            if self._task is not None:  # rich cannot unset the total of a task, so it is replaced
+                self._bar.remove_task(self._task)
+            self._task = self._bar.add_task(words, total=total, left=left)
+        self._bar.update(self._task, completed=done, total=total, left=left)
 
-    def _replace(self, description: str, total: int | None, left: str) -> None:
-        if self._task is not None:  # rich cannot unset the total of a task, so it is replaced
-            self._bar.remove_task(self._task)
-        self._task = self._bar.add_task(description, total=total, left=left)
+    def phase(self, state: PhaseState) -> None:
+        """Show a computation of several phases."""
+        head = f"phase {state.number} of {state.count}: {state.words}"
+        self(head, state.done, state.total, time_left(state.left_s))
+
+    def fit(self, state: FitProgress) -> None:
+        """Show a fit."""
+        self(state.phase, state.done, state.total, f"cost {state.cost:.6g}" if isfinite(state.cost) else "")
+
+
+@contextmanager
+def progress_bar(words: str, wanted: bool | None, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """Give a callback that shows the number of steps done, and of all steps where `total` is not known before."""
+    with Bar(wanted) as bar:
+        yield lambda done, all_steps=None: bar(words, done, all_steps or total)
 
 
 def time_left(seconds: float | None) -> str:

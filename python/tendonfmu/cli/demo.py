@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import Progress, command
-from tendonfmu.cli.console import phase_bar, print_json, print_results, say, say_files, warn
+from tendonfmu.cli.console import Bar, print_json, print_results, say, say_files, warn
 
 
 @command()
@@ -29,8 +29,8 @@ def demo(
         warn(f"{story.missing}")
     for number, name in enumerate(story.names, start=1):
         say(f"{number} {name}: {TITLES[name][:1].lower()}{TITLES[name][1:]}")
-        with phase_bar(progress) as show:
-            chapter = story.run(name, show)
+        with Bar(progress) as bar:
+            chapter = story.run(name, bar)
         print_results(chapter.tables, chapter.lines, left="")
     story.write()
     say_files(story.files)

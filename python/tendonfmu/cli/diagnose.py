@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import ExtendedFinger, FreeRecordings, Progress, command
-from tendonfmu.cli.console import PhaseDisplay, print_json, print_results, progress_bar, say_files, warn
+from tendonfmu.cli.console import Bar, print_json, print_results, progress_bar, say_files, warn
 from tendonfmu.cli.hand import show_outcome
 from tendonfmu.errors import InputError
 from tendonfmu.options import DiagnoseOptions
@@ -86,13 +86,13 @@ def diagnose(
     if scheduler is not None:
         raise InputError("--scheduler: given without --history; expected both or neither")
     check_folder(output, [finger, *recordings, *tests, *before])
-    with PhaseDisplay(progress) as display:
+    with Bar(progress) as bar:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DiagnosisWarning)  # printed below, one line each
             diagnosed = find(
-                finger, recordings, test=tests, reference=before or None, progress=display, **vars(options)
+                finger, recordings, test=tests, reference=before or None, progress=bar.phase, **vars(options)
             )
-        display.note("writing the files")
+        bar("writing the files")
         written = diagnosed.write(output)
     print_results(
         diagnosis_text.tables(diagnosed.found),

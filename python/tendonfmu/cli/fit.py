@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tendonfmu.cli.command import FingerFile, FreeRecordings, Progress, Report, command
-from tendonfmu.cli.console import INTERRUPTED, fail, fit_bar, print_json, print_results, say, say_files
+from tendonfmu.cli.console import INTERRUPTED, Bar, fail, print_json, print_results, say, say_files
 from tendonfmu.files import counted
 from tendonfmu.options import FitOptions
 
@@ -54,9 +54,9 @@ def fit(
     if ssv is not None:
         check_parameter_set_path(ssv, *inputs)
     try:
-        with fit_bar(progress) as show, warnings.catch_warnings():
+        with Bar(progress) as bar, warnings.catch_warnings():
             warnings.simplefilter("ignore", FitWarning)  # printed below, one line each
-            result = fit_finger(finger, recordings, compare=compare or [], progress=show, **vars(options))
+            result = fit_finger(finger, recordings, compare=compare or [], progress=bar.fit, **vars(options))
     except FitInterrupted as stopped:
         left = write_unfinished(output, stopped.unfinished)
         fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")

@@ -22,10 +22,12 @@ from tendonfmu.recordings import (
     Held,
     RecordingSource,
     admit,
+    bias_is_constant,
     listed_sources,
     prepare,
     read_recordings,
     require_noise,
+    without_rests,
 )
 from tendonfmu.statistics import FEWEST_STRETCHES, STRETCH
 
@@ -103,8 +105,8 @@ def _read(
     held = Held() if test_sources else apart
     read, others = read_recordings(given_sources, role), read_recordings(test_sources, "test")
     warnings = [] if checked else admit(given, [*read, *others], unfit=UNFIT_FOR_SEARCH, besides=("routing",))
-    training = [prepare(given, recording, kinematics, held) for recording in read]
-    unseen = [prepare(given, other, kinematics, Held()) for other in others]
+    training = [_moving(given, prepare(given, recording, kinematics, held)) for recording in read]
+    unseen = [_moving(given, prepare(given, other, kinematics, Held())) for other in others]
     require_noise(given, training)
     require_unseen(training, unseen)
     check_unseen([recording.recording for recording in training], [recording.recording for recording in unseen])
@@ -113,6 +115,11 @@ def _read(
             f"{recording.path.name}: {text}" for recording in (*training, *unseen) for text in recording.warnings
         ]
     return Input(given, training, unseen, tuple(warnings))
+
+
+def _moving(finger: Finger, recording: FitRecording) -> FitRecording:
+    """Return a machine's recording without rests, at which its motor holds any torque; fingers keep theirs."""
+    return without_rests(recording, finger, is_batch=True) if bias_is_constant(finger.data) else recording
 
 
 def _require_motion(recordings: Sequence[FitRecording]) -> None:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .prepared import (
         FitRecording,
         Held,
+        bias_is_constant,
         held_out_blocks,
         motion_of,
         prepare,

@@ -58,7 +58,7 @@ def repair(path: Path, fitting: Repair) -> Finding:
 
 def rests(path: Path, share: float) -> Finding:
     """Describe a log with much rest."""
-    why = "a motor that holds with any torque up to friction", "fit learns from the samples in motion alone"
+    why = "a motor that holds with any torque up to friction", "fit and diagnose learn from motion alone"
     return Finding("warning", "rests", path, ("joint_velocity",), f"{percent(share)} at rest", *why)
 
 
