@@ -16,6 +16,7 @@ import pytest
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, measure, needs_nothing_else
 from repetitions import repeated
+from tendonfmu.diagnosis.cause import Where
 from tendonfmu.diagnosis.names import title_of
 from tendonfmu.diagnosis.reported import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
@@ -182,6 +183,16 @@ def test_the_waterfall_leads_from_the_nominal_to_the_extended_model(make: Callab
     assert fall.floor is not None and last[0].width == pytest.approx(fall.floor, abs=0.01)
     assert all(0.0 <= part.start <= part.start + part.width <= 100.01 for row in fall.rows for part in row.parts)
     assert plain(diagnosis_page(found)).count(found.verdict) > 0
+
+
+def test_green_stands_for_a_cause_that_is_certain() -> None:
+    known = examples.one_cause()
+    (cause,) = known.causes
+    rivals = (Where("force_gain", tendon=1), Where("moment_arm", joint=1, tendon=1), Where("cover_stiffness", joint=1))
+    unsure = dataclasses.replace(known, causes=(dataclasses.replace(cause, confusable_with=rivals),))
+    assert known.verdict == "explained" and 'class="verdict good"' in diagnosis_page(known)
+    assert 'class="verdict good"' not in diagnosis_page(unsure)
+    assert "It may also be another effect" in plain(diagnosis_page(unsure))
 
 
 def test_what_a_diagnosis_does_not_know_is_no_number(full: Diagnosis) -> None:

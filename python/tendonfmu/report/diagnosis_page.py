@@ -25,6 +25,7 @@ from tendonfmu.report.diagnosis_text import (
     confusion_sentence,
     error_rows,
     error_sentence,
+    has_rivals,
     headline,
     hidden,
     hidden_sentences,
@@ -101,7 +102,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
 
 def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     return {
-        "tone": _TONES[diagnosis.verdict],
+        "tone": "" if any(map(has_rivals, diagnosis.causes)) else _TONES[diagnosis.verdict],
         "headline": headline(diagnosis),
         "error": error_sentence(diagnosis),
         "left": left_sentence(diagnosis),

@@ -106,6 +106,11 @@ def _time_to_fall(lag: Numbers, correlation: Numbers) -> float:
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
+def has_rivals(cause: Cause) -> bool:
+    """Return whether the data cannot distinguish a cause from other effects."""
+    return bool(cause.confusable_with)
+
+
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence, and a second one where something touches the finger."""
     count = len(diagnosis.causes)
@@ -115,6 +120,8 @@ def headline(diagnosis: Diagnosis) -> str:
         cause = diagnosis.causes[0]
         size = f", {cause.size}" if cause.changed else ""
         text = f"{text[:-1]}: {at_place(cause.title, cause.where, names_of(diagnosis))}{size}."
+    if any(map(has_rivals, diagnosis.causes)):
+        text += f" {'It' if count == 1 else 'Some of them'} may also be another effect, which looks alike here."
     left = left_of(diagnosis)
     if left is not None and not count and diagnosis.kind != "change" and diagnosis.verdict in ("adequate", "explained"):
         memory = f", correlated over {left.memory}" if left.memory else ""
