@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
+from tendonfmu.diagnosis import base as base_module
 from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.base import delay_of_positions, find_base
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
@@ -161,6 +162,25 @@ def test_a_search_starts_at_the_true_delay(samples: int, source: int) -> None:
     rows = found_base(finger(), 24, source, samples).model.data.get("extensions") or []
     found = sum(row["delay"] for row in rows if row["effect"] == "time_delay")
     assert found == pytest.approx(samples / RATE, abs=0.6 / RATE)
+
+
+def test_the_same_reference_is_fitted_once(hidden: FitRecording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A history asks for it with every recording."""
+    asked = []
+    monkeypatch.setattr(base_module, "_found_base", lambda *given: asked.append(given) or len(asked))
+    monkeypatch.setattr(base_module, "_LAST", {})
+    given, settings = described(finger()), FitSettings(threads=1)
+    train = hidden.train.copy()
+    train[len(train) // 2] = False
+    answers = [
+        find_base(given, [hidden], settings, 0.03),
+        find_base(described(finger()), [copy.deepcopy(hidden)], settings, 0.03),
+        find_base(given, [replace(hidden, train=train)], settings, 0.03),
+        find_base(described(with_cover()), [hidden], settings, 0.03),
+        find_base(given, [hidden], settings, 0.05),
+        find_base(given, [hidden], settings, 0.03),
+    ]
+    assert answers == [1, 1, 2, 3, 4, 5], "only the last one is kept"
 
 
 def test_a_search_starts_with_the_memory_that_there_is() -> None:

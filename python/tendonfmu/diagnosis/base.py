@@ -8,6 +8,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -74,7 +76,39 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
 
 
 def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
-    """Fit the given description, and find what it lacks of delay, position-dependent torque and memory."""
+    """Fit the given description, and find what it lacks of delay, position-dependent torque and memory.
+
+    The last answer is kept, because a history asks the same of its reference for every recording.
+    """
+    key = _digest(given, recordings, settings, least_gain)
+    if key not in _LAST:
+        found = _found_base(given, recordings, settings, least_gain)
+        _LAST.clear()
+        _LAST[key] = found
+    return _LAST[key]
+
+
+_LAST: dict[str, Base] = {}
+
+
+def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> str:
+    """Return a hash of everything that a base depends on."""
+    known = hashlib.sha256(json.dumps([given.data, str(settings), least_gain]).encode())
+    for recording in recordings:
+        known.update(f"{recording.kinematics} {recording.parts}".encode())
+        groups = recording.recording.groups
+        for values in (
+            recording.time,
+            recording.target,
+            recording.train,
+            recording.at_rest,
+            *(groups[name] for name in sorted(groups)),
+        ):
+            known.update(values.tobytes())
+    return known.hexdigest()
+
+
+def _found_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
     samples = Samples.of(given.data, recordings, settings.threads)
     nominal = fit_numbers(given.data, samples, settings)
     samples = samples.as_rests_demand(nominal.data)
