@@ -6,6 +6,7 @@ import gzip
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,9 +18,10 @@ import pytest
 import typer
 
 import map_cases
-from command import Answer, Call
+from command import Answer, Call, DemoRun
 from fmu_binary import FINGER
 from plant_fmu_rig import fmu_rig
+from repetitions import repeated
 from repository_paths import ROOT
 from tendonfmu.cli.program import app
 
@@ -48,6 +50,7 @@ CALLS = {
     "score": ("{finger} {recording} -o score.json", "tendonfmu.interface.score"),
     "demo": ("-o demo", "tendonfmu.demo.Story"),
 }
+LEARNING = ("fit", "calibrate", "diagnose", "tune")  # what takes seconds
 QUICK = ("check", "build", "run", "simulate", "excite")  # the others are seen with --json where they are tested
 FILES = {"finger": "finger.json", "rig": "rig.json", "recording": "recording.csv", "model": "model.xml"}
 Feed = Callable[[bytes], None]
@@ -105,6 +108,18 @@ def test_a_command_has_help_and_the_common_options(call: Call, name: str) -> Non
     assert options["-q"] is options["--quiet"] and "--json" in options
     assert {word for word, each in options.items() if "processor" in (each.help or "")} <= {"--jobs"}
     assert all(each.help for word, each in options.items() if word.startswith("-") and word not in ("-h", "--help"))
+
+
+@pytest.mark.parametrize("name", repeated(COMMANDS, *(k for k, name in enumerate(COMMANDS) if name not in LEARNING)))
+def test_the_example_of_its_help_runs(call: Call, tmp_path: Path, demo_run: DemoRun, name: str) -> None:
+    (tmp_path / "tendonfmu-demo").symlink_to(demo_run.folder)
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    line = call(name, "--help").out.partition("Example:\n")[2].strip()
+    program, command, *given = shlex.split(line)
+    assert (program, command) == ("tendonfmu", name)
+    if name != "demo":  # which has run
+        answer = call(name, *given)
+        assert answer.status == 0, answer
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -34,24 +34,77 @@ app = typer.Typer(
     help="Model the friction of tendon-driven robot fingers, and detect contact without a tactile sensor.",
 )
 
-for name, (function, summary) in {  # in the order of --help
-    "check": (check.check, "Check a description, and whether recordings belong to it."),
-    "build": (run.build, "Pack an FMU of a finger, or of a simulated one."),
-    "run": (run.run, "Run a model over a recording and write all outputs."),
-    "simulate": (run.simulate, "Simulate a finger and write the recording."),
-    "convert": (convert.convert, "Convert any log into a recording."),
-    "import": (import_mjcf.import_model, "Make a description from a MuJoCo model."),
-    "export": (import_mjcf.export_model, "Write fitted numbers into a MuJoCo model."),
-    "describe": (convert.describe, "Write a description to begin with."),
-    "excite": (excite.excite, "Plan a training motion."),
-    "fit": (fit.fit, "Estimate the numbers of a finger from free motion."),
-    "calibrate": (calibrate.calibrate, "The main way: from free motion to a tuned FMU."),
-    "diagnose": (diagnose.diagnose, "Show what a model gets wrong, and name the cause."),
-    "tune": (detect.tune, "Tune contact detection for a rate of false alarms."),
-    "score": (detect.score, "Measure contact detection against labels."),
-    "demo": (demo.demo, "Show every step on built-in data."),
+DATA, TWO = "tendonfmu-demo/data", "tendonfmu-demo/data/two_joints"  # which `tendonfmu demo` leaves
+INDEX = f"{DATA}/index_finger_calibrated.json"
+# in the order of --help; an example runs where `tendonfmu demo` has run, and, where it names examples, in a clone
+for name, (function, summary, example) in {
+    "check": (
+        check.check,
+        "Check a description, and whether recordings belong to it.",
+        f"{TWO}.json {TWO}_training.parquet",
+    ),
+    "build": (run.build, "Pack an FMU of a finger, or of a simulated one.", f"{INDEX} -o index_finger.fmu"),
+    "run": (
+        run.run,
+        "Run a model over a recording and write all outputs.",
+        f"{INDEX} {DATA}/index_finger_pushes.parquet -o out.csv",
+    ),
+    "simulate": (
+        run.simulate,
+        "Simulate a finger and write the recording.",
+        "examples/rigs/index_finger_pushes.json -o pushes.parquet",
+    ),
+    "convert": (
+        convert.convert,
+        "Convert any log into a recording.",
+        f"inspect {TWO}_training.parquet",
+    ),
+    "import": (
+        import_mjcf.import_model,
+        "Make a description from a MuJoCo model.",
+        "mjcf examples/mujoco/finger.xml -o finger.json",
+    ),
+    "export": (
+        import_mjcf.export_model,
+        "Write fitted numbers into a MuJoCo model.",
+        "mjcf examples/mujoco/finger_calibrated.json examples/mujoco/finger.xml -o fitted.xml",
+    ),
+    "describe": (
+        convert.describe,
+        "Write a description to begin with.",
+        'finger --name thumb --joints base,tip --tendon "flexor base+ tip+" --tendon "extensor base- tip-" '
+        '--tendon "tip_extensor base+ tip-" -o thumb.json',
+    ),
+    "excite": (excite.excite, "Plan a training motion.", f"{TWO}.json -o motion.csv --duration 60 --pretension 20"),
+    "fit": (
+        fit.fit,
+        "Estimate the numbers of a finger from free motion.",
+        f"{TWO}.json {TWO}_training.parquet --compare {TWO}_unseen.parquet -o fitted.json",
+    ),
+    "calibrate": (
+        calibrate.calibrate,
+        "The main way: from free motion to a tuned FMU.",
+        f"{TWO}.json {TWO}_training.parquet --test {TWO}_unseen.parquet -o calibrated",
+    ),
+    "diagnose": (
+        diagnose.diagnose,
+        "Show what a model gets wrong, and name the cause.",
+        f"{TWO}.json {TWO}_training.parquet --test {TWO}_unseen.parquet -o diagnosis",
+    ),
+    "tune": (
+        detect.tune,
+        "Tune contact detection for a rate of false alarms.",
+        f"{INDEX} {DATA}/index_finger_free.parquet -o tuned.json",
+    ),
+    "score": (
+        detect.score,
+        "Measure contact detection against labels.",
+        f"{INDEX} {DATA}/index_finger_pushes.parquet -o score.json",
+    ),
+    "demo": (demo.demo, "Show every step on built-in data.", ""),
 }.items():
-    app.command(name, cls=SeveralValues, short_help=summary)(function)
+    shown = "\n  ".join(["\b\nExample:", f"tendonfmu {name} {example}".rstrip()])
+    app.command(name, cls=SeveralValues, short_help=summary, epilog=shown)(function)
 
 
 @functools.cache

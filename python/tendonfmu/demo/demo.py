@@ -25,7 +25,7 @@ from tendonfmu.calibration import text as calibration_text
 from tendonfmu.drawing import Sheet
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
-from tendonfmu.files import check_output_folder, write_text
+from tendonfmu.files import check_output_folder, whole_file, write_text
 from tendonfmu.interface import CalibrateResult, build, calibrate, fit, run, score
 from tendonfmu.model import read_finger
 from tendonfmu.report import (
@@ -114,7 +114,12 @@ class Story:
 
     def write(self) -> None:
         """Write the page of all chapters that have run, whole or not at all."""
-        page = self.folder / PAGE
+        page, copied = self.folder / PAGE, self.folder / "data"
+        copied.mkdir(exist_ok=True)
+        for file in DATA.iterdir():
+            with whole_file(copied / file.name) as temporary:
+                temporary.write_bytes(file.read_bytes())
+        self.files[copied] = "the built-in data, which the examples of --help use"
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}

@@ -10,13 +10,14 @@ import numpy as np
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.base import refitted
 from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, SCALING, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term
 from tendonfmu.diagnosis.effects.memory import PRESLIDING
 from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, intervals_of, with_known
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.search import Search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed, names_with, step_p_value
+from tendonfmu.estimate import SCALING
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
 

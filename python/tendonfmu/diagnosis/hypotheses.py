@@ -16,9 +16,9 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction, Where
-from tendonfmu.diagnosis.effects import BY_NAME, SCALING, SHARED, Place, Term, Variant
+from tendonfmu.diagnosis.effects import BY_NAME, SHARED, Place, Term, Variant
 from tendonfmu.diagnosis.extension_fit import structure_of
-from tendonfmu.estimate import Estimator, Unknown, own_copy, set_number
+from tendonfmu.estimate import SCALING, Estimator, Unknown, own_copy, set_number
 from tendonfmu.model import law_path, native, steps_of
 
 LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range

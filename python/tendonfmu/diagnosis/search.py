@@ -17,7 +17,7 @@ from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of
-from tendonfmu.diagnosis.effects import CALIBRATED, SCALING, Place, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, Place, Term
 from tendonfmu.diagnosis.effects.memory import MEMORY, memory_of
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, possible
 from tendonfmu.diagnosis.result import Event
@@ -31,6 +31,7 @@ from tendonfmu.diagnosis.selection import (
     step_p_value,
 )
 from tendonfmu.diagnosis.view import View
+from tendonfmu.estimate import SCALING
 from tendonfmu.model import finger_from_data
 from tendonfmu.tasks import Phases, Step
 

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from .slow_drift import SlowDrift, slowest_drift
     from .structure import (
         MAGNITUDES,
+        SCALING,
         Choice,
         Structure,
         build_structure,

@@ -14,7 +14,6 @@ from tendonfmu.diagnosis.effects.table import (
     COMMON,
     OF_LAW,
     RUBBING,
-    SCALING,
     SHARED,
     by_name,
 )
@@ -27,7 +26,6 @@ __all__ = [
     "COMMON",
     "OF_LAW",
     "RUBBING",
-    "SCALING",
     "SHARED",
     "Candidate",
     "Column",

@@ -153,8 +153,6 @@ class Candidate:
     # Effects of surfaces and materials: a finger tends to have them at all of its places alike. The others belong to
     # one sensor, link or pulley.
     shared: bool = False
-    # Corrections of the torque itself: a large one shrinks the torque, and with it everything that is left of it.
-    scaling: bool = False
     common: bool = False  # in every finger, or in every way of recording: its name does not count
 
     def places(self, data: Data, kinematics: int = 1) -> list[Place]:

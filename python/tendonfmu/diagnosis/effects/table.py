@@ -282,7 +282,6 @@ CANDIDATES: tuple[Candidate, ...] = (
         # at -1 there would be no force
         make=terms.row(-0.9, correction=0),
         size=words.correction("the true force is"),
-        scaling=True,
     ),
     Candidate(
         name="force_offset",
@@ -338,7 +337,6 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.passes,
         make=terms.row(correction=0),
         size=words.arm,
-        scaling=True,
     ),
     Candidate(
         name="moment_arm_variation",
@@ -352,7 +350,6 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.passes,
         make=terms.row(slope=0),
         size=words.of("the arm changes by {}", "slope"),
-        scaling=True,
     ),
     Candidate(
         name="pulley_eccentricity",
@@ -369,7 +366,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             words.wave("the arm goes up and down by {}"), "turns", ", {} times per turn of the joint"
         ),
         find_shapes=shapes.pulley,
-        scaling=True,
     ),
     Candidate(
         name="tendon_nonlinearity",
@@ -424,7 +420,6 @@ CANDIDATES: tuple[Candidate, ...] = (
 CALIBRATION = "calibration"  # many corrections at once: `calibration.py`
 CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")
 SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
-SCALING = tuple(candidate.name for candidate in CANDIDATES if candidate.scaling)
 RUBBING = ("stribeck", *(candidate.name for candidate in CANDIDATES if "friction" in candidate.name))
 # what depends on speed, load, acceleration or travel, as every friction law does
 OF_LAW = (
