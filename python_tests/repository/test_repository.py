@@ -13,6 +13,7 @@ import pytest
 
 from optional_parts import require
 from repository_paths import ROOT
+from tendonfmu.model import read_finger
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -116,3 +117,11 @@ def test_no_file_carries_a_machine_or_a_registry() -> None:
         for match in (*MACHINE.finditer(text), *REGISTRY.finditer(text))
     ]
     assert found == []
+
+
+DESCRIBED = [file for file in sorted((ROOT / "examples").rglob("*.json")) if '"tendonfmu-finger-1"' in file.read_text()]
+
+
+@pytest.mark.parametrize("file", DESCRIBED, ids=lambda file: str(file.relative_to(ROOT)))
+def test_every_description_of_the_examples_is_read(file: Path) -> None:
+    assert read_finger(file).joint_names

@@ -55,7 +55,10 @@ Subject = Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="f
 Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for a page with figures")]
 Report = Annotated[Path | None, typer.Option(metavar="R.json", help="report with all results, as JSON")]
 Progress = Annotated[
-    bool | None, typer.Option("--progress/--no-progress", help="show progress [default: a bar on a terminal, else a line every 10 s]")
+    bool | None,
+    typer.Option(
+        "--progress/--no-progress", help="show progress [default: a bar on a terminal, else a line every 10 s]"
+    ),
 ]
 
 
