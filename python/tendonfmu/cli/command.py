@@ -56,9 +56,7 @@ Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="folder for a 
 Report = Annotated[Path | None, typer.Option(metavar="R.json", help="report with all results, as JSON")]
 Progress = Annotated[
     bool | None,
-    typer.Option(
-        "--progress/--no-progress", help="show progress [default: a bar on a terminal, else a line every 10 s]"
-    ),
+    typer.Option("--progress/--no-progress", help="show progress [default: a bar on a terminal, else lines]"),
 ]
 
 
