@@ -52,6 +52,16 @@ def test_a_repeat_is_found_with_its_shift(shift: float) -> None:
     assert found.end == pytest.approx(THEN.time[-1] - shift, abs=1e-9)
 
 
+def test_a_repeat_is_found_within_a_longer_reference_that_moves_more_elsewhere() -> None:
+    parts = joined(replace(FOREIGN, angle=3.0 * FOREIGN.angle), THEN, make_series(4, SECONDS))
+    count = len(THEN.time)
+    reference = replace(parts, time=np.arange(3 * count) * STEP)
+    both = joined(reference, THEN)
+    (found,) = find_repeats(both, forces(both), [0], [1])
+    assert found.shift == pytest.approx(THEN.time[0] - reference.time[count], abs=1e-9)
+    assert found.end - found.begin == pytest.approx(THEN.time[-1] - THEN.time[0], abs=1e-9)
+
+
 def test_a_controller_that_follows_as_well_repeats_it() -> None:
     rng = np.random.default_rng(3)
     wandering = 0.01 * np.ptp(THEN.angle, axis=0) * np.sin(2 * np.pi * 0.4 * THEN.time[:, None] + rng.uniform(0, 6, 2))

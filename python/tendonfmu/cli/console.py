@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from tendonfmu.estimate import FitProgress
     from tendonfmu.tasks import PhaseState
 
+MOST_WARNINGS = 5  # lines at the end of a result
 # exit status of every command; 0 is done, 129 and 143 are ended by SIGHUP and SIGTERM
 NO, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
 
@@ -127,12 +128,15 @@ def leave(status: int) -> NoReturn:
 
 
 def print_results(tables: Iterable[Any], lines: Iterable[str], left: str, warnings: Iterable[str] = ()) -> None:
-    """Print tables of (title, headings, rows), lines, and then a line for each kind of warnings; reports have all."""
+    """Print tables of (title, headings, rows), lines, and a line for each of the first kinds of warnings."""
     from tendonfmu.files import by_kind
 
     _print_tables(tables, lines, left)
-    for words, _ in by_kind(warnings):
+    kinds = by_kind(warnings)
+    for words, _ in kinds[:MOST_WARNINGS]:
         warn(words)
+    if more := len(kinds[MOST_WARNINGS:]):
+        warn(f"{more} more of other kinds: the report and the page have all")
 
 
 def _print_tables(tables: Iterable[Any], lines: Iterable[str], left: str) -> None:

@@ -7,6 +7,7 @@ was repeated exactly, aligned samples are subtracted instead, and almost nothing
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -39,9 +40,6 @@ Rows = NDArray[np.int64]
 SAME_ANGLES = 0.02  # of the angles' spread: a controller follows the same reference this closely
 SAME_FORCES = 0.1  # of the forces: friction that grows with them then differs by as little
 SHORTEST = 5.0  # s; least length that both motions share
-LATEST = (
-    0.3  # s: the later one motion is, the fewer samples their correlation sums, which moves its peak by less than this
-)
 
 
 def background_columns(
@@ -144,7 +142,7 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
     step = series.step
     if min(map(len, time)) * step < SHORTEST or any(np.diff(times).max() > 1.5 * step for times in time):
         return None
-    for lag in _lags(angle[0], angle[1], round(LATEST / step)):
+    for lag in _lags(angle[0], angle[1], math.ceil(SHORTEST / step)):
         begin, end = _shared(len(angle[0]), len(angle[1]), lag)
         if (end - begin) * step < SHORTEST:
             continue
@@ -173,23 +171,17 @@ def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
     return max(0, -lag), min(one, other - lag)
 
 
-def _lags(one: Numbers, other: Numbers, near: int) -> Iterator[int]:
-    """Yield possible delays of the second motion, in blocks."""
+def _lags(one: Numbers, other: Numbers, fewest: int) -> Iterator[int]:
+    """Yield possible delays of the second motion, in blocks: none, and that by which both differ least."""
     yield 0
-    whole = np.zeros(len(one) + len(other) - 1)
-    for a, b in zip((one - one.mean(axis=0)).T, (other - other.mean(axis=0)).T, strict=True):
-        scale = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
-        whole += correlate(b, a, method="fft") / scale
-    best = int(np.argmax(whole)) - (len(one) - 1)
-    yield min(range(best - near, best + near + 1), key=lambda lag: _apart(one, other, lag))
-
-
-def _apart(one: Numbers, other: Numbers, lag: int) -> float:
-    """Return the mean square difference of the angles over what both share."""
-    begin, end = _shared(len(one), len(other), lag)
-    if end <= begin:
-        return np.inf
-    return float(np.mean((one[begin:end] - other[begin + lag : end + lag]) ** 2))
+    one, other = (motion / np.maximum(np.ptp(other, axis=0), 1e-300) for motion in (one, other))
+    lags = np.arange(1 - len(one), len(other))
+    begin, end = np.maximum(0, -lags), np.minimum(len(one), len(other) - lags)
+    sums, others = (np.concatenate([[0.0], np.cumsum(np.sum(motion**2, axis=1))]) for motion in (one, other))
+    apart = sums[end] - sums[begin] + others[end + lags] - others[begin + lags]
+    for a, b in zip(one.T, other.T, strict=True):
+        apart -= 2.0 * correlate(b, a, method="fft")
+    yield int(lags[np.argmin(np.where(end - begin >= fewest, apart / (end - begin), np.inf))])
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
