@@ -22,11 +22,9 @@ from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import names_of
-from tendonfmu.report.fit_figures import fit_sheets
 from tendonfmu.report.fit_page import fit_page
 from tendonfmu.report.fit_text import residual_tables
 from tendonfmu.report.numbers import percent_interval
-from tendonfmu.report.page import drawn
 from tendonfmu.report.run_page import run_page, run_report
 from tendonfmu.statistics.intervals import Interval
 
@@ -36,7 +34,7 @@ HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
 @pytest.fixture(scope="module")
 def pages(fit: FitPicture, full: Diagnosis, table: dict[str, Any], run_numbers: dict[str, Any]) -> dict[str, str]:
     return {
-        "fit": fit_page(fit, drawn(fit_sheets(fit))),
+        "fit": fit_page(fit),
         "diagnosis": diagnosis_page(full),
         "run": run_page(run_numbers, table, np.arange(len(table["time"])) < 120),
     }

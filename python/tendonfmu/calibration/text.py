@@ -18,7 +18,6 @@ from tendonfmu.report import (
     Row,
     Table,
     capital,
-    drawn,
     friction_figure,
     motion_sheet,
     push_sheet,
@@ -361,7 +360,7 @@ def calibration_page(calibration: Calibration) -> str:
     tone, sentence = verdict(report)
     return render(
         "calibration.html.jinja",
-        drawn(sheets(calibration)),
+        sheets(calibration),
         report=report,
         finger=friction_figure(calibration.data),
         tone=tone,

@@ -35,7 +35,6 @@ from tendonfmu.report import (
     diagnosis_page,
     diagnosis_sheets,
     diagnosis_text,
-    drawn,
     fit_page,
     fit_text,
     law_sheets,
@@ -118,7 +117,7 @@ class Story:
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}
-        write_text(page, render("story.html.jinja", drawn(sheets), **content))
+        write_text(page, render("story.html.jinja", sheets, **content))
         self.files = {page: "the whole demo, for a browser", **self.files}
 
     def report(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
-from tendonfmu.drawing.panel import BLUE, DARK, GREY, LIGHT, SKIN
+from tendonfmu.drawing.figures import BLUE, DARK, GREY, LIGHT, SKIN
 from tendonfmu.errors import InternalError
 from tendonfmu.model import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from .history import headline, history_report, rows_of_lines, trend_sentence, write_history
     from .marked_finger import friction_figure
     from .numbers import Row, Table, capital, column, html_of, percent, rms, rounded, together
-    from .page import Tile, drawn, render, write_figures
+    from .page import Tile, render, write_figures
     from .rerun_recording import check_rerun, write_rerun
     from .run_page import check_page, run_report, run_sheets, write_run_page
     from .score_figures import score_sheets, write_score_figures
-    from .tune_figures import write_tune_figures
+    from .tune_figures import tail_sheet, write_tune_figures
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -52,7 +52,7 @@ from tendonfmu.report.numbers import (
     rounded,
     together,
 )
-from tendonfmu.report.page import Tile, drawn, render
+from tendonfmu.report.page import Tile, render
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs listed at most
@@ -65,7 +65,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
     names, (factor, unit) = names_of(diagnosis), unit_of(diagnosis)
     return render(
         "diagnosis.html.jinja",
-        drawn(diagnosis_sheets(diagnosis)),
+        diagnosis_sheets(diagnosis),
         diagnosis=diagnosis,
         words=words_of(diagnosis.kind),
         unit=unit,

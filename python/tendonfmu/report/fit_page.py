@@ -21,7 +21,7 @@ from tendonfmu.report.fit_text import (
     summary_sentences,
 )
 from tendonfmu.report.numbers import Row, percent, rounded, unit_text
-from tendonfmu.report.page import Drawn, Tile, drawn, make_folder, render
+from tendonfmu.report.page import Tile, make_folder, render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
@@ -32,16 +32,16 @@ Entry = Mapping[str, Any]
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     """Write `report.html` to a folder, which is made if missing, whole or not at all."""
     make_folder(folder)
-    write_text(folder / PAGE, fit_page(picture, drawn(fit_sheets(picture))))
+    write_text(folder / PAGE, fit_page(picture))
     return {folder / PAGE: "all results, to be read in a browser"}
 
 
-def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:
+def fit_page(picture: FitPicture) -> str:
     """Return the HTML text of the page of a fit."""
     report, tables = picture.report, list(residual_tables(picture))
     return render(
         "fit.html.jinja",
-        sheets,
+        fit_sheets(picture),
         report=report,
         state=state_of(report),
         tiles_shown=_tiles(report, tables),
