@@ -70,7 +70,7 @@ TEMPLATE = {  # what all figures share
         "yaxis": {**_AXIS, "showline": False, "ticks": "", "gridcolor": "#e6e6e6", "automargin": "left"},
     },
 }
-_COLUMNS, _ROW, _GAP, _TOP, _BOTTOM = 2, 240, 78, 90, 50  # of a notebook's figure; CSS pixels
+_COLUMNS, _ROW, _GAP = 2, 230, 84  # of a notebook's figure; heights in CSS pixels
 
 
 # --- in a page --------------------------------------------------------------------------------------------------------
@@ -150,11 +150,13 @@ def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), col
     layout: dict[str, Any] = {"annotations": [], "shapes": []}
     traces, named = [], set[str]()
     for k, shown in enumerate(panels):
-        left, top = (k % columns) / columns, 1 - (_ROW + gap) * (k // columns) / height
+        left, top = (k % columns) * 1.07 / columns, 1 - (_ROW + gap) * (k // columns) / height
         number, other = k + 1 if k else "", k + 1 + len(panels)
         x, y, counts = f"x{number}", f"y{number}", f"y{other}"
-        domain = [left, left + (0.87 if columns > 1 else 1.0) / columns]
+        domain = [left, left + (0.93 if columns > 1 else 1.0) / columns]
         together = {"matches": "x"} if columns == 1 and k else {}
+        if columns == 1 and k < len(panels) - 1:
+            together["title"] = {}
         layout[f"xaxis{number}"] = shown.layout["xaxis"] | {"domain": domain, "anchor": y} | together
         layout[f"yaxis{number}"] = shown.layout["yaxis"] | {"domain": [max(top - _ROW / height, 0), top], "anchor": x}
         if "yaxis2" in shown.layout:
@@ -170,10 +172,12 @@ def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), col
             at = {"xref": "paper", "yref": "paper", "x": left, "y": top, "xanchor": "left", "yanchor": "bottom"}
             text = {"text": f"<b>{titles[k]}</b>", "showarrow": False, "align": "left", "font": {"size": 12}}
             layout["annotations"].append(at | text)
-    heading = {"text": html.escape(title), "x": 0, "xref": "container", "pad": {"l": 12}, "font": {"size": 14}}
-    whole = height + _TOP + _BOTTOM
-    legend = {"orientation": "h", "y": 1 - 30 / whole, "yref": "container", "yanchor": "top"}
-    figure = go.Figure(traces, layout | {"title": heading, "showlegend": True}, _validate=False)
+    letters = sum(8 + len(name) for name in named)  # of the legend
+    margin = {"t": 60 + 22 * (1 + letters // 150) + (30 if any(titles) else 0), "b": 50, "l": 58, "r": 12}
+    whole = height + margin["t"] + margin["b"]
+    heading = {"text": html.escape(title), "x": 0, "xref": "container", "font": {"size": 14}}
+    heading |= {"y": 1, "yref": "container", "yanchor": "top", "pad": {"l": 12, "t": 14}}
+    legend = {"orientation": "h", "y": 1 - 44 / whole, "yref": "container", "yanchor": "top"}
+    figure = go.Figure(traces, layout | {"title": heading, "legend": legend, "showlegend": True}, _validate=False)
     figure.update_layout(template=TEMPLATE, paper_bgcolor="#fff", plot_bgcolor="#fff", hovermode="closest")
-    margin = {"t": _TOP, "b": _BOTTOM, "l": 58, "r": 12}
-    return figure.update_layout(height=whole, margin=margin, legend=legend)
+    return figure.update_layout(height=whole, margin=margin)
