@@ -154,7 +154,7 @@ def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), col
         number, other = k + 1 if k else "", k + 1 + len(panels)
         x, y, counts = f"x{number}", f"y{number}", f"y{other}"
         domain = [left, left + (0.93 if columns > 1 else 1.0) / columns]
-        together = {"matches": "x"} if columns == 1 and k else {}
+        together: dict[str, Any] = {"matches": "x"} if columns == 1 and k else {}
         if columns == 1 and k < len(panels) - 1:
             together["title"] = {}
         layout[f"xaxis{number}"] = shown.layout["xaxis"] | {"domain": domain, "anchor": y} | together
