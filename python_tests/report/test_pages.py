@@ -116,7 +116,7 @@ def test_the_page_of_a_fit_holds_its_numbers(fit: FitPicture, pages: dict[str, s
     for entry in fit.report["parameters"]:
         assert entry["path"].split(".", 1)[1] in page and f"{entry['value']:.4g}".rstrip("0") in numbers, entry
     assert numbers.count('class="doubtful"') == sum(not entry["identified"] for entry in fit.report["parameters"])
-    tables = list(residual_tables(fit))
+    tables = residual_tables(fit.report, fit.fitted.joint_names)
     assert [part.title for part in tables] == ["Training", "Held out of training", "Not trained on: x4"]
     for part, data in zip(tables, (residual, fit.report["residual"]["held_out"]), strict=False):
         assert part.all.fitted == pytest.approx(1e3 * np.sqrt(np.mean(np.square(data["rms"]))))

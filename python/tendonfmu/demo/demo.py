@@ -178,7 +178,7 @@ class Story:
         self.files |= write_fit_page(picture, folder)
         fitted.write(folder / "fitted.json")
         self.files[folder / "fitted.json"] = "the fitted description"
-        residuals = list(residual_tables(picture))
+        residuals = residual_tables(picture.report, picture.fitted.joint_names)
         start, end = (rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
         tile = Tile(f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit")
         sheets = [list(torque_sheets(picture))[-1]]

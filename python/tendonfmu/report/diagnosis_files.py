@@ -50,7 +50,6 @@ from tendonfmu.tasks import uninterrupted
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
 DIGITS = 6  # significant digits of the curves
-_SUFFIXES = (".html", ".json", ".fmu", ".png")  # .png: earlier versions wrote figures beside the page
 _NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
@@ -108,8 +107,7 @@ def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
     old.mkdir()
     moved: list[tuple[Path, Path]] = []
     ordered = sorted(files, key=lambda file: file.name == REPORT)
-    names = {*_earlier(folder), *(file.name for file in ordered)}
-    leaving = [(folder / name, old / name) for name in sorted(names) if (folder / name).is_file()]
+    leaving = [(folder / file.name, old / file.name) for file in ordered if (folder / file.name).is_file()]
     try:
         for source, target in (*leaving, *((file, folder / file.name) for file in ordered)):
             os.replace(source, target)
@@ -129,7 +127,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     added = "no cause added" if causes == 0 else "its cause added" if causes == 1 else f"its {causes} causes added"
     for name, data in ((NOMINAL, diagnosis.nominal_data), (EXTENDED, diagnosis.extended_data)):
         write_text(folder / name, description_text(dict(data)))
-    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # drawing takes longer than all the rest
+    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU)
     files = {
         folder / PAGE: "all results, to be read in a browser",
         folder / REPORT: "the same numbers",
@@ -139,16 +137,6 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     }
     write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
     return files
-
-
-def _earlier(folder: Path) -> list[str]:
-    """List the files that the report of an earlier diagnosis names, including figures of causes no longer found."""
-    try:
-        listed = json.loads((folder / REPORT).read_bytes())["files"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return []
-    texts = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
-    return [name for name in texts if Path(name).name == name and Path(name).suffix in _SUFFIXES]
 
 
 # --- the report -------------------------------------------------------------------------------------------------------
