@@ -28,8 +28,8 @@ BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "
 DARK, GREY, LIGHT, SKIN, SILVER, SAND = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC", "#BDBDBD", "#F0C27A"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, DARK, GREY)  # of curves that are alike
 DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
-SIZES: Mapping[Size, tuple[int, int]] = {"small": (370, 230), "medium": (560, 230), "large": (560, 380)}  # CSS pixels
-WIDE = (1120, 210)
+SIZES: Mapping[Size, tuple[int, int]]  # CSS pixels
+SIZES = {"small": (370, 230), "medium": (560, 230), "large": (560, 380), "wide": (1120, 210)}
 
 _HISTOGRAM = 0.16  # share of the height of the axes
 _INNER = 0.6  # decades that the linear part of a stretched axis takes on each side of 0
@@ -164,7 +164,13 @@ def heat(values: Numbers, x: Numbers, y: Numbers, colours: Sequence[str], limits
 
 def stripes(intervals: Sequence[Interval], name: str, colour: str, alpha: float) -> Trace:
     """Return intervals of x that are shaded over the whole height."""
-    fill = {"type": "rect", "fillcolor": _faint(colour, alpha), "line": {"width": 0}, **_UPRIGHT}
+    fill = {
+        "type": "rect",
+        "fillcolor": _faint(colour, alpha),
+        "line": {"width": 0},
+        "name": html.escape(name),
+        **_UPRIGHT,
+    }
     shapes = [{**fill, "x0": begin, "x1": end} for begin, end in intervals]
     return {"shapes": shapes, "name": name, "key": ("patch", colour, alpha) if name and shapes else None}
 
@@ -238,8 +244,8 @@ def panel(
         layout["yaxis2"] = {"overlaying": "y", "range": [0, 1 / _HISTOGRAM], "visible": False, "fixedrange": True}
     value = "%{x:.4~g}" if rows and all(trace["mode"] != "lines" for trace in drawn) else "%{y:.4~g}"
     traces = [_placed(trace, value, unit, near_x, near_y) for trace in _thinned(drawn)]
-    extent = WIDE if size == "wide" else SIZES[size]
-    return Panel(title, alt, traces, layout, keys, note, size, (extent[0], height - 20 if height else extent[1]), zoom)
+    extent = SIZES[size][0], height - 20 if height else SIZES[size][1]
+    return Panel(title, alt, traces, layout, keys, note, size, extent, zoom)
 
 
 def _is_drawn(trace: Trace) -> bool:

@@ -161,13 +161,12 @@ def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), col
         layout[f"yaxis{number}"] = shown.layout["yaxis"] | {"domain": [max(top - _ROW / height, 0), top], "anchor": x}
         if "yaxis2" in shown.layout:
             layout[f"yaxis{other}"] = shown.layout["yaxis2"] | {"overlaying": y, "anchor": x}
-        layout["shapes"] += [shape | {"xref": x, "yref": f"{y} domain"} for shape in shown.layout["shapes"]]
         for trace in shown.traces:
-            name = trace.get("name", "")
-            first = trace.get("showlegend", False) and name not in named
-            named |= {name} if first else set()
             axes = {"xaxis": x, "yaxis": counts if "yaxis" in trace else y}
-            traces.append(trace | axes | {"showlegend": first, "legendgroup": name})
+            traces.append(trace | axes | _in_legend(trace, trace.get("showlegend", False), named))
+        for shape in shown.layout["shapes"]:
+            axes = {"xref": x, "yref": f"{y} domain"}
+            layout["shapes"].append(shape | axes | _in_legend(shape, bool(shape.get("name")), named))
         if titles:
             at = {"xref": "paper", "yref": "paper", "x": left, "y": top, "xanchor": "left", "yanchor": "bottom"}
             text = {"text": f"<b>{titles[k]}</b>", "showarrow": False, "align": "left", "font": {"size": 12}}
@@ -181,3 +180,12 @@ def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), col
     figure = go.Figure(traces, layout | {"title": heading, "legend": legend, "showlegend": True}, _validate=False)
     figure.update_layout(template=TEMPLATE, paper_bgcolor="#fff", plot_bgcolor="#fff", hovermode="closest")
     return figure.update_layout(height=whole, margin=margin)
+
+
+def _in_legend(drawn: Mapping[str, Any], shown: bool, named: set[str]) -> dict[str, Any]:
+    """Show a name in the legend once."""
+    name = drawn.get("name", "")
+    first = shown and name not in named
+    if first:
+        named.add(name)
+    return {"showlegend": first, "legendgroup": name}
