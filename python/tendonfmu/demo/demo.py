@@ -23,7 +23,6 @@ from tendonfmu.calibration import DIAGNOSIS
 from tendonfmu.calibration import PAGE as CALIBRATION_PAGE
 from tendonfmu.calibration import text as calibration_text
 from tendonfmu.drawing import Sheet
-from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
 from tendonfmu.files import check_output_folder, write_text
 from tendonfmu.interface import CalibrateResult, build, calibrate, fit, run, score
@@ -38,6 +37,7 @@ from tendonfmu.report import (
     fit_page,
     fit_text,
     law_sheets,
+    make_folder,
     render,
     residual_tables,
     rounded,
@@ -92,10 +92,7 @@ class Story:
 
     def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+        make_folder(folder)
         self.folder = folder
         self.names = [name for name in TITLES if HAS_ESTIMATION or name not in ESTIMATING]
         self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"

@@ -5,7 +5,6 @@ The report is "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
@@ -31,12 +30,12 @@ from tendonfmu.diagnosis import (
 )
 from tendonfmu.errors import OutputError, own_fault
 from tendonfmu.files import (
-    check_output,
     check_output_folder,
     finite,
     in_use,
     is_about,
     remove_left_behind,
+    report_text,
     write_text,
 )
 from tendonfmu.fmu import build_fmu
@@ -50,15 +49,11 @@ from tendonfmu.tasks import uninterrupted
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
 DIGITS = 6  # significant digits of the curves
-_NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
     """Check before a long computation that the results can be written to a folder."""
-    check_output_folder(folder)
-    if folder.is_dir():
-        for name in _NAMED:
-            check_output(folder / name, *inputs)
+    check_output_folder(folder, (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL), inputs)
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
@@ -175,26 +170,6 @@ def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, A
         "views": [_view(view) for view in diagnosis.views],
     }
     return {key: finite(value) for key, value in report.items()}
-
-
-def report_text(report: Mapping[str, Any]) -> str:
-    """Format a report as JSON. Each entry of a list of objects and each curve is on a line of its own."""
-    parts = []
-    for key, value in report.items():
-        listed = isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
-        text = "[\n  " + ",\n  ".join(_entry(entry) for entry in value) + "]" if listed else _in_line(value)
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _entry(entry: Mapping[str, Any]) -> str:
-    if "evidence" not in entry:
-        return _in_line(entry)
-    return "{" + ",\n   ".join(f"{json.dumps(key)}: {_in_line(value)}" for key, value in entry.items()) + "}"
-
-
-def _in_line(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _plain(value: Any, **renamed: str) -> Any:

@@ -24,12 +24,12 @@ from tendonfmu.report.diagnosis_text import (
     confusion_sentence,
     error_rows,
     error_sentence,
+    gain_text,
     headline,
     hidden,
     hidden_sentences,
     left_of,
     left_sentence,
-    meaning_of_gain,
     names_of,
     next_sentence,
     place_rows,
@@ -71,7 +71,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         first=_first_screen(diagnosis, names),
         finger=finger_figure(diagnosis),
         fall=waterfall_of(diagnosis, names),
-        cards=cards_of(diagnosis, names),
+        cards=[_card(diagnosis, cause, names) for cause in reported_causes(diagnosis)],
         too_small=_too_small(diagnosis, names),
         uncertain=[
             (capital(cause.title), names.places(cause), percent_interval(cause.gain), capital(cause.experiment))
@@ -155,11 +155,6 @@ def _experiment(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
-def cards_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """Return what a page shows of each cause."""
-    return [_card(diagnosis, cause, names) for cause in reported_causes(diagnosis)]
-
-
 def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     """Return what a page shows of one cause."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
@@ -172,7 +167,7 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "place": capital(names.places(cause)),
         "size": cause.size,
         "long": len(cause.size) > _LONG,
-        "gain": f"{percent_interval(cause.gain)} {meaning_of_gain(diagnosis, cause)}",
+        "gain": gain_text(diagnosis, cause),
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
